@@ -1,0 +1,1 @@
+"""Motion becomes a picture: the scene and charts behind one front door."""

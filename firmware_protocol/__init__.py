@@ -1,0 +1,1 @@
+"""The wire: frames between a board and its gateway. Imports nothing of ours."""

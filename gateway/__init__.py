@@ -1,0 +1,1 @@
+"""Bytes become samples: ports, journal, clock, GNSS, publication."""

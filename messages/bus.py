@@ -1,0 +1,131 @@
+"""One Zenoh session, opened the same way by every process.
+
+Clients connect to explicit endpoints in client mode; scouting is off, so nothing is found or announced on the network
+by itself. A client may start before its router: it keeps trying in the background.
+"""
+
+import json
+import logging
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+import zenoh
+from google.protobuf.message import DecodeError, Message
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from messages.topics import NAME, Topic
+
+log = logging.getLogger(__name__)
+
+M = TypeVar("M", bound=Message)
+
+
+class BusSettings(BaseModel):
+    """[bus] of gyrofree.toml."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    prefix: str = "gyrofree"  # first part of every key; two installations on one router differ in it
+    router: str = "tcp/127.0.0.1:7447"  # endpoint of the router that clients connect to
+    listen: list[str] = Field(default_factory=lambda: ["tcp/127.0.0.1:7447"])  # endpoints the router listens on
+    lease_ms: int = Field(default=2000, ge=200, le=60000)  # a frozen peer is noticed after this long
+
+    @field_validator("prefix")
+    @classmethod
+    def _prefix_is_a_name(cls, value: str) -> str:
+        if not NAME.fullmatch(value):
+            raise ValueError(f"{value!r}: want a-z, 0-9, _ and - after a first letter, at most 32 characters")
+        return value
+
+
+def _config(settings: BusSettings, mode: str) -> zenoh.Config:
+    config = zenoh.Config()
+    values = {
+        "mode": mode,
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "timestamping/enabled": True,
+        "transport/link/tx/lease": settings.lease_ms,
+    }
+    if mode == "router":
+        values["listen/endpoints"] = settings.listen
+    else:
+        values["connect/endpoints"] = [settings.router]
+        values["connect/timeout_ms"] = -1
+        values["connect/exit_on_failure"] = False
+        values["listen/endpoints"] = []
+    for key, value in values.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+def open_router(settings: BusSettings) -> zenoh.Session:
+    """A session that routes for all others; raises zenoh.ZError when an endpoint cannot be bound."""
+    return zenoh.open(_config(settings, "router"))
+
+
+def open_client(settings: BusSettings) -> zenoh.Session:
+    """A client session; returns at once, also while the router is still absent."""
+    return zenoh.open(_config(settings, "client"))
+
+
+def connected(session: zenoh.Session) -> bool:
+    """True when the session has a router."""
+    return bool(list(session.info.routers_zid()))
+
+
+def wait_connected(session: zenoh.Session, timeout_s: float) -> bool:
+    """Wait for the router; False when it did not come in time."""
+    end = time.monotonic() + timeout_s
+    while not connected(session):
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.02)
+    return True
+
+
+class Publishers:
+    """Declared publishers of one session, made at first use. DROP: a slow link never stalls the caller."""
+
+    def __init__(self, session: zenoh.Session, prefix: str) -> None:
+        self._session = session
+        self._prefix = prefix
+        self._by_key: dict[str, zenoh.Publisher] = {}
+        self._sequence: dict[str, int] = {}
+
+    def put(self, topic: Topic[M], device: str, message: M, estimator: str = "") -> None:
+        """Publish; a message with a header gets this key's next sequence unless the caller set one."""
+        key = topic.key(self._prefix, device, estimator)
+        if key not in self._by_key:
+            self._by_key[key] = self._session.declare_publisher(
+                key, congestion_control=zenoh.CongestionControl.DROP, express=True
+            )
+        if "header" in message.DESCRIPTOR.fields_by_name and not message.header.sequence:
+            self._sequence[key] = self._sequence.get(key, 0) + 1
+            message.header.sequence = self._sequence[key]
+        self._by_key[key].put(message.SerializeToString())
+
+
+def decode(topic: Topic[M], payload: bytes) -> M | None:
+    """The message, or None (and a log line) for bytes that are not one: a foreign publisher must not stop a service."""
+    message = topic.type()
+    try:
+        message.ParseFromString(payload)
+    except DecodeError as error:
+        log.warning("%s: %d bytes are no %s (%s): ignored", topic.name, len(payload), topic.type.__name__, error)
+        return None
+    return message
+
+
+def subscribe(
+    session: zenoh.Session, topic: Topic[M], prefix: str, handler: Callable[[str, M], None], device: str = "*"
+) -> zenoh.Subscriber:
+    """Call handler(key, message) on Zenoh's thread for each message; handlers only append to a queue."""
+
+    def on_sample(sample: zenoh.Sample) -> None:
+        message = decode(topic, sample.payload.to_bytes())
+        if message is not None:
+            handler(str(sample.key_expr), message)
+
+    return session.declare_subscriber(topic.pattern(prefix, device), on_sample)

@@ -1,0 +1,122 @@
+"""Every topic of the system, in the order the data flow.
+
+Bus keys, recording channels, staleness limits and docs/topics.md come from this table; no other file spells a key.
+A key is ``<prefix>/<device>/<topic>`` or, for topics of which there is one per estimator,
+``<prefix>/<device>/<topic>/<estimator>``. Prefix, device and estimator names match NAME.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from google.protobuf.message import Message
+
+from messages import gyrofree_pb2 as pb
+
+M = TypeVar("M", bound=Message)
+
+NAME = re.compile(r"[a-z][a-z0-9_-]{0,31}")
+RECORDER = "recorder"  # the device name under which the recorder speaks
+
+
+class TopicError(ValueError):
+    """A name or key that cannot stand on the bus."""
+
+
+@dataclass(frozen=True)
+class Topic(Generic[M]):
+    """One row of the table."""
+
+    name: str
+    type: type[M]
+    rate: float  # Hz, nominal; 0 for messages sent on an event
+    source: str  # the process that publishes it
+    text: str
+    per_estimator: bool = False
+    recorded: bool = True
+
+    def key(self, prefix: str, device: str, estimator: str = "") -> str:
+        """Bus key of this topic; raises TopicError for a name that may not stand in a key."""
+        names = [prefix, device] + ([estimator] if self.per_estimator else [])
+        for name in names:
+            check_name(name)
+        return "/".join([prefix, device, self.name] + names[2:])
+
+    def pattern(self, prefix: str, device: str = "*") -> str:
+        """Key expression that matches this topic of one or (default) every device."""
+        return f"{prefix}/{device}/{self.name}" + ("/*" if self.per_estimator else "")
+
+
+ACCEL = Topic("accel", pb.AccelBatch, 100, "gateway", "raw and scaled accelerometer axes")
+IMU = Topic("imu", pb.ImuBatch, 100, "gateway", "specific force and rate of a six-axis board")
+TACHO = Topic("tacho", pb.TachoRate, 20, "gateway", "table rate from tachometer pulses")
+GNSS = Topic("gnss", pb.GnssFix, 4, "gateway", "GNSS epoch: position, velocity, quality")
+LOCATION = Topic("location", LocationFix, 4, "gateway", "the same position for any viewer")
+LINK = Topic("link", pb.LinkStatus, 1, "gateway", "state and ledger of the line")
+BOARD = Topic("board", pb.BoardInfo, 0.1, "gateway", "what the board says of itself")
+TRUTH = Topic("truth", pb.Truth, 100, "simulator", "true motion; simulated boards only")
+RATE = Topic("rate", pb.RateEstimate, 100, "estimator", "gyro-free rotation estimate", per_estimator=True)
+NAV = Topic("nav", pb.NavSolution, 20, "estimator", "INS/GNSS solution", per_estimator=True)
+INNOVATION = Topic("innovation", pb.Innovation, 4, "estimator", "correction by one fix", per_estimator=True)
+POSE = Topic("pose", FrameTransform, 20, "estimator", "body against n, for any viewer", per_estimator=True)
+ESTIMATOR = Topic("estimator", pb.EstimatorStatus, 1, "estimator", "health of one estimator", per_estimator=True)
+STATUS = Topic("status", pb.RecorderStatus, 1, "recorder", "state of the recording", recorded=False)
+LOG = Topic("log", Log, 0, "any", "warnings worth keeping with the data")
+
+TOPICS: tuple[Topic, ...] = (
+    ACCEL, IMU, TACHO, GNSS, LOCATION, LINK, BOARD, TRUTH, RATE, NAV, INNOVATION, POSE, ESTIMATOR, STATUS, LOG,
+)  # fmt: skip
+
+BY_NAME = {topic.name: topic for topic in TOPICS}
+
+
+@dataclass(frozen=True)
+class Address:
+    """A bus key taken apart."""
+
+    prefix: str
+    device: str
+    topic: Topic
+    estimator: str
+
+
+def check_name(name: str) -> str:
+    """The name itself; raises TopicError when it may not stand in a key."""
+    if not NAME.fullmatch(name):
+        raise TopicError(f"name {name!r}: want a-z, 0-9, _ and - after a first letter, at most 32 characters")
+    return name
+
+
+def parse(key: str) -> Address:
+    """Take a key apart; raises TopicError for one that is not in the table."""
+    parts = key.split("/")
+    topic = BY_NAME.get(parts[2]) if len(parts) in (3, 4) else None
+    if topic is None or (len(parts) == 4) != topic.per_estimator:
+        raise TopicError(f"key {key!r}: want <prefix>/<device>/<topic>[/<estimator>], topic one of {', '.join(BY_NAME)}")
+    return Address(parts[0], parts[1], topic, parts[3] if topic.per_estimator else "")
+
+
+def recorder_control_key(prefix: str) -> str:
+    """Key of the recorder's queryable: RecorderCommand in, RecorderStatus out."""
+    return f"{check_name(prefix)}/{RECORDER}/control"
+
+
+def history_key(prefix: str, device: str) -> str:
+    """Key of a gateway's queryable for journal records: selector parameters `first` and `last`."""
+    return f"{check_name(prefix)}/{check_name(device)}/history"
+
+
+def markdown() -> str:
+    """The table of docs/topics.md."""
+    rows = ["| topic | type | Hz | published by | recorded | what |", "|---|---|---|---|---|---|"]
+    for topic in TOPICS:
+        name = topic.name + ("/&lt;estimator&gt;" if topic.per_estimator else "")
+        rate = f"{topic.rate:g}" if topic.rate else "on event"
+        recorded = "yes" if topic.recorded else "no"
+        rows.append(
+            f"| `{name}` | `{topic.type.DESCRIPTOR.full_name}` | {rate} | {topic.source} | {recorded} | {topic.text} |"
+        )
+    return "\n".join(rows) + "\n"

@@ -1,0 +1,1 @@
+"""What happened: record, recover, list, replay."""
