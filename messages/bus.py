@@ -1,11 +1,13 @@
 """One Zenoh session, opened the same way by every process.
 
 Clients connect to explicit endpoints in client mode; scouting is off, so nothing is found or announced on the network
-by itself. A client may start before its router: it keeps trying in the background.
+by itself. A client may start before its router: open_client keeps trying, and once open a session finds a router that
+comes back by itself. (Zenoh 1.10 has no background first connect in client mode: zenoh.open blocks or raises.)
 """
 
 import json
 import logging
+import threading
 import time
 from collections.abc import Callable
 from typing import TypeVar
@@ -52,8 +54,7 @@ def _config(settings: BusSettings, mode: str) -> zenoh.Config:
         values["listen/endpoints"] = settings.listen
     else:
         values["connect/endpoints"] = [settings.router]
-        values["connect/timeout_ms"] = -1
-        values["connect/exit_on_failure"] = False
+        values["connect/timeout_ms"] = 1000
         values["listen/endpoints"] = []
     for key, value in values.items():
         config.insert_json5(key, json.dumps(value))
@@ -65,9 +66,32 @@ def open_router(settings: BusSettings) -> zenoh.Session:
     return zenoh.open(_config(settings, "router"))
 
 
-def open_client(settings: BusSettings) -> zenoh.Session:
-    """A client session; returns at once, also while the router is still absent."""
-    return zenoh.open(_config(settings, "client"))
+class BusUnavailable(ConnectionError):
+    """No router answered in the time given."""
+
+
+def open_client(
+    settings: BusSettings, stop: threading.Event | None = None, timeout_s: float | None = None
+) -> zenoh.Session:
+    """A connected client session; waits for the router, for ever by default.
+
+    Raises BusUnavailable after timeout_s or when `stop` is set first.
+    """
+    stop = stop or threading.Event()
+    end = None if timeout_s is None else time.monotonic() + timeout_s
+    said = False
+    while True:
+        try:
+            return zenoh.open(_config(settings, "client"))
+        except zenoh.ZError:
+            if stop.is_set() or (end is not None and time.monotonic() > end):
+                raise BusUnavailable(
+                    f"[bus] router {settings.router}: nobody answers; start one with `gyrofree router`"
+                ) from None
+        if not said:
+            log.warning("router %s does not answer yet: trying on", settings.router)
+            said = True
+        stop.wait(0.25)
 
 
 def connected(session: zenoh.Session) -> bool:
