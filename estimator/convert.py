@@ -1,0 +1,114 @@
+"""Bus messages to arrays and states to bus messages. With service.py the only file here that knows messages."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from numpy.typing import NDArray
+
+from messages import gyrofree_pb2 as pb
+
+Array = NDArray[np.float64]
+
+MICRO = 1e-6
+
+
+class BadMessage(ValueError):
+    """A message whose lengths or numbers cannot be samples."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """A batch as arrays."""
+
+    t_s: Array  # (n,) s of the board's clock
+    values: Array  # (n, columns)
+
+
+def _rows(what: str, header: pb.Header, values: Iterable[float], columns: int, period_s: float) -> Samples:
+    flat = np.array(values, dtype=np.float64)
+    where = f"{what} {header.sequence} of {header.device}"
+    if columns < 1 or flat.size == 0 or flat.size % columns:
+        raise BadMessage(f"{where}: {flat.size} values do not fill rows of {columns}")
+    if not np.isfinite(flat).all():
+        raise BadMessage(f"{where}: not all values are finite")
+    if not 0.0 < period_s < 10.0:
+        raise BadMessage(f"{where}: period {period_s} s, want 0 to 10 s")
+    n = flat.size // columns
+    return Samples(header.device_us * MICRO + period_s * np.arange(n), flat.reshape(n, columns))
+
+
+def accel_samples(batch: pb.AccelBatch) -> Samples:
+    """Axis readings (n, axes), m/s^2; raises BadMessage."""
+    return _rows("accel", batch.header, batch.f_mps2, batch.axes, batch.period_s)
+
+
+def imu_samples(batch: pb.ImuBatch) -> tuple[Samples, Array]:
+    """Specific force and rate, both (n, 3), in m/s^2 and rad/s; raises BadMessage."""
+    force = _rows("imu force", batch.header, batch.f_b_mps2, 3, batch.period_s)
+    rate = _rows("imu rate", batch.header, batch.omega_ib_b_radps, 3, batch.period_s)
+    if len(force.values) != len(rate.values):
+        raise BadMessage(
+            f"imu {batch.header.sequence} of {batch.header.device}: {len(force.values)} rows of specific force, "
+            f"{len(rate.values)} of rate"
+        )
+    return force, rate.values
+
+
+def sample_header(first: pb.Header, offset_s: float) -> pb.Header:
+    """Header of an estimate for the instant offset_s after the batch's first sample.
+
+    It has no sequence: the publisher counts. Everything else follows from the input alone.
+    """
+    return pb.Header(
+        device=first.device,
+        epoch=first.epoch,
+        device_us=max(0, first.device_us + round(offset_s * 1e6)),
+        utc_ns=first.utc_ns + round(offset_s * 1e9),
+        utc_sigma_s=first.utc_sigma_s,
+        source=first.source,
+        run=first.run,
+    )
+
+
+def rate_message(header: pb.Header, batch: pb.AccelBatch, index: int, name: str, state: Any) -> pb.RateEstimate:
+    """RateState as published."""
+    message = pb.RateEstimate(
+        header=header,
+        estimator=name,
+        for_sequence=batch.header.sequence,
+        for_index=index,
+        omega_ib_b_radps=as_list(state.omega_b),
+        omega_covariance=as_list(state.P),
+        alpha_b_radps2=as_list(state.alpha_b),
+        f_b_mps2=as_list(state.f_b),
+        q_nb=as_list(state.q_nb),
+        angle_z_rad=float(state.angle_z),
+        innovation=as_list(state.innovation),
+        innovation_sigma=as_list(state.innovation_sigma),
+        nis=float(state.nis),
+        nis_dof=int(state.nis_dof),
+        still=bool(state.still),
+        p_n_m=as_list(state.p_n),
+        v_n_mps=as_list(state.v_n),
+        bias=as_list(state.bias),
+    )
+    message.innovation_unit = getattr(state, "innovation_unit", "")
+    return message
+
+
+def pose_message(header: pb.Header, name: str, p_n_m: Iterable[float], q_nb: Iterable[float]) -> FrameTransform:
+    """Body against n as any viewer draws it: parent <device>/n, child <device>/<estimator>."""
+    message = FrameTransform(parent_frame_id=f"{header.device}/n", child_frame_id=f"{header.device}/{name}")
+    message.timestamp.FromNanoseconds(header.utc_ns)
+    t, q = message.translation, message.rotation
+    t.x, t.y, t.z = (float(value) for value in p_n_m)
+    q.w, q.x, q.y, q.z = (float(value) for value in q_nb)
+    return message
+
+
+def as_list(values: Any) -> list[float]:
+    """Any array, row-major; None is empty."""
+    return [] if values is None else np.asarray(values, dtype=np.float64).ravel().tolist()

@@ -1,0 +1,48 @@
+"""[estimator] of gyrofree.toml."""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Metres = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+
+
+class LayoutSettings(BaseModel):
+    """Where the accelerometers of one board sit."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    kind: Literal["cube"] = "cube"  # four triads on a cube, the wiring of the published test
+    half_side_m: float = Field(default=0.05, gt=0.0, le=10.0)  # m, from the cube's centre to a face
+
+
+class VehicleSettings(BaseModel):
+    """What a navigation filter must know of the vehicle a six-axis board rides in."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    lever_arm_b_m: tuple[Metres, Metres, Metres] = (0.0, 0.0, 0.0)  # m, from IMU to antenna: forward, right, down
+
+
+class EstimatorSettings(BaseModel):
+    """[estimator]: which estimators run, and what they know of each device."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    rate: list[str] = Field(default_factory=lambda: ["least-squares", "products-ekf"])  # gyro-free rate estimators
+    navigators: list[str] = Field(default_factory=lambda: ["ekf"])  # INS/GNSS filters
+    layout: LayoutSettings = LayoutSettings()  # of a device that layouts does not name
+    layouts: dict[str, LayoutSettings] = Field(default_factory=dict)  # by device name
+    vehicle: VehicleSettings = VehicleSettings()  # of a device that vehicles does not name
+    vehicles: dict[str, VehicleSettings] = Field(default_factory=dict)  # by device name
+    use_every_fix: int = Field(default=1, ge=1, le=1000)  # n: filters get one fix in n, the others only score them
+    rate_limit_hz: float = Field(default=200.0, gt=0.0, le=1000.0)  # Hz, at most, of each rate/<estimator>
+    nav_limit_hz: float = Field(default=20.0, gt=0.0, le=200.0)  # Hz, at most, of nav and pose
+
+    def layout_of(self, device: str) -> LayoutSettings:
+        """Accelerometer layout of a device."""
+        return self.layouts.get(device, self.layout)
+
+    def vehicle_of(self, device: str) -> VehicleSettings:
+        """Vehicle of a device."""
+        return self.vehicles.get(device, self.vehicle)
