@@ -95,7 +95,8 @@ def parse(key: str) -> Address:
     parts = key.split("/")
     topic = BY_NAME.get(parts[2]) if len(parts) in (3, 4) else None
     if topic is None or (len(parts) == 4) != topic.per_estimator:
-        raise TopicError(f"key {key!r}: want <prefix>/<device>/<topic>[/<estimator>], topic one of {', '.join(BY_NAME)}")
+        known = ", ".join(BY_NAME)
+        raise TopicError(f"key {key!r}: want <prefix>/<device>/<topic>[/<estimator>], topic one of {known}")
     return Address(parts[0], parts[1], topic, parts[3] if topic.per_estimator else "")
 
 

@@ -1,0 +1,69 @@
+# make demo   everything it needs, then the live dashboard on one printed URL (SOURCE=drive DATA=<folder> plays a log)
+# make test   everything it needs, then all tests
+# make bench  the figures of README and docs, one JSON line each
+PYTHON ?= python3
+SOURCE ?= table
+SPEED ?= 1
+PORT ?= 8080
+BUS_PORT ?= 7447
+BIN := .venv/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+DRIVE := $(if $(DATA),--data "$(DATA)")
+
+.PHONY: demo test setup dev system-packages bench docs messages lint compose-test clean
+
+demo: setup
+	@$(BIN)/gyrofree demo --source $(SOURCE) $(DRIVE) --speed $(SPEED) --port $(PORT) --bus-port $(BUS_PORT)
+
+setup: .make/warm
+
+.make/venv:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed; this is $$($(PYTHON) --version). Name another: make PYTHON=python3.12"; exit 1; }
+	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || if [ "$$(id -u)" = 0 ]; then apt-get update -q && apt-get install -y -q python3-venv; else echo "This Python cannot make environments; run: sudo apt-get install python3-venv"; exit 1; fi
+	$(PYTHON) -m venv .venv
+	@mkdir -p .make && touch $@
+
+.make/runtime: requirements/runtime.txt requirements/build.txt pyproject.toml | .make/venv
+	@echo "Installing packages, each checked against its hash ..."
+	$(PIP) install --require-hashes -r requirements/build.txt -r requirements/runtime.txt
+	$(PIP) install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+.make/warm: .make/runtime $(wildcard estimator/*.py)
+	@echo "Compiling the filters once, for the cache ..."
+	@$(BIN)/python -m estimator.warm
+	@touch $@
+
+dev: .make/dev
+.make/dev: requirements/dev.txt .make/runtime
+	$(PIP) install --require-hashes -r requirements/dev.txt
+	@touch $@
+
+system-packages:
+	@missing=""; \
+	command -v chromium >/dev/null || missing="$$missing chromium fonts-dejavu-core"; \
+	command -v gcc >/dev/null || missing="$$missing gcc libc6-dev"; \
+	[ -z "$$missing" ] || if [ "$$(id -u)" = 0 ]; then apt-get update -q && apt-get install -y -q --no-install-recommends $$missing; \
+	else echo "The tests need Debian packages; run: sudo apt-get install$$missing"; exit 1; fi
+
+test: setup dev system-packages
+	$(BIN)/python -m pytest
+
+lint: dev
+	$(BIN)/ruff check .
+
+bench: setup dev
+	@for file in tests/bench/bench_*.py; do echo "== $$file"; $(BIN)/python $$file || exit 1; done
+
+docs: setup
+	$(BIN)/python -m firmware_protocol.document > docs/protocol.md
+	$(BIN)/python -m messages.document > docs/topics.md
+
+messages: dev
+	$(BIN)/python -m grpc_tools.protoc -Imessages --python_out=messages --pyi_out=messages messages/gyrofree.proto
+
+compose-test:
+	bash deploy/compose-test.sh
+
+clean:
+	rm -rf .venv .make var artefacts

@@ -1,0 +1,291 @@
+"""The command line. Every command takes its parameters here and does its work in another module."""
+
+import importlib.metadata
+import json
+import sys
+import threading
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from gyrofree.config import ConfigError, Settings, load_or_default
+from gyrofree.process import EXIT_FAILED, fail, run_service
+from gyrofree.process import EXIT_CONFIG as CONFIG
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    help="Bench and remote eye for inertial units without gyroscopes.\n\n"
+    "`gyrofree demo` shows everything on one page; the other commands are its parts.",
+)
+
+Config = Annotated[
+    Path | None, typer.Option("--config", "-c", help="Configuration file; default ./gyrofree.toml if it is there.")
+]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Log details too.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON on standard output.")]
+Speed = Annotated[float, typer.Option(min=0.1, max=100.0, help="Seconds of the log per second.")]
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        print(f"gyrofree {importlib.metadata.version('gyrofree')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_show_version, is_eager=True)
+    ] = False,
+) -> None:
+    pass
+
+
+def _settings(path: Path | None) -> Settings:
+    try:
+        return load_or_default(path)
+    except ConfigError as error:
+        raise fail(str(error), CONFIG) from None
+
+
+@app.command()
+def demo(
+    source: Annotated[
+        str, typer.Option(help="'table': the simulated rotating table. 'drive': the log in --data, played.")
+    ] = "table",
+    data: Annotated[Path | None, typer.Option(help="Folder with imu.csv and gnss.csv, for --source drive.")] = None,
+    speed: Speed = 1.0,
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the dashboard.")] = 8080,
+    bus_port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the Zenoh router.")] = 7447,
+    folder: Annotated[Path, typer.Option(help="Where journal, recordings and users are kept.")] = Path("var/demo"),
+    record: Annotated[bool, typer.Option(help="Record from the start.")] = True,
+) -> None:
+    """Start router, gateway, estimator, recorder, dashboard and a board, and print one URL.
+
+    The board is simulated, but it speaks the real wire through a pseudo-terminal. Ctrl-C ends everything.
+    """
+    from gyrofree import demo as demonstration
+
+    if source == "table":
+        board, device, layout = ["simulate"], "cube", "cube"
+    elif source == "drive":
+        if data is None:
+            raise fail("--source drive wants --data FOLDER with imu.csv and gnss.csv", CONFIG)
+        _check_log(data)
+        board, device, layout = ["play", str(data), "--speed", str(speed), "--loop"], "car", "imu"
+    else:
+        raise fail(f"--source {source!r}: want 'table' or 'drive'", CONFIG)
+    scale = speed if source == "drive" else 1.0
+    demonstration.run(
+        demonstration.Plan(folder.absolute(), board, device, layout, port, bus_port, record=record, time_scale=scale)
+    )
+
+
+def _check_log(path: Path, gnss: Path | None = None) -> str:
+    """Kind of log ("imu" or "cube"); a log that cannot be played ends the command with its reason."""
+    from gyrofree.play import LogError, kind_of
+
+    try:
+        return kind_of(path, gnss)
+    except (LogError, OSError) as error:
+        raise fail(str(error)) from None
+
+
+@app.command()
+def router(config: Config = None, verbose: Verbose = False) -> None:
+    """Route the bus: the Zenoh session that all others connect to."""
+    settings = _settings(config)
+
+    def body(stop: threading.Event) -> None:
+        from messages.bus import open_router
+
+        with open_router(settings.bus):
+            import logging
+
+            logging.getLogger(__name__).info("router listens on %s", ", ".join(settings.bus.listen))
+            stop.wait()
+
+    run_service(body, verbose)
+
+
+@app.command()
+def gateway(config: Config = None, verbose: Verbose = False) -> None:
+    """Read the boards of [[gateway.devices]], journal every byte, publish samples."""
+    settings = _settings(config)
+
+    def body(stop: threading.Event) -> None:
+        from gateway import service
+
+        service.run(settings.gateway, settings.bus, stop)
+
+    run_service(body, verbose)
+
+
+@app.command()
+def estimator(config: Config = None, verbose: Verbose = False) -> None:
+    """Turn the samples on the bus into rate, attitude and navigation, several estimators side by side."""
+    settings = _settings(config)
+
+    def body(stop: threading.Event) -> None:
+        from estimator import service
+
+        service.run(settings.estimator, settings.bus, stop)
+
+    run_service(body, verbose)
+
+
+@app.command()
+def record(config: Config = None, verbose: Verbose = False) -> None:
+    """Write everything on the bus to MCAP files, when told to from the dashboard or from the start."""
+    settings = _settings(config)
+
+    def body(stop: threading.Event) -> None:
+        from sessions import recorder
+
+        recorder.run(settings.recorder, settings.bus, stop)
+
+    run_service(body, verbose)
+
+
+@app.command()
+def dashboard(config: Config = None, verbose: Verbose = False) -> None:
+    """Serve the web page with scene, charts, recordings and sign-in."""
+    settings = _settings(config)
+
+    def body(stop: threading.Event) -> None:
+        from dashboard import service
+
+        service.run(settings.dashboard, settings.bus, stop)
+
+    run_service(body, verbose)
+
+
+@app.command()
+def simulate(
+    link: Annotated[Path | None, typer.Option(help="Make the pseudo-terminal reachable under this path.")] = None,
+    tcp: Annotated[int | None, typer.Option(help="Listen on this TCP port of the loopback instead of a pty.")] = None,
+    profile: Annotated[str, typer.Option(help="Motion of the table: published, wobble, fast or still.")] = "published",
+    seed: Annotated[int, typer.Option(help="Seed of biases, scale errors and noise.")] = 1,
+    device: Annotated[str, typer.Option(help="Device name under which the truth is published.")] = "cube",
+    once: Annotated[bool, typer.Option(help="End after one run of the profile.")] = False,
+    config: Config = None,
+    verbose: Verbose = False,
+) -> None:
+    """Be a cube on a rotating table: a board on a pseudo-terminal that speaks the real wire.
+
+    Attach a gateway to the printed port. The true motion goes to the bus as its own topic, marked simulated.
+    """
+    settings = _settings(config)
+
+    def body(stop: threading.Event) -> None:
+        from gyrofree import simulate as simulator
+
+        simulator.run(simulator.Options(link, tcp, profile, seed, device, once), settings.bus, stop)
+
+    run_service(body, verbose)
+
+
+@app.command()
+def play(
+    log: Annotated[Path, typer.Argument(help="CSV file, or a folder with imu.csv and gnss.csv.")],
+    gnss: Annotated[Path | None, typer.Option(help="CSV of GNSS epochs beside a single CSV of samples.")] = None,
+    speed: Speed = 1.0,
+    loop: Annotated[bool, typer.Option(help="Start over at the end.")] = False,
+    link: Annotated[
+        Path | None, typer.Option(help="Only be a board, reachable under this path; no other service is started.")
+    ] = None,
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the dashboard.")] = 8080,
+    bus_port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the Zenoh router.")] = 7447,
+    folder: Annotated[Path, typer.Option(help="Where journal, recordings and users are kept.")] = Path("var/play"),
+    config: Config = None,
+    verbose: Verbose = False,
+) -> None:
+    """Play a log of real sensors through the wire, the gateway and everything behind it.
+
+    The columns are described in docs/logs.md. Like `gyrofree demo`, this prints one URL; with --link it is only the board.
+    """
+    kind = _check_log(log, gnss)
+    if link is not None:
+
+        def body(stop: threading.Event) -> None:
+            from gyrofree import play as player
+
+            player.run(player.Options(log, gnss, speed, loop, link), stop)
+
+        return run_service(body, verbose)
+    from gyrofree import demo as demonstration
+
+    board = ["play", str(log.absolute()), "--speed", str(speed)] + (["--loop"] if loop else [])
+    board += ["--gnss", str(gnss.absolute())] if gnss else []
+    demonstration.run(
+        demonstration.Plan(
+            folder.absolute(), board, "cube" if kind == "cube" else "log", kind, port, bus_port, time_scale=speed
+        )
+    )
+
+
+@app.command()
+def replay(
+    session: Annotated[str, typer.Argument(help="Id of a recording (`--list` shows them) or path of an MCAP file.")] = "",
+    speed: Speed = 1.0,
+    check: Annotated[
+        bool, typer.Option(help="Do not publish: run the estimators on it and compare bit for bit.")
+    ] = False,
+    listing: Annotated[bool, typer.Option("--list", help="List the recordings.")] = False,
+    as_json: AsJson = False,
+    config: Config = None,
+    verbose: Verbose = False,
+) -> None:
+    """Send a recording through the bus again, or prove that it reproduces its estimates."""
+    settings = _settings(config)
+    from gyrofree import replay as player
+
+    if listing or not session:
+        return player.show_list(settings, as_json)
+    try:
+        path = player.find(settings, session)
+    except LookupError as error:
+        raise fail(str(error)) from None
+    if check:
+        raise typer.Exit(player.check(settings, path, as_json))
+    run_service(lambda stop: player.run(settings, path, speed, stop), verbose)
+
+
+@app.command()
+def doctor(
+    health: Annotated[
+        str, typer.Option(help="Only ask this running service for a sign of life: router, gateway, ...")
+    ] = "",
+    as_json: AsJson = False,
+    config: Config = None,
+) -> None:
+    """Check ports, permissions, clock, disk and versions, and say what to do."""
+    from gyrofree import doctor as examination
+
+    settings = _settings(config)
+    services = ("router", *examination.SIGN_OF_LIFE, "dashboard")
+    if health and health not in services:
+        raise fail(f"--health {health!r}: want one of {', '.join(services)}", CONFIG)
+    findings = [examination.health(health, settings)] if health else examination.examine(settings)
+    if as_json:
+        print(json.dumps(examination.as_json(findings), indent=2))
+    else:
+        table = Table("check", "state", "found", "what to do")
+        colour = {"ok": "green", "warn": "yellow", "fail": "bold red"}
+        for finding in findings:
+            state = f"[{colour[finding.state]}]{finding.state}[/]"
+            table.add_row(finding.check, state, finding.found, finding.remedy)
+        Console(file=sys.stdout).print(table)
+    if any(finding.state == "fail" for finding in findings):
+        raise typer.Exit(EXIT_FAILED)
+
+
+def main() -> None:
+    """Entry point of `gyrofree`."""
+    app()

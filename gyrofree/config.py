@@ -1,0 +1,119 @@
+"""gyrofree.toml: one file, read once, refused loudly.
+
+Each room owns the model of its section; this module puts them together, and turns what is wrong in the file into one
+line per fault: file, line, section, what was found, what is wanted.
+"""
+
+import difflib
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from dashboard.settings import DashboardSettings
+from estimator.settings import EstimatorSettings
+from gateway.settings import GatewaySettings
+from messages.bus import BusSettings
+from sessions.settings import RecorderSettings
+
+DEFAULT_PATH = Path("gyrofree.toml")
+
+
+class ConfigError(ValueError):
+    """What is wrong in the configuration, one line per fault."""
+
+
+class Settings(BaseModel):
+    """The whole file; a section that is absent takes its defaults."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    bus: BusSettings = Field(default_factory=BusSettings)
+    gateway: GatewaySettings = Field(default_factory=GatewaySettings)
+    estimator: EstimatorSettings = Field(default_factory=EstimatorSettings)
+    recorder: RecorderSettings = Field(default_factory=RecorderSettings)
+    dashboard: DashboardSettings = Field(default_factory=DashboardSettings)
+
+
+def load(path: Path) -> Settings:
+    """Settings of a file; raises ConfigError with one line per fault."""
+    try:
+        text = path.read_text()
+    except OSError as error:
+        raise ConfigError(f"{path}: {error.strerror}; name another file with --config FILE") from None
+    try:
+        values = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: not TOML: {error}") from None
+    return check(values, str(path), text)
+
+
+def load_or_default(path: Path | None) -> Settings:
+    """The named file; without a name ./gyrofree.toml if it is there, else all defaults."""
+    if path is not None:
+        return load(path)
+    return load(DEFAULT_PATH) if DEFAULT_PATH.exists() else Settings()
+
+
+def check(values: dict[str, Any], source: str, text: str = "") -> Settings:
+    """Settings of parsed TOML; `source` and `text` only serve the messages."""
+    try:
+        return Settings.model_validate(values)
+    except ValidationError as error:
+        raise ConfigError("\n".join(_line(fault, source, text) for fault in error.errors())) from None
+
+
+def _line(fault: dict[str, Any], source: str, text: str) -> str:
+    """One fault as a sentence with its place."""
+    *path, key = [str(part) for part in fault["loc"]] or ["?"]
+    where = f"{source}{_line_number(text, path, key)}: [{'.'.join(path)}]" if path else source + ":"
+    if fault["type"] == "extra_forbidden":
+        what = "key" if path else "section"
+        return f"{where} has no {what} {key!r}; {_nearest(key, _known(fault['loc']))}"
+    if fault["type"] == "missing":
+        return f"{where} wants {key!r}, which is not there"
+    found = fault.get("input")
+    return f"{where} {key} = {found!r}: {fault['msg'][:1].lower()}{fault['msg'][1:]}"
+
+
+def _nearest(key: str, known: list[str]) -> str:
+    near = difflib.get_close_matches(key, known, 1)
+    return (f"did you mean {near[0]!r}? It" if near else "it") + f" knows {', '.join(known)}"
+
+
+def _known(loc: tuple) -> list[str]:
+    """Names that may stand at the place of `loc`."""
+    model: Any = Settings
+    for part in loc[:-1]:
+        if isinstance(part, int) or part not in model.model_fields:
+            continue
+        model = _inner_model(model.model_fields[part].annotation)
+    return list(model.model_fields)
+
+
+def _inner_model(annotation: Any) -> Any:
+    """The pydantic model inside list[...], dict[str, ...] or X | None."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for inner in getattr(annotation, "__args__", ()):
+        found = _inner_model(inner)
+        if found is not None:
+            return found
+    return None
+
+
+def _line_number(text: str, path: list[str], key: str) -> str:
+    """':N' of the line that sets `key` below the header of its section, or '' when it cannot be told."""
+    section = ".".join(part for part in path if not part.isdigit())
+    wanted = next((int(part) for part in path if part.isdigit()), 0)
+    current, count = "", -1
+    for number, line in enumerate(text.splitlines(), 1):
+        header = re.match(r"\s*\[+\s*([\w.\-]+)\s*\]+", line)
+        if header:
+            current = header[1]
+            count += current == section
+        elif current == section and count >= wanted and re.match(rf"\s*{re.escape(key)}\s*=", line):
+            return f":{number}"
+    return ""
