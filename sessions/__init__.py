@@ -1,1 +1,1 @@
-"""What happened: record, recover, list, replay."""
+"""What happened: recording, recovery, catalogue, replay and reproduction of sessions."""
