@@ -32,7 +32,9 @@ REASONS = SPEC.reasons
 HEADER = struct.Struct("<" + "".join(field.format for field in SPEC.header))
 CRC_SIZE = 4
 MAX_BODY = SPEC.max_wire - 2  # bytes between two delimiters
-MAX_FRAME = HEADER.size + SPEC.max_payload + CRC_SIZE  # bytes before stuffing
+HEADER_SIZE = HEADER.size
+MIN_FRAME = HEADER_SIZE + CRC_SIZE  # bytes before stuffing
+MAX_FRAME = MIN_FRAME + SPEC.max_payload
 RESIDUE = 0x2144DF1C  # crc32 of any data followed by its own crc32, little-endian
 PROTO = SPEC.proto
 
@@ -130,8 +132,6 @@ class Deframer:
 
     def _delimiter(self, events: list[Event]) -> None:
         """A delimiter behind a delimiter opens a frame; more of them are idle line."""
-        if self._overrun:
-            raise AssertionError("an overrun always holds at least one byte of body")
         self._zeros += 1
         if self._zeros == MAX_BODY + 1:
             self._idle(events)
@@ -166,6 +166,9 @@ class Deframer:
 
 
 _RULES = length_rules()
+_PROTO_AT = 0
+_after_proto = struct.Struct("<x" + HEADER.format.lstrip("<")[1:]).unpack_from
+_make = tuple.__new__  # skips NamedTuple's Python-level constructor, a sixth of the time of a frame
 
 
 def _decode(chunk: bytes, zeros: int) -> Event:
@@ -174,26 +177,33 @@ def _decode(chunk: bytes, zeros: int) -> Event:
         body = cobs.decode(chunk)
     except cobs.DecodeError as error:
         return _damaged(chunk, zeros, "cobs", str(error))
-    size = len(body) - (HEADER.size + CRC_SIZE)
-    if size > SPEC.max_payload:
-        return _damaged(chunk, zeros, "long", f"payload of {size} bytes, at most {SPEC.max_payload}")
-    if size < 0:
-        return _damaged(chunk, zeros, "short", f"{len(body)} bytes, header and CRC are {HEADER.size + CRC_SIZE}")
-    if crc32(body) != RESIDUE:
-        received, computed = int.from_bytes(body[-CRC_SIZE:], "little"), crc32(body[:-CRC_SIZE])
-        return _damaged(chunk, zeros, "crc", f"0x{received:08x} received, 0x{computed:08x} computed")
-    proto, type_, epoch, flags, seq, t_us = HEADER.unpack_from(body)
-    if proto != PROTO:
-        return _damaged(chunk, zeros, "version", f"proto 0x{proto:02x}, this receiver speaks 0x{PROTO:02x}")
-    payload = body[HEADER.size : -CRC_SIZE]
+    size = len(body)
+    if crc32(body) != RESIDUE or body[_PROTO_AT] != PROTO or not MIN_FRAME <= size <= MAX_FRAME:
+        return _refused(chunk, zeros, body)
+    type_, epoch, flags, seq, t_us = _after_proto(body)
+    payload = body[HEADER_SIZE:-CRC_SIZE]
     rule = _RULES[type_]
     if rule is not None:
         least, count_at, width, width_of = rule
+        size -= MIN_FRAME
         if size < least or (
             count_at and size < least + payload[count_at] * (width_of(payload) if width_of else width)
         ):
             return _damaged(chunk, zeros, "payload", shortage(type_, payload))
-    return Frame(type_, epoch, flags, seq, t_us, payload, len(chunk) + 1 + zeros)
+    return _make(Frame, (type_, epoch, flags, seq, t_us, payload, len(chunk) + 1 + zeros))
+
+
+def _refused(chunk: bytes, zeros: int, body: bytes) -> Damaged:
+    """Why an unstuffed body is no frame of ours, in the order of spec.toml."""
+    size = len(body) - MIN_FRAME
+    if size > SPEC.max_payload:
+        return _damaged(chunk, zeros, "long", f"payload of {size} bytes, at most {SPEC.max_payload}")
+    if size < 0:
+        return _damaged(chunk, zeros, "short", f"{len(body)} bytes, header and CRC are {MIN_FRAME}")
+    if crc32(body) != RESIDUE:
+        received, computed = int.from_bytes(body[-CRC_SIZE:], "little"), crc32(body[:-CRC_SIZE])
+        return _damaged(chunk, zeros, "crc", f"0x{received:08x} received, 0x{computed:08x} computed")
+    return _damaged(chunk, zeros, "version", f"proto 0x{body[_PROTO_AT]:02x}, this receiver speaks 0x{PROTO:02x}")
 
 
 def _damaged(chunk: bytes, zeros: int, reason: str, detail: str) -> Damaged:

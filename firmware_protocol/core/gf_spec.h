@@ -1,0 +1,167 @@
+#ifndef GF_SPEC_H
+#define GF_SPEC_H
+
+/* Made from spec.toml by: python -m firmware_protocol.document header.  Do not edit. */
+
+enum {
+  GF_PROTO = 0xA1,
+  GF_MINOR = 1,
+  GF_HEADER_SIZE = 16,
+  GF_MAX_PAYLOAD = 488,
+  GF_MAX_WIRE = 512,
+  GF_MAX_BODY = GF_MAX_WIRE - 2 /* bytes between two delimiters */
+};
+
+enum {
+  GF_TYPE_HELLO = 0x01,
+  GF_TYPE_STATUS = 0x02,
+  GF_TYPE_ACC12 = 0x10,
+  GF_TYPE_ADC = 0x11,
+  GF_TYPE_TACHO = 0x12,
+  GF_TYPE_PPS = 0x13,
+  GF_TYPE_GPS = 0x14,
+  GF_TYPE_IMU6 = 0x15,
+  GF_TYPE_CMD = 0x40,
+  GF_TYPE_ACK = 0x41
+};
+
+enum {
+  GF_FLAG_DROPPED = 1,
+  GF_FLAG_PPS = 2,
+  GF_FLAG_SIMULATED = 4,
+  GF_FLAG_CONFIG = 8
+};
+
+typedef enum {
+  GF_REASON_IDLE = 1,
+  GF_REASON_LONG = 2,
+  GF_REASON_COBS = 3,
+  GF_REASON_SHORT = 4,
+  GF_REASON_CRC = 5,
+  GF_REASON_VERSION = 6,
+  GF_REASON_PAYLOAD = 7,
+  GF_REASON_UNFINISHED = 8
+} gf_reason_t;
+
+/* Offsets in bytes; GF_..._SIZE is the smallest payload and where the rows or raw bytes begin. */
+enum {
+  GF_HEADER_PROTO = 0,
+  GF_HEADER_TYPE = 1,
+  GF_HEADER_EPOCH = 2,
+  GF_HEADER_FLAGS = 3,
+  GF_HEADER_SEQ = 4,
+  GF_HEADER_T_US = 8
+};
+
+enum {
+  GF_HELLO_MINOR = 0,
+  GF_HELLO_BOARD_ID = 1,
+  GF_HELLO_SENSOR_MASK = 2,
+  GF_HELLO_N_AXES = 3,
+  GF_HELLO_TICK_HZ = 4,
+  GF_HELLO_SAMPLE_PERIOD_NS = 8,
+  GF_HELLO_BATCH = 12,
+  GF_HELLO_UID = 16,
+  GF_HELLO_FIRMWARE = 32,
+  GF_HELLO_VERSION = 52,
+  GF_HELLO_CONFIG_CRC = 58,
+  GF_HELLO_SENSORS = 60,
+  GF_HELLO_SIZE = 92
+};
+
+enum {
+  GF_STATUS_BUILT = 0,
+  GF_STATUS_SENT = 4,
+  GF_STATUS_DROPPED = 8,
+  GF_STATUS_SAMPLES = 12,
+  GF_STATUS_MISSED_TICKS = 16,
+  GF_STATUS_SAMPLE_DROPS = 20,
+  GF_STATUS_SPI_ERRORS = 24,
+  GF_STATUS_INIT_ERRORS = 40,
+  GF_STATUS_FIFO_OVERRUNS = 56,
+  GF_STATUS_TACHO_TOTAL = 72,
+  GF_STATUS_TACHO_OVERFLOW = 76,
+  GF_STATUS_PPS_TOTAL = 80,
+  GF_STATUS_GPS_BYTES = 84,
+  GF_STATUS_RX_OK = 88,
+  GF_STATUS_RX_BAD = 92,
+  GF_STATUS_UART_ERRORS = 96,
+  GF_STATUS_FREE_STACK = 100,
+  GF_STATUS_CPU_PERMILLE = 104,
+  GF_STATUS_LAST_SEQ = 108,
+  GF_STATUS_SIZE = 112
+};
+
+enum {
+  GF_ACC12_FIRST_INDEX = 0,
+  GF_ACC12_PERIOD_NS = 4,
+  GF_ACC12_N = 8,
+  GF_ACC12_SENSOR_MASK = 9,
+  GF_ACC12_STALE_MASK = 10,
+  GF_ACC12_SIZE = 12
+};
+
+enum {
+  GF_ADC_FIRST_INDEX = 0,
+  GF_ADC_PERIOD_NS = 4,
+  GF_ADC_N = 8,
+  GF_ADC_CHANNEL_MASK = 9,
+  GF_ADC_VREF_MV = 10,
+  GF_ADC_SIZE = 12
+};
+
+enum {
+  GF_TACHO_FIRST_PULSE = 0,
+  GF_TACHO_N = 4,
+  GF_TACHO_EDGE = 5,
+  GF_TACHO_SIZE = 8
+};
+
+enum {
+  GF_PPS_INDEX = 0,
+  GF_PPS_FRACTION_NS = 4,
+  GF_PPS_FLAGS = 8,
+  GF_PPS_SIZE = 12
+};
+
+enum {
+  GF_GPS_SIZE = 0
+};
+
+enum {
+  GF_IMU6_FIRST_INDEX = 0,
+  GF_IMU6_PERIOD_NS = 4,
+  GF_IMU6_ACCEL_SCALE_UG = 8,
+  GF_IMU6_GYRO_SCALE_NRAD = 12,
+  GF_IMU6_N = 16,
+  GF_IMU6_SIZE = 20
+};
+
+enum {
+  GF_CMD_COMMAND = 0,
+  GF_CMD_TOKEN = 2,
+  GF_CMD_SIZE = 4
+};
+
+enum {
+  GF_ACK_COMMAND = 0,
+  GF_ACK_TOKEN = 2,
+  GF_ACK_STATUS = 4,
+  GF_ACK_SIZE = 6
+};
+
+/* What a payload must hold: GF_FIXED(type, size), GF_ROWS(type, size, offset of the row count,
+ * bytes per row), GF_MASKED(type, size, offset of the row count, bytes per value, offset of the mask).
+ * A type without a line demands nothing. */
+#define GF_LENGTH_RULES \
+  GF_FIXED(GF_TYPE_HELLO, GF_HELLO_SIZE) \
+  GF_FIXED(GF_TYPE_STATUS, GF_STATUS_SIZE) \
+  GF_ROWS(GF_TYPE_ACC12, GF_ACC12_SIZE, GF_ACC12_N, 24u) \
+  GF_MASKED(GF_TYPE_ADC, GF_ADC_SIZE, GF_ADC_N, 2u, GF_ADC_CHANNEL_MASK) \
+  GF_ROWS(GF_TYPE_TACHO, GF_TACHO_SIZE, GF_TACHO_N, 4u) \
+  GF_FIXED(GF_TYPE_PPS, GF_PPS_SIZE) \
+  GF_ROWS(GF_TYPE_IMU6, GF_IMU6_SIZE, GF_IMU6_N, 24u) \
+  GF_FIXED(GF_TYPE_CMD, GF_CMD_SIZE) \
+  GF_FIXED(GF_TYPE_ACK, GF_ACK_SIZE)
+
+#endif
