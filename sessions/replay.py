@@ -5,22 +5,28 @@ renamed, `cube` to `cube-replay`, so that a replay never mixes with the board it
 times, run, sequence and source stay those of the recording.
 """
 
+import logging
 import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import zenoh
 from google.protobuf.message import DecodeError, Message
 
-from messages.bus import Publishers
+from messages.bus import BusSettings, BusUnavailable, open_client
 from messages.topics import ACCEL, BOARD, GNSS, IMU, LINK, LOCATION, TACHO, TRUTH, Address, Topic, TopicError, parse
 from sessions.mcap_log import Damage, read
+
+log = logging.getLogger(__name__)
 
 INPUTS: tuple[Topic, ...] = (ACCEL, IMU, TACHO, GNSS, LINK, BOARD, TRUTH, LOCATION)
 SUFFIX = "-replay"
 LONGEST_NAME = 32  # of a device, see messages.topics.NAME
-PROGRESS_S = 0.5
+PROGRESS_S = 5.0
+MATCH_S = 0.25  # at most, for the router to say that somebody listens to a key
+DRAIN_S = 0.2  # after the last message, so that the session does not close over what is still being sent
 
 
 @dataclass(frozen=True)
@@ -81,9 +87,39 @@ def rename(message: Message, old: str, new: str) -> None:
         message.frame_id = new + message.frame_id[len(old) :]
 
 
+class Outlet:
+    """Publishers that lose nothing at their beginning.
+
+    A publisher just declared drops what it is given until the router has told it of its subscribers (measured: up to
+    13 ms); so the first message of a key waits for that, at most MATCH_S.
+    """
+
+    def __init__(self, session: zenoh.Session, prefix: str) -> None:
+        self._session = session
+        self._prefix = prefix
+        self._by_key: dict[str, zenoh.Publisher] = {}
+        self.waited_s = 0.0
+
+    def put(self, address: Address, device: str, message: Message) -> None:
+        """Publish as it is: sequence and run stay those of the recording."""
+        key = address.topic.key(self._prefix, device, address.estimator)
+        publisher = self._by_key.get(key)
+        if publisher is None:
+            publisher = self._by_key[key] = self._session.declare_publisher(
+                key,
+                congestion_control=zenoh.CongestionControl.BLOCK,  # a replay may wait, but must not lose
+                express=True,
+            )
+            begun = time.monotonic()
+            while not publisher.matching_status.matching and time.monotonic() - begun < MATCH_S:
+                time.sleep(0.002)
+            self.waited_s += time.monotonic() - begun
+        publisher.put(message.SerializeToString(deterministic=True))
+
+
 def replay(
     path: Path,
-    publishers: Publishers,
+    outlet: Outlet,
     stop: threading.Event,
     *,
     speed: float = 1.0,
@@ -99,18 +135,18 @@ def replay(
         raise ValueError(f"speed {speed}: want a positive number, 1 for real time")
     bad: list[str] = []
     sent, first_ns, seconds, behind, told = 0, None, 0.0, 0.0, 0.0
-    begun = time.monotonic()
+    begun, waited_before = time.monotonic(), 0.0
     for item in inputs(path, on_bad=bad.append):
         if first_ns is None:
-            first_ns, begun = item.log_ns, time.monotonic()
+            first_ns, begun, waited_before = item.log_ns, time.monotonic(), outlet.waited_s
         seconds = (item.log_ns - first_ns) / 1e9
-        wait = begun + seconds / speed - time.monotonic()
+        wait = begun + outlet.waited_s - waited_before + seconds / speed - time.monotonic()
         if stop.wait(wait) if wait > 0.0 else stop.is_set():
             break
         behind = max(0.0, -wait)
         device = renamed(item.address.device, suffix)
         rename(item.message, item.address.device, device)
-        publishers.put(item.address.topic, device, item.message, item.address.estimator)
+        outlet.put(item.address, device, item.message)
         sent += 1
         if on_progress is not None and time.monotonic() - told >= PROGRESS_S:
             told = time.monotonic()
@@ -119,3 +155,35 @@ def replay(
     if on_progress is not None:
         on_progress(final)
     return final
+
+
+def run(
+    path: Path,
+    bus: BusSettings,
+    stop: threading.Event,
+    *,
+    speed: float = 1.0,
+    suffix: str = SUFFIX,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> Progress:
+    """`replay` with a bus session of its own; raises what `replay` raises, and BusUnavailable without a router."""
+    try:
+        session = open_client(bus, stop)
+    except BusUnavailable:
+        if stop.is_set():
+            return Progress(0.0, 0, 0, 0.0)
+        raise
+    with session:
+        outlet = Outlet(session, bus.prefix)
+        final = replay(path, outlet, stop, speed=speed, suffix=suffix, on_progress=on_progress or _log)
+        stop.wait(DRAIN_S)
+    log.info("replayed %d messages, %.1f s, %d left out as unreadable", final.messages, final.seconds, final.unreadable)
+    return final
+
+
+def _log(progress: Progress) -> None:
+    log.info("%.1f s, %d messages%s", progress.seconds, progress.messages, _late(progress))
+
+
+def _late(progress: Progress) -> str:
+    return f", {progress.behind_s:.2f} s behind: slower than asked for" if progress.behind_s > 0.1 else ""

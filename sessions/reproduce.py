@@ -11,7 +11,7 @@ begun while the estimator was running) differs honestly: `Comparison.first_diffe
 
 from collections import defaultdict
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -45,7 +45,7 @@ class Comparison:
 
     @property
     def same(self) -> bool:
-        """Every recorded estimate came out again, bit for bit."""
+        """Every recorded estimate came out again, bit for bit (more of them may have)."""
         return self.equal > 0 and not self.different and not self.missing
 
 
@@ -59,9 +59,13 @@ class Report:
     damage: str
 
     @property
-    def same(self) -> bool:
+    def identical(self) -> bool:
         """There were estimates and all of them came out again."""
         return bool(self.keys) and all(comparison.same for comparison in self.keys.values())
+
+    def as_dict(self) -> dict:
+        """For JSON."""
+        return {"identical": self.identical, **asdict(self)}
 
 
 def reproduce(path: Path, pipeline: Pipeline) -> Report:
