@@ -1,0 +1,138 @@
+"""The dashboard process: the scene on the loopback, the web application on the one exposed port."""
+
+import asyncio
+import contextlib
+import errno
+import logging
+import socket
+import threading
+from collections.abc import Collection
+from typing import Any
+
+import uvicorn
+
+from dashboard.app import create_app
+from dashboard.auth import Gate
+from dashboard.control import BusWatch, RecorderControl, Replay
+from dashboard.front import Front
+from dashboard.settings import DashboardSettings
+from dashboard.users import UserStore, load_users
+from messages.bus import BusSettings, open_client
+from sessions.catalogue import Catalogue
+
+log = logging.getLogger(__name__)
+
+STOP_LOOK_S = 0.1  # s between two looks at the stop event
+GRACE_S = 2  # s, for answers under way when the process ends
+
+
+class PortTaken(OSError):
+    """The port is somebody else's; never replaced by another one silently."""
+
+    def __str__(self) -> str:
+        return str(self.strerror)
+
+
+class _Server(uvicorn.Server):
+    """uvicorn without its own signal handlers: the process has a stop event for that."""
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Any:
+        yield
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """The bound socket of the dashboard; raises PortTaken, or OSError for an address this machine does not have."""
+    try:
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        bound = socket.socket(family, socket.SOCK_STREAM)
+    except OSError as error:
+        raise OSError(error.errno, f"[dashboard] host {host!r}: {error.strerror}") from None
+    bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        bound.bind(address)
+        bound.listen(128)
+    except OSError as error:
+        bound.close()
+        if error.errno == errno.EADDRINUSE:
+            text = f"[dashboard] port {port} of {host} is taken: end what uses it (`ss -ltnp`), or set another port"
+            raise PortTaken(error.errno, text) from None
+        raise OSError(error.errno, f"[dashboard] {host}:{port}: {error.strerror}") from None
+    return bound
+
+
+def serve(front: Front, bound: socket.socket, stop: threading.Event) -> None:
+    """Serve the web application on a bound socket until `stop` is set."""
+    settings = front.settings
+    config = uvicorn.Config(
+        create_app(front),
+        log_config=None,
+        access_log=False,  # it would write the tokens of sign-in links
+        ws_max_size=settings.message_limit,
+        ws_per_message_deflate=False,  # the scene is compressed already
+        ws_max_queue=16,
+        proxy_headers=bool(settings.trusted_proxies),
+        forwarded_allow_ips=settings.trusted_proxies or None,
+        timeout_graceful_shutdown=GRACE_S,
+        timeout_keep_alive=15,
+        limit_concurrency=512,
+        server_header=False,
+        lifespan="off",
+    )
+    server = _Server(config)
+
+    async def until_stopped() -> None:
+        serving = asyncio.create_task(server.serve(sockets=[bound]))
+        while not stop.is_set() and not serving.done():
+            await asyncio.sleep(STOP_LOOK_S)
+        server.should_exit = True
+        await serving
+
+    asyncio.run(until_stopped())
+
+
+def run(settings: DashboardSettings, bus: BusSettings, stop: threading.Event, replay: Replay | None = None) -> None:
+    """The dashboard until `stop` is set.
+
+    `replay` starts replays for the sessions page (control.ProcessReplay); without it the page has no such button.
+    Raises PortTaken when the port or viser's is in use, UsersError for a damaged users file, BusUnavailable when it is
+    stopped before a router answers.
+    """
+    from dashboard.scene import service as scene  # here: viser takes a second to import, a taken port should not wait
+
+    with listen(settings.host, settings.port) as bound:
+        if not load_users(settings.users):
+            log.warning("%s has no users: nobody can sign in; add one with `gyrofree users add`", settings.users)
+        if not settings.secure_cookies and settings.host not in ("127.0.0.1", "::1", "localhost"):
+            log.warning("serving %s without TLS: passwords cross the network readable; see docs", settings.url)
+        session = open_client(bus, stop)
+        try:
+            try:
+                handle = scene.start(bus, settings)
+            except scene.SceneError as error:
+                raise PortTaken(errno.EADDRINUSE, str(error)) from None
+            front = Front(
+                settings=settings,
+                gate=Gate(settings, UserStore(settings.users)),
+                catalogue=Catalogue(settings.sessions_root),
+                scene_port=lambda: handle.port,
+                watch=BusWatch(session, bus.prefix),
+                recorder=RecorderControl(session, bus.prefix),
+                replay=replay,
+                open_widgets=lambda: _open_widgets(handle),
+            )
+            log.info("dashboard at %s", settings.url)
+            try:
+                serve(front, bound, stop)
+            finally:
+                if replay is not None:
+                    replay.stop()
+                handle.stop()
+        finally:
+            session.close()
+
+
+def _open_widgets(handle: Any) -> Collection[str]:
+    """Widgets a viewer may use, as far as the scene names them; none otherwise."""
+    named = getattr(handle, "viewer_uuids", None)
+    return named() if named is not None else ()
