@@ -1,0 +1,101 @@
+"""A GNSS fix as a navigation filter takes it: numbers, their trust, and the reasons to refuse it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+Array = NDArray[np.float64]
+
+NONE, AUTONOMOUS, DIFFERENTIAL, RTK_FLOAT, RTK_FIXED, DEAD_RECKONING = range(6)  # GnssFix.Quality of the bus
+
+# 1-sigma north, east, up (m) and of velocity (m/s) by quality, for receivers that do not give their own
+TYPICAL = {
+    AUTONOMOUS: ((1.6, 1.6, 3.2), (0.1, 0.1, 0.2)),
+    DIFFERENTIAL: ((0.8, 0.8, 1.6), (0.1, 0.1, 0.2)),
+    RTK_FLOAT: ((0.3, 0.3, 0.6), (0.07, 0.07, 0.12)),
+    RTK_FIXED: ((0.02, 0.02, 0.03), (0.05, 0.05, 0.08)),
+}
+
+
+@dataclass(frozen=True)
+class Fix:
+    """One GNSS epoch on the samples' clock."""
+
+    t: float  # s, the instant it is for
+    arrival: float  # s, when its first byte came
+    latitude: float  # rad
+    longitude: float  # rad
+    height: float  # m above the ellipsoid
+    quality: int
+    sigma_p: Array  # (3,) m, north east up
+    v_n: Array | None = None  # (3,) m/s
+    sigma_v: Array | None = None  # (3,) m/s, with v_n
+    withheld: bool = False  # only to score the filter with
+    key: int = 0  # whatever the caller needs to know it by
+
+    def due(self, settle: float) -> float:
+        """When it is used, s."""
+        return max(self.t, self.arrival + settle)
+
+    def vector(self) -> Array:
+        """(6,) as fix_residual takes it."""
+        v = self.v_n if self.v_n is not None else np.zeros(3)
+        return np.array([self.latitude, self.longitude, self.height, *v])
+
+    def rows(self) -> slice:
+        """Rows of the measurement that this fix has."""
+        return slice(0, 6 if self.v_n is not None else 3)
+
+
+@dataclass(frozen=True)
+class FixSettings:
+    """How far a receiver is believed."""
+
+    floor_p: tuple[float, float, float] = (0.02, 0.02, 0.03)  # m: no fix is better, whatever its receiver says
+    floor_v: tuple[float, float, float] = (0.05, 0.05, 0.05)  # m/s
+    timing: float = 0.005  # s, of the fix's time against the samples' clock: counts with the speed
+    false_alarm: float = 1e-6  # chance that the NIS gate refuses a good fix of a filter whose model is right
+    readmit_after: int = 5  # rejections in a row after which the filter, not the receiver, is taken to be wrong
+
+    def gate(self, dof: int) -> float:
+        """Largest NIS that is accepted."""
+        return _gate(self.false_alarm, dof)
+
+    def objection(self, fix: Fix) -> str:
+        """Why this fix must not be used, in words; empty when it may."""
+        if fix.quality in (NONE, DEAD_RECKONING):
+            return "the receiver has no satellite fix"
+        numbers = np.concatenate([fix.vector(), fix.sigma_p, fix.sigma_v if fix.sigma_v is not None else []])
+        if not np.isfinite(numbers).all() or abs(fix.latitude) > np.pi / 2.0:
+            return "not a position"
+        return ""
+
+
+_GATES: dict[tuple[float, int], float] = {}
+
+
+def _gate(false_alarm: float, dof: int) -> float:
+    key = (false_alarm, dof)
+    if key not in _GATES:
+        _GATES[key] = float(chi2.isf(false_alarm, dof))
+    return _GATES[key]
+
+
+def typical_sigma(quality: int) -> tuple[Array, Array]:
+    """Position and velocity sigma, (3,) each, m and m/s, of a receiver that does not say."""
+    position, velocity = TYPICAL.get(quality, TYPICAL[AUTONOMOUS])
+    return np.array(position), np.array(velocity)
+
+
+def fix_noise(fix: Fix, settings: FixSettings) -> Array:
+    """R (6, 6), or (3, 3) without velocity: the receiver's sigma, floored, and timing error along the way (E-31)."""
+    p = np.maximum(fix.sigma_p, settings.floor_p)
+    if fix.v_n is None:
+        return np.diag(p**2)
+    v = np.maximum(fix.sigma_v, settings.floor_v)
+    R = np.diag(np.concatenate([p, v]) ** 2)
+    way = np.array([fix.v_n[0], fix.v_n[1], -fix.v_n[2]]) * settings.timing
+    R[:3, :3] += np.outer(way, way)
+    return R
