@@ -1,0 +1,146 @@
+"""One uPlot chart: curves with 3-sigma bands, grey gaps, and a heading with live values.
+
+uPlot's own legend knows values only under the cursor, so the heading takes its place. Known traps of the charts and
+what is done about them: NaN is never sent; the time axis is told that it is not a date; a gap is a grey series on a
+scale of its own, drawn last and opaque so that it covers the straight line beneath.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import viser
+
+from dashboard.scene import series
+from dashboard.scene.palette import number, rgba
+
+
+@dataclass
+class Curve:
+    """One line of a chart. t (n,) s, y (n,) in the chart's unit; half (n,) is the half width of its band."""
+
+    label: str
+    colour: str
+    t: np.ndarray
+    y: np.ndarray
+    half: np.ndarray | None = None
+    dash: bool = False
+    stale: bool = False
+    width: float = 1.6
+    live: bool = True  # its newest value stands in the heading
+
+
+class Chart:
+    """A chart inside a container of a client's GUI; show() builds it again only when its set of curves changes."""
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        folder,
+        order: float,
+        title: str,
+        unit: str,
+        height: int = 190,
+        digits: int = 1,
+    ) -> None:
+        self._client, self._folder, self._order = client, folder, order
+        self._title, self._unit, self._height, self._digits = title, unit, height, digits
+        self._signature: tuple = ()
+        self._plot: viser.GuiUplotHandle | None = None
+        with folder:
+            self._heading = client.gui.add_html("", order=order)
+
+    def show(self, curves: Sequence[Curve], t0: float, t1: float, dark: bool, primary: int = 0) -> None:
+        """Draw the window [t0, t1]; gaps are those of the curve number `primary`."""
+        heading = self._heading_html(curves)
+        if self._heading.content != heading:
+            self._heading.content = heading
+        curves = [curve for curve in curves if len(curve.t)]
+        if not curves:
+            self._remove()
+            return
+        data = _data(curves, t0, t1, min(primary, len(curves) - 1))
+        signature = (dark, *((c.label, c.colour, c.half is not None, c.dash, c.width) for c in curves))
+        if self._plot is None or signature != self._signature:
+            self._remove()
+            self._signature = signature
+            self._build(curves, data, dark)
+        else:
+            self._plot.data = data
+
+    def _remove(self) -> None:
+        if self._plot is not None:
+            self._plot.remove()
+            self._plot = None
+
+    def _heading_html(self, curves: Sequence[Curve]) -> str:
+        items = []
+        for curve in curves:
+            if not curve.label:
+                continue
+            good = curve.y[np.isfinite(curve.y)] if curve.live else curve.y[:0]
+            value = number(float(good[-1]), self._digits) if len(good) else ("–" if curve.live else "")
+            mark = "gf-dash" if curve.dash else "gf-line"
+            stale = " gf-stale" if curve.stale else ""
+            items.append(
+                f'<span class="gf-item{stale}"><i class="{mark}" style="border-color:{curve.colour}"></i>'
+                f"{curve.label} <b>{value}</b></span>"
+            )
+        empty = "" if items else '<span class="gf-item gf-stale">no data yet</span>'
+        return (
+            f'<div class="gf-chart"><span class="gf-title">{self._title} <em>{self._unit}</em></span>'
+            f'<span class="gf-legend">{"".join(items)}{empty}</span></div>'
+        )
+
+    def _build(self, curves: Sequence[Curve], data: tuple[np.ndarray, ...], dark: bool) -> None:
+        lines: list[dict] = [{"label": "t"}]
+        bands: list[dict] = []
+        for curve in curves:
+            line = {"label": curve.label, "stroke": curve.colour, "width": curve.width, "points": {"show": False}}
+            lines.append(line | ({"dash": (6, 4)} if curve.dash else {}))
+            if curve.half is not None:
+                bands.append({"series": (len(lines), len(lines) + 1), "fill": rgba(curve.colour, 0.20)})
+                edge = {"stroke": rgba(curve.colour, 0.35), "width": 0.7, "points": {"show": False}}
+                lines += [edge | {"label": f"{curve.label} +3σ"}, edge | {"label": f"{curve.label} −3σ"}]
+        gap = "#3b3b3b" if dark else "#d5d5d5"
+        lines.append(
+            {
+                "label": "gap",
+                "scale": "gap",
+                "stroke": gap,
+                "width": 0,
+                "fill": gap,
+                "fillTo": 0,
+                "points": {"show": False},
+            }
+        )
+        with self._folder:
+            self._plot = self._client.gui.add_uplot(
+                data,
+                series=tuple(lines),
+                bands=tuple(bands) or None,
+                scales={"x": {"time": False}, "y": {}, "gap": {"range": (0, 1)}},
+                axes=({"size": 26, "font": "11px sans-serif"}, {"size": 46, "font": "11px sans-serif"}),
+                legend={"show": False},
+                height=self._height,
+                padding=(6, 10, 0, 0),
+                order=self._order + 0.5,
+            )
+
+
+def _data(curves: Sequence[Curve], t0: float, t1: float, primary: int) -> tuple[np.ndarray, ...]:
+    """The arrays of a chart: time, each curve with the edges of its band, and the gap mask; all of one length."""
+    edges, x = series.grid(t0, t1)
+    lines = [series.decimate(curve.t, curve.y, edges)[0] for curve in curves]
+    low, high = min(float(y.min()) for y in lines), max(float(y.max()) for y in lines)
+    # A band that grows without bound would press the curves flat: it is cut a third of their range outside.
+    reach = max((high - low) / 3, 1e-9)
+    out = [x]
+    for curve, y in zip(curves, lines, strict=True):
+        out.append(y)
+        if curve.half is not None:
+            half = series.decimate(curve.t, curve.half, edges)[0]
+            out += [np.clip(y + half, low - reach, high + reach), np.clip(y - half, low - reach, high + reach)]
+    t = curves[primary].t
+    out.append(series.gap_mask(t, edges, max(series.gap_limit(t), 2.5 * (edges[1] - edges[0]))))
+    return tuple(out)

@@ -1,0 +1,80 @@
+"""Colours (Okabe and Ito's set, distinguishable with the common colour deficiencies) and number formats."""
+
+import html
+import math
+from collections.abc import Iterable
+
+from messages import gyrofree_pb2 as pb
+
+ORANGE, SKY, GREEN, YELLOW = "#E69F00", "#56B4E9", "#009E73", "#F0E442"
+BLUE, VERMILLION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#8C8C8C"
+
+AXES = (VERMILLION, GREEN, SKY)  # x, y, z
+REFERENCE = GREEN  # tachometer
+FIX = ORANGE  # GNSS
+_ESTIMATORS = {"products-ekf": SKY, "least-squares": VERMILLION, "ekf": SKY}
+_FURTHER = (PURPLE, YELLOW, ORANGE, BLUE, VERMILLION, SKY)
+# Names for people; anything else is shown as it is called on the bus.
+_TITLES = {"products-ekf": "products filter", "least-squares": "least squares", "ekf": "INS/GNSS filter"}
+
+SOURCES = {
+    pb.SOURCE_SIMULATED: ("SIMULATED", PURPLE),
+    pb.SOURCE_PLAYED: ("PLAYED", ORANGE),
+    pb.SOURCE_HARDWARE: ("HARDWARE", GREEN),
+    pb.SOURCE_EMULATED: ("EMULATED", YELLOW),
+    pb.SOURCE_UNKNOWN: ("SOURCE UNKNOWN", GREY),
+}
+
+
+def estimator_colour(name: str, among: Iterable[str] = ()) -> str:
+    """The colour of an estimator: fixed for ours, else by its place among the names that have none."""
+    if name in _ESTIMATORS:
+        return _ESTIMATORS[name]
+    others = sorted({other for other in among if other not in _ESTIMATORS} | {name})
+    return _FURTHER[others.index(name) % len(_FURTHER)]
+
+
+def estimator_title(name: str) -> str:
+    """The estimator's name for people."""
+    return _TITLES.get(name, name)
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """'#rrggbb' as three numbers 0..255."""
+    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
+
+
+def rgba(colour: str, alpha: float) -> str:
+    """'#rrggbb' with an opacity, as CSS."""
+    return "rgba({},{},{},{:.2f})".format(*rgb(colour), alpha)
+
+
+def truth_colour(dark: bool) -> str:
+    """The colour of what is really the case: the strongest contrast to the background."""
+    return "#F2F2F2" if dark else "#1A1A1A"
+
+
+def number(value: float | None, digits: int = 1, unit: str = "", sign: bool = False) -> str:
+    """A value with its unit, a dash for what is not known."""
+    if value is None or not math.isfinite(value):
+        return f"– {unit}".rstrip()
+    text = f"{value:{'+' if sign else ''},.{digits}f}".replace(",", "\u202f").replace("-", "\u2212")
+    return f"{text} {unit}".rstrip()
+
+
+def escape(text: str) -> str:
+    """Text from outside, safe inside HTML."""
+    return html.escape(text, quote=True)
+
+
+def rows(items: Iterable[tuple[str, str]], stale: bool = False) -> str:
+    """A two-column table as HTML; values may carry markup, so callers escape what comes from outside."""
+    body = "".join(f"<tr><td>{label}</td><td>{value}</td></tr>" for label, value in items)
+    return f'<table class="gf-rows{" gf-stale" if stale else ""}">{body}</table>'
+
+
+def age(seconds: float) -> str:
+    """How old something is."""
+    if seconds < 90:
+        return f"{seconds:.1f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.0f} h"

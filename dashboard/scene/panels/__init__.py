@@ -1,0 +1,17 @@
+"""One module per panel. PAGES are the pages of charts in the order of their tabs; the others stand on the left."""
+
+from dashboard.scene.panels.acceleration import Acceleration
+from dashboard.scene.panels.angle import Angle
+from dashboard.scene.panels.axes import Axes
+from dashboard.scene.panels.base import Panel, Snapshot
+from dashboard.scene.panels.devices import Devices
+from dashboard.scene.panels.errors import Errors
+from dashboard.scene.panels.innovations import Innovations
+from dashboard.scene.panels.link import Link
+from dashboard.scene.panels.position import Position
+from dashboard.scene.panels.rates import Rates
+from dashboard.scene.panels.record import Record
+
+PAGES: tuple[type[Panel], ...] = (Rates, Axes, Acceleration, Angle, Position, Errors, Innovations, Link)
+
+__all__ = ["PAGES", "Devices", "Panel", "Record", "Snapshot"]

@@ -1,0 +1,76 @@
+"""What every panel gets and must do."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import viser
+
+from dashboard.scene.chart import Chart, Curve
+from dashboard.scene.palette import estimator_colour, estimator_title
+from dashboard.scene.store import Device, Store
+
+DEG = 180.0 / np.pi
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """One update of a view: the chosen device and the time window of its charts. Valid under the store's lock."""
+
+    store: Store
+    device: Device
+    t0: float  # s on the device's axis
+    t1: float
+    now: float  # time.monotonic(), s
+    dark: bool
+
+    def rows(self, topic: str, estimator: str = "") -> tuple[np.ndarray, np.ndarray]:
+        """Ring rows of a topic inside the window."""
+        return self.device.window(topic, estimator, self.t0, self.t1)
+
+    def stale(self, topic: str, estimator: str = "") -> bool:
+        """True when the newest message is too old."""
+        return self.device.stale(topic, estimator, self.now)
+
+
+class Panel:
+    """A page of charts and tables in a folder of one client's GUI; update() is called only while it is visible."""
+
+    title = ""
+
+    def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
+        self.client, self.folder = client, folder
+        self._charts: dict[str, Chart] = {}
+        self._order = 0.0
+
+    def chart(self, key: str, title: str, unit: str, height: int = 170, digits: int = 1) -> Chart:
+        """The chart of this key, made at first use below the ones before it."""
+        if key not in self._charts:
+            self._order += 2.0
+            self._charts[key] = Chart(self.client, self.folder, self._order, title, unit, height, digits)
+        return self._charts[key]
+
+    def show(self, key: str, title: str, unit: str, curves: Sequence[Curve], s: Snapshot, **options) -> None:
+        """Draw a chart for the window of the snapshot."""
+        self.chart(key, title, unit, **options).show(curves, s.t0, s.t1, s.dark)
+
+    def html(self, content: str, handle: viser.GuiHtmlHandle | None) -> viser.GuiHtmlHandle:
+        """Set an HTML element's content when it changed; make it at first use."""
+        if handle is None:
+            with self.folder:
+                return self.client.gui.add_html(content, order=self._order)
+        if handle.content != content:
+            handle.content = content
+        return handle
+
+    def update(self, s: Snapshot) -> None:
+        """Bring the page to the state of the snapshot."""
+        raise NotImplementedError
+
+
+def estimator_curve(
+    s: Snapshot, topic: str, name: str, t: np.ndarray, y: np.ndarray, half: np.ndarray | None = None
+) -> Curve:
+    """A curve in the colour and under the title of an estimator."""
+    colour = estimator_colour(name, s.device.estimators(topic))
+    return Curve(estimator_title(name), colour, t, y, half, stale=s.stale(topic, name))

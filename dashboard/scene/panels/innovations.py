@@ -1,0 +1,88 @@
+"""Is a filter honest: innovations inside their 3-sigma, NIS inside the chi-square bounds of its degrees of freedom."""
+
+import numpy as np
+from scipy.stats import chi2
+
+from dashboard.scene.chart import Curve
+from dashboard.scene.palette import AXES, GREY, estimator_title, number, rows
+from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve
+from dashboard.scene.store import (
+    INNOVATION_NIS,
+    INNOVATION_SIGMA,
+    INNOVATION_VALUE,
+    RATE_INNOVATION,
+    RATE_INNOVATION_SIGMA,
+    RATE_NIS,
+)
+
+INSIDE = 0.95  # share of NIS values that an honest filter has between the two bounds
+
+
+class Innovations(Panel):
+    """NIS first, then the innovations; the table says how many values lie inside."""
+
+    title = "NIS"
+    _table = None
+
+    def update(self, s: Snapshot) -> None:
+        topic = "innovation" if s.device.is_vehicle else "rate"
+        items = []
+        for name in s.device.estimators(topic):
+            message = s.device.get(topic, name).message
+            if topic == "innovation":
+                t, r = s.rows("innovation", name)
+                nis, value, sigma = r[:, INNOVATION_NIS], r[:, INNOVATION_VALUE], r[:, INNOVATION_SIGMA]
+                dof, labels, unit = message.dof, list(message.name), "m, m/s"
+            else:
+                t, r = s.rows("rate", name)
+                nis, value, sigma = r[:, RATE_NIS], r[:, RATE_INNOVATION], r[:, RATE_INNOVATION_SIGMA]
+                dof, unit = message.nis_dof, message.innovation_unit or "1"
+                labels = _PRODUCTS if value.shape[1] == 6 else []
+            good = np.isfinite(nis)
+            if not good.any():
+                continue
+            items += self._nis(s, topic, name, t[good], nis[good], int(dof))
+            self._innovations(s, topic, name, (t[good], value[good], sigma[good]), labels, unit)
+        note = '<p class="gf-note">No corrections yet: a filter without measurements has no innovations.</p>'
+        self._table = self.html(rows(items) if items else note, self._table)
+
+    def _nis(self, s: Snapshot, topic: str, name: str, t: np.ndarray, nis: np.ndarray, dof: int) -> list:
+        title = estimator_title(name)
+        low, high = chi2.interval(INSIDE, max(dof, 1))
+        curve = estimator_curve(s, topic, name, t, np.minimum(nis, 5 * high))
+        ends = np.array([s.t0, s.t1])
+        bounds = [
+            Curve(f"χ² {label} %", GREY, ends, np.full(2, bound), dash=True, width=1.2)
+            for label, bound in (("2.5", low), ("97.5", high))
+        ]
+        self.show(f"{name}nis", f"NIS, {title}", f"{dof} degrees of freedom", [curve, *bounds], s, height=200)
+        inside = float(np.mean((nis >= low) & (nis <= high)) * 100)
+        return [
+            (f"inside 95 % bounds, {title}", number(inside, 1, "%")),
+            (f"mean NIS, expected {dof}", number(float(np.mean(nis)), 2)),
+        ]
+
+    def _innovations(self, s: Snapshot, topic: str, name: str, data: tuple, labels: list[str], unit: str) -> None:
+        t, value, sigma = data
+        for first in (0, 3):
+            curves = [
+                Curve(
+                    labels[k] if k < len(labels) else str(k + 1),
+                    AXES[k - first],
+                    t,
+                    value[:, k],
+                    3 * sigma[:, k] if k == first else None,
+                    stale=s.stale(topic, name),
+                )
+                for k in range(first, first + 3)
+                if np.isfinite(value[:, k]).any()
+            ]
+            if curves:
+                self.show(
+                    f"{name}{first}", f"Innovations {first + 1} to {first + len(curves)}", unit, curves, s, digits=2
+                )
+
+
+_PRODUCTS = ["ω<sub>x</sub>²", "ω<sub>y</sub>²", "ω<sub>z</sub>²"] + [
+    f"ω<sub>{a}</sub>ω<sub>{b}</sub>" for a, b in ("xy", "xz", "yz")
+]

@@ -1,0 +1,367 @@
+"""The 3-D scene of one browser: what is where, from the newest messages of the chosen device.
+
+Names of the nodes, which tests and other tools may rely on. Below /world everything stands in n (north, east, down):
+a node's quaternion (w, x, y, z) is the q_nb of the message and its position is in metres (the cube: half sides).
+
+    /world                              n turned into the z-up display frame; moved against the vehicle when following
+    /world/truth                        body frame of what is really the case; simulated devices only
+    /world/truth/edges
+    /world/estimate/<estimator>/body    body frame of one estimator (rate/<estimator> or nav/<estimator>)
+    /world/estimate/<estimator>/body/{edges,faces,axes,label}      axes: the twelve sensors, on the main estimator only
+    /world/estimate/<estimator>/body/rate, .../rate_label          arrow of omega_ib_b, on the main estimator only
+    /world/estimate/<estimator>/trajectory/<piece>                 vehicles
+    /world/estimate/<estimator>/ellipsoid                          3-sigma position, at the body
+    /world/table                        the table below the cube, turning with the truth, else with the main estimate
+    /world/fixes/<piece>                GNSS fixes
+    /world/ground                       grid
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import viser
+
+from dashboard.scene import geometry as geo
+from dashboard.scene.palette import FIX, GREY, ORANGE, estimator_colour, estimator_title, number, rgb, truth_colour
+from dashboard.scene.store import Device
+
+ARROW_PER_RADPS = 0.55  # half sides per rad/s; 180 deg/s gives 1.7
+ARROW_LONGEST = 2.2
+CUBE_CAMERA = (4.3, -3.6, 2.6)
+VEHICLE_CAMERA = (-22.0, -20.0, 14.0)
+
+LAYERS = ("truth", "estimates", "sensors", "rate", "trajectory", "fixes", "ellipsoid", "grid")
+
+
+@dataclass
+class Choice:
+    """What the person at this browser wants to see."""
+
+    dark: bool = True
+    follow: bool = True
+    layers: dict[str, bool] = field(default_factory=lambda: dict.fromkeys(LAYERS, True))
+
+
+class SceneView:
+    """Nodes in the scope of one client; update() brings them to the state of a device."""
+
+    def __init__(self, client: viser.ClientHandle, choice: Choice) -> None:
+        self._client, self._scene, self._choice = client, client.scene, choice
+        self._built: tuple = ()
+        self._nodes: dict[str, object] = {}
+        self._sent: dict[str, tuple] = {}
+        self._pieces: dict[str, int] = {}  # points of each track piece that the browser has
+        self._thinned: dict[str, int] = {}
+        self._scene.set_up_direction("+z")
+        self._lights()
+
+    def reset_camera(self, vehicle: bool) -> None:
+        """Look at the body from the usual side."""
+        camera = self._client.camera
+        with self._client.atomic():
+            camera.up_direction = (0.0, 0.0, 1.0)
+            camera.position = VEHICLE_CAMERA if vehicle else CUBE_CAMERA
+            camera.look_at = (0.0, 0.0, 0.0) if vehicle else (0.0, 0.0, 0.25)
+
+    def forget(self) -> None:
+        """Take everything away; the next update builds it again."""
+        if "/world" in self._nodes:
+            self._nodes["/world"].remove()
+        self._nodes.clear()
+        self._sent.clear()
+        self._pieces.clear()
+        self._thinned.clear()
+        self._built = ()
+
+    def update(self, device: Device) -> None:
+        """Poses from the newest messages. Call under the store's lock, 20 to 30 times a second."""
+        vehicle = device.is_vehicle
+        estimators = device.estimators("nav" if vehicle else "rate")
+        truth = device.get("truth") is not None
+        built = (device.name, device.generation, vehicle, tuple(estimators), truth, self._choice.dark)
+        if built != self._built:
+            first = not self._built or self._built[2] != vehicle
+            self.forget()
+            self._built = built
+            self._build(vehicle, estimators, truth)
+            if first:
+                self.reset_camera(vehicle)
+        if vehicle:
+            self._update_vehicle(device, estimators)
+        else:
+            self._update_cube(device, estimators)
+        for node, layer in self._layers():
+            if node.visible != self._choice.layers[layer]:
+                node.visible = self._choice.layers[layer]
+
+    def update_tracks(self, device: Device) -> None:
+        """Trajectories and fixes; only pieces that grew are sent. Call under the store's lock, twice a second."""
+        for name, track in device.tracks.items():
+            if name == "fixes":
+                self._track("/world/fixes", track, rgb(FIX), points=True)
+            else:
+                estimator = name.split("/", 1)[1]
+                colour = rgb(estimator_colour(estimator, device.estimators("nav")))
+                self._track(f"/world/estimate/{estimator}/trajectory", track, colour, points=False)
+
+    # --- building -------------------------------------------------------------------------------------------------
+
+    def _lights(self) -> None:
+        """Our own lights: the default ones are so strong that colours turn to white."""
+        self._scene.configure_default_lights(enabled=False)
+        self._scene.configure_environment_map(None)
+        self._scene.add_light_ambient("/lights/ambient", intensity=1.6)
+        self._scene.add_light_directional("/lights/sun", intensity=1.7, position=(3.0, -4.0, 8.0))
+
+    def _build(self, vehicle: bool, estimators: list[str], truth: bool) -> None:
+        scene, dark = self._scene, self._choice.dark
+        self._nodes["/world"] = scene.add_frame("/world", show_axes=False, wxyz=geo.Q_DISPLAY_N)
+        self._grid(vehicle)
+        for index, name in enumerate(estimators):
+            colour = estimator_colour(name, estimators)
+            body = f"/world/estimate/{name}/body"
+            self._nodes[body] = scene.add_frame(body, show_axes=False)
+            if vehicle:
+                self._vehicle_body(body, colour)
+                path = f"/world/estimate/{name}/ellipsoid"
+                self._nodes[path] = scene.add_icosphere(
+                    path, radius=1.0, color=rgb(colour), opacity=0.22, cast_shadow=False, visible=False
+                )
+            else:
+                self._cube_body(body, colour, name, main=index == 0)
+        if not vehicle:
+            self._table()
+        if truth:
+            self._nodes["/world/truth"] = scene.add_frame("/world/truth", show_axes=False)
+            scene.add_line_segments(
+                "/world/truth/edges",
+                geo.box_edges((1.015,) * 3),
+                rgb(truth_colour(dark)),
+                thickness=2.0,
+                thickness_units="screen",
+            )
+
+    def _grid(self, vehicle: bool) -> None:
+        dark, size = self._choice.dark, 10.0 if vehicle else 1.0
+        self._nodes["/world/ground"] = self._scene.add_grid(
+            "/world/ground",
+            infinite_grid=True,
+            cell_size=size,
+            section_size=5 * size,
+            cell_color=(48, 50, 54) if dark else (222, 222, 222),
+            section_color=(74, 78, 84) if dark else (196, 196, 196),
+            fade_distance=250.0 if vehicle else 26.0,
+            fade_strength=1.5,
+            shadow_opacity=0.0,
+            position=(0.0, 0.0, 0.3 if vehicle else 1.42),
+        )
+
+    def _table(self) -> None:
+        dark = self._choice.dark
+        self._nodes["/world/table"] = self._scene.add_frame("/world/table", show_axes=False)
+        vertices, faces = geo.disc(2.3, 0.14, 96)
+        self._scene.add_mesh_simple(
+            "/world/table/disc",
+            vertices,
+            faces,
+            color=(52, 60, 70) if dark else (205, 210, 216),
+            flat_shading=True,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+            position=(0.0, 0.0, -1.12),
+        )
+        angle = np.radians(np.arange(0, 360, 15))
+        inner = np.where(np.arange(len(angle)) % 6 == 0, 1.85, 2.1)
+        rim = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))])
+        marks = np.stack([rim * inner[:, None], rim * 2.26], axis=1) + [0, 0, -1.11]
+        self._scene.add_line_segments(
+            "/world/table/marks", marks.astype(np.float32), rgb(GREY), thickness=2.0, thickness_units="screen"
+        )
+
+    def _cube_body(self, body: str, colour: str, name: str, main: bool) -> None:
+        scene = self._scene
+        scene.add_line_segments(
+            f"{body}/edges", geo.box_edges((1, 1, 1)), rgb(colour), thickness=3.0, thickness_units="screen"
+        )
+        scene.add_box(
+            f"{body}/faces",
+            color=rgb(colour),
+            dimensions=(2.0, 2.0, 2.0),
+            opacity=0.22 if main else 0.07,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        scene.add_label(
+            f"{body}/label",
+            estimator_title(name),
+            position=(0.0, 0.0, 1.28 if main else 1.08),
+            anchor="bottom-center",
+            font_screen_scale=0.8,
+        )
+        if main:
+            self._sensors(body)
+            self._rate_arrow(body)
+
+    def _sensors(self, body: str) -> None:
+        """Twelve arrows at their corners, drawn along each sensor's direction, with the axis' name at the tip."""
+        start = np.repeat(geo.TRIADS_B, 3, axis=0)
+        direction = geo.TRIAD_AXES_B.reshape(12, 3)
+        group = f"{body}/axes"
+        self._nodes[group] = self._scene.add_frame(group, show_axes=False)
+        colours = np.tile(np.array([rgb(c) for c in _SENSOR_COLOURS], dtype=np.uint8), (4, 1))
+        self._scene.add_arrows(
+            f"{group}/arrows",
+            np.stack([start, start + 0.42 * direction], axis=1).astype(np.float32),
+            colours,
+            shaft_radius=0.022,
+            head_radius=0.055,
+            head_length=0.13,
+        )
+        for i in range(12):
+            self._scene.add_label(
+                f"{group}/a{i // 3 + 1}{i % 3 + 1}",
+                f"a{i // 3 + 1}{i % 3 + 1}",
+                position=tuple(start[i] + 0.5 * direction[i]),
+                anchor="center-center",
+                font_screen_scale=0.62,
+            )
+
+    def _rate_arrow(self, body: str) -> None:
+        path = f"{body}/rate"
+        points = np.array([[[0, 0, 0], [0, 0, 0.01]]], dtype=np.float32)
+        self._nodes[path] = self._scene.add_arrows(
+            path, points, rgb(ORANGE), shaft_radius=0.045, head_radius=0.11, head_length=0.24
+        )
+        self._nodes[f"{path}_label"] = self._scene.add_label(
+            f"{path}_label", "", anchor="center-left", font_screen_scale=0.9
+        )
+
+    def _vehicle_body(self, body: str, colour: str) -> None:
+        scene = self._scene
+        scene.add_line_segments(
+            f"{body}/edges", geo.vehicle_edges(), rgb(colour), thickness=3.0, thickness_units="screen"
+        )
+        scene.add_box(
+            f"{body}/faces",
+            color=rgb(colour),
+            dimensions=(4.4, 1.8, 0.6),
+            position=(0.0, 0.0, -0.6),
+            opacity=0.45,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        self._nodes[f"{body}/heading"] = scene.add_arrows(
+            f"{body}/heading",
+            np.array([[[2.2, 0, -0.6], [5.5, 0, -0.6]]], dtype=np.float32),
+            rgb(ORANGE),
+            shaft_radius=0.12,
+            head_radius=0.35,
+            head_length=0.8,
+        )
+
+    # --- updating -------------------------------------------------------------------------------------------------
+
+    def _set(self, path: str, *, q=None, p=None) -> None:
+        """Send a pose when it changed."""
+        node = self._nodes.get(path)
+        if node is None:
+            return
+        if q is not None and self._sent.get(f"{path}#q") != q:
+            node.wxyz = self._sent[f"{path}#q"] = q
+        if p is not None and self._sent.get(f"{path}#p") != p:
+            node.position = self._sent[f"{path}#p"] = p
+
+    def _update_cube(self, device: Device, estimators: list[str]) -> None:
+        reference = None
+        for name in reversed(estimators):
+            reference = geo.quaternion(device.get("rate", name).message.q_nb)
+            self._set(f"/world/estimate/{name}/body", q=reference)
+        truth = device.get("truth")
+        if truth is not None:
+            reference = geo.quaternion(truth.message.q_nb) or reference
+            self._set("/world/truth", q=reference)
+        self._set("/world/table", q=reference)
+        if estimators:
+            self._update_rate_arrow(f"/world/estimate/{estimators[0]}/body/rate", device, estimators[0])
+
+    def _update_rate_arrow(self, path: str, device: Device, estimator: str) -> None:
+        node, label = self._nodes.get(path), self._nodes.get(f"{path}_label")
+        omega = np.asarray(device.get("rate", estimator).message.omega_ib_b_radps, dtype=float)
+        if node is None or omega.shape != (3,) or not np.all(np.isfinite(omega)):
+            return
+        size = float(np.linalg.norm(omega))
+        text = f"ω {number(np.degrees(size), 0, '°/s')}" if size > 0.05 else ""
+        length = min(ARROW_PER_RADPS * size, ARROW_LONGEST)
+        direction = omega / size if size > 0.05 else np.array([0.0, 0.0, 1.0])
+        # It starts on the face it leaves the cube through, so that a slow rate is seen outside the cube as well.
+        start = direction / np.max(np.abs(direction))
+        tip = start + direction * (length + 0.25 if size > 0.05 else 1e-3)
+        key = tuple(np.round(np.concatenate([start, tip]), 2))
+        if self._sent.get(path) != key:
+            self._sent[path] = key
+            node.points = np.array([[start, tip]], dtype=np.float32)
+            label.position = tuple(tip + direction * 0.12)
+        if label.text != text:
+            label.text = text
+
+    def _update_vehicle(self, device: Device, estimators: list[str]) -> None:
+        for index, name in enumerate(estimators):
+            message = device.get("nav", name).message
+            q = geo.quaternion(message.q_nb)
+            p = tuple(message.p_ned_m) if len(message.p_ned_m) == 3 else None
+            self._set(f"/world/estimate/{name}/body", q=q, p=p)
+            surface = geo.ellipsoid(message.position_covariance)
+            path = f"/world/estimate/{name}/ellipsoid"
+            if surface is not None and p is not None and path in self._nodes:
+                self._set(path, q=surface[1], p=p)
+                scale = tuple(round(v, 3) for v in surface[0])
+                if self._sent.get(f"{path}#s") != scale:
+                    self._sent[f"{path}#s"] = scale
+                    self._nodes[path].scale = scale
+            if index == 0 and p is not None:
+                self._set("/world/ground", p=(0.0, 0.0, round(p[2], 1) + 0.3))
+                if self._choice.follow:
+                    shift = -geo.rotate(np.array(geo.Q_DISPLAY_N), np.array(p))
+                    self._set("/world", p=tuple(float(v) for v in shift))
+
+    def _layers(self):
+        for path, node in self._nodes.items():
+            tail = path.rsplit("/", 1)[1]
+            if path == "/world/truth":
+                yield node, "truth"
+            elif tail in ("rate", "rate_label"):
+                yield node, "rate"
+            elif "/trajectory/" in path:
+                yield node, "trajectory"
+            elif path.startswith("/world/fixes/"):
+                yield node, "fixes"
+            elif tail in _TAILS:
+                yield node, _TAILS[tail]
+
+    def _track(self, base: str, track: geo.Track, colour: tuple[int, int, int], points: bool) -> None:
+        if self._thinned.get(base, track.thinned) != track.thinned:
+            for path in [path for path in self._nodes if path.startswith(f"{base}/")]:
+                self._nodes.pop(path).remove()
+                self._pieces.pop(path, None)
+        self._thinned[base] = track.thinned
+        for index, piece in enumerate(track.pieces):
+            path = f"{base}/{index}"
+            if len(piece) < 2 or self._pieces.get(path) == len(piece):
+                continue
+            self._pieces[path] = len(piece)
+            line = np.asarray(piece, dtype=np.float32)
+            if points:
+                self._nodes[path] = self._scene.add_point_cloud(
+                    path, line, colour, point_size=0.7, point_shape="circle", precision="float32"
+                )
+            else:
+                segments = np.stack([line[:-1], line[1:]], axis=1)
+                self._nodes[path] = self._scene.add_line_segments(
+                    path, segments, colour, thickness=3.0, thickness_units="screen"
+                )
+
+
+_SENSOR_COLOURS = ("#D55E00", "#009E73", "#56B4E9")
+_TAILS = {"body": "estimates", "axes": "sensors", "ellipsoid": "ellipsoid", "ground": "grid"}

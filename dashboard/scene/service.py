@@ -1,0 +1,141 @@
+"""start(): the viser server on the loopback, the feed, and the two loops that bring browsers up to date."""
+
+import contextlib
+import io
+import logging
+import socket
+import threading
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+import viser
+
+from dashboard.scene.feed import Feed
+from dashboard.scene.store import Store
+from dashboard.scene.view import View
+from messages import gyrofree_pb2 as pb
+from messages.bus import BusSettings
+
+log = logging.getLogger(__name__)
+
+POSE_S = 1 / 25  # period of poses
+PANEL_S = 1 / 4  # period of charts and tables
+
+RecordCall = Callable[[pb.RecorderCommand], pb.RecorderStatus]
+
+
+class SceneSettings(Protocol):
+    """What start() reads of the dashboard's settings."""
+
+    viser_port: int  # 0 takes a free one
+
+
+class SceneError(RuntimeError):
+    """The scene cannot be served."""
+
+
+class SceneHandle:
+    """The running scene. `port` is where viser listens; the front door sends signed-in people there."""
+
+    def __init__(self, server: viser.ViserServer, feed: Feed, store: Store, on_record: RecordCall | None) -> None:
+        self.port = server.get_port()
+        self.store = store
+        self.feed = feed
+        self._server = server
+        self._on_record = on_record or feed.recorder
+        self._views: dict[int, View] = {}
+        self._lock = threading.Lock()
+        self._stop = threading.Event()
+        self._watched = feed.watched
+        server.on_client_connect(self._connected)
+        server.on_client_disconnect(self._disconnected)
+        self._threads = [
+            threading.Thread(target=self._loop, args=(POSE_S, View.tick_scene), name="dashboard-poses", daemon=True),
+            threading.Thread(target=self._loop, args=(PANEL_S, View.tick_panels), name="dashboard-panels", daemon=True),
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def operator_uuids(self) -> frozenset[str]:
+        """GUI elements that only an operator may use: the proxy drops a viewer's message that names one of them."""
+        with self._lock:
+            return frozenset(uuid for view in self._views.values() for uuid in view.operator_uuids)
+
+    @property
+    def clients(self) -> int:
+        """Browsers that look."""
+        with self._lock:
+            return len(self._views)
+
+    def stop(self) -> None:
+        """End loops, feed and server."""
+        self._stop.set()
+        self._watched.set()  # wakes the loops
+        for thread in self._threads:
+            thread.join(timeout=5.0)
+        self.feed.stop()
+        self._server.stop()
+
+    def _connected(self, client: viser.ClientHandle) -> None:
+        view = View(client, self.store, self.feed, self._on_record)
+        with self._lock:
+            self._views[client.client_id] = view
+            self._watched.set()
+        log.info("browser %d looks at the scene", client.client_id)
+
+    def _disconnected(self, client: viser.ClientHandle) -> None:
+        with self._lock:
+            self._views.pop(client.client_id, None)
+            if not self._views:
+                self._watched.clear()
+        log.info("browser %d is gone", client.client_id)
+
+    def _loop(self, period_s: float, tick: Callable[[View], None]) -> None:
+        """Call tick for each view; nothing at all is done while nobody looks."""
+        complained: set[int] = set()
+        while not self._stop.is_set():
+            self._watched.wait()
+            began = time.monotonic()
+            with self._lock:
+                views = list(self._views.items())
+            for number, view in views:
+                try:
+                    tick(view)
+                except Exception:  # one browser's trouble must not stop the others' picture
+                    if number not in complained:
+                        log.exception("browser %d: update failed", number)
+                    complained.add(number)
+            self._stop.wait(max(period_s - (time.monotonic() - began), period_s / 4))
+
+
+def start(
+    bus: BusSettings,
+    settings: SceneSettings,
+    store: Store | None = None,
+    on_record: RecordCall | None = None,
+    host: str = "127.0.0.1",
+) -> SceneHandle:
+    """Serve the scene at settings.viser_port of `host`.
+
+    `on_record` gets the orders of the record buttons and returns the recorder's answer or raises ConnectionError; by
+    default the recorder is asked on the bus. Raises SceneError when the port is taken.
+    """
+    with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner that would stand among our data
+        server = viser.ViserServer(
+            host=host, port=settings.viser_port or _free_port(host), label="gyrofree", verbose=False
+        )
+    if settings.viser_port and server.get_port() != settings.viser_port:
+        # viser takes the next free port without a word; the proxy would then talk to a stranger.
+        server.stop()
+        raise SceneError(
+            f"[dashboard] viser_port {settings.viser_port}: already in use; stop the other program or set it to 0"
+        )
+    store = store or Store()
+    return SceneHandle(server, Feed(bus, store, threading.Event()), store, on_record)
+
+
+def _free_port(host: str) -> int:
+    with socket.socket() as probe:
+        probe.bind((host, 0))
+        return probe.getsockname()[1]

@@ -1,0 +1,251 @@
+"""Latest values and ring buffers, per device, filled by the feed and read by the views.
+
+Time is `header.utc_ns` in seconds after the first message of the device; whether a value is stale is judged by when it
+arrived, because a replay carries the past's time. Every method that reads or writes takes the store's lock briefly.
+"""
+
+import threading
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+from google.protobuf.message import Message
+
+from dashboard.scene.geometry import Track, ned_from_geodetic
+from messages import gyrofree_pb2 as pb
+from messages import topics as tp
+
+HISTORY_S = 320.0  # kept in the rings; the longest window a view offers is 300 s
+STALE_S = 1.0  # a value older than this is greyed
+SLOW_STALE_S = {"link": 3.0, "status": 3.0, "estimator": 3.0, "board": 30.0, "gnss": 2.5, "innovation": 10.0}
+
+
+class Ring:
+    """The newest `capacity` rows of a table whose first column is the time, s. Not locked: the store does that."""
+
+    def __init__(self, columns: int, capacity: int) -> None:
+        self._rows = np.full((capacity, columns + 1), np.nan)
+        self._next = 0
+        self.count = 0
+
+    def append(self, t: float, values: np.ndarray | list[float]) -> None:
+        """Add a row; missing values at its end stay NaN, too many are cut. A row not after the last is dropped."""
+        if self.count and t <= self._rows[self._next - 1, 0]:
+            return
+        row = self._rows[self._next]
+        width = min(len(values), len(row) - 1)
+        row[0], row[1 : width + 1], row[width + 1 :] = t, values[:width], np.nan
+        self._next = (self._next + 1) % len(self._rows)
+        self.count = min(self.count + 1, len(self._rows))
+
+    def window(self, t0: float, t1: float) -> tuple[np.ndarray, np.ndarray]:
+        """Times (n,) and values (n, columns) of the rows with t0 <= t <= t1, oldest first, copied."""
+        if self.count < len(self._rows):
+            rows = self._rows[: self.count]
+        else:
+            rows = np.concatenate([self._rows[self._next :], self._rows[: self._next]])
+        first, last = np.searchsorted(rows[:, 0], [t0, t1 + 1e-9])
+        chosen = rows[first:last].copy()
+        return chosen[:, 0], chosen[:, 1:]
+
+
+# Columns of the rings.
+RATE_OMEGA, RATE_SIGMA, RATE_F = slice(0, 3), slice(3, 6), slice(6, 9)
+RATE_ANGLE, RATE_NIS, RATE_POSITION = 9, 10, slice(11, 14)
+RATE_INNOVATION, RATE_INNOVATION_SIGMA = slice(14, 20), slice(20, 26)
+TRUTH_OMEGA, TRUTH_F, TRUTH_ANGLE = slice(0, 3), slice(3, 6), 6
+NAV_POSITION, NAV_VELOCITY, NAV_SIGMA_POSITION, NAV_YAW = slice(0, 3), slice(3, 6), slice(6, 9), 9
+INNOVATION_VALUE, INNOVATION_SIGMA, INNOVATION_NIS, INNOVATION_ERROR = slice(0, 6), slice(6, 12), 12, slice(13, 16)
+GNSS_POSITION = slice(0, 3)
+
+
+@dataclass
+class Latest:
+    """The newest message of one topic (and estimator) and when it came."""
+
+    message: Message
+    arrived: float  # time.monotonic(), s
+    t: float  # s on the device's axis
+
+    def age(self, now: float | None = None) -> float:
+        """Seconds since it arrived."""
+        return (time.monotonic() if now is None else now) - self.arrived
+
+
+@dataclass
+class Device:
+    """What is known of one device. `latest` is keyed by topic name and estimator ('' where there is none)."""
+
+    name: str
+    utc0_ns: int
+    latest: dict[tuple[str, str], Latest] = field(default_factory=dict)
+    rings: dict[tuple[str, str], Ring] = field(default_factory=dict)
+    tracks: dict[str, Track] = field(default_factory=dict)
+    t_newest: float = 0.0
+    origin: tuple[float, float, float] | None = None  # latitude deg, longitude deg, height m of n's origin
+    run: int = 0
+    generation: int = 0  # counts the times everything was forgotten because time jumped back
+
+    @property
+    def is_vehicle(self) -> bool:
+        """A six-axis board that navigates, as against a cube on its table."""
+        return ("imu", "") in self.latest or any(topic == "nav" for topic, _ in self.latest)
+
+    def estimators(self, topic: str) -> list[str]:
+        """Names of the estimators heard on a topic; the one with corrections first, because it is the main one."""
+        names = [estimator for name, estimator in self.latest if name == topic]
+        return sorted(names, key=lambda name: ("ekf" not in name, name))
+
+    def get(self, topic: str, estimator: str = "") -> Latest | None:
+        """Newest message of a topic."""
+        return self.latest.get((topic, estimator))
+
+    def stale(self, topic: str, estimator: str = "", now: float | None = None) -> bool:
+        """True when there is none or it is older than its topic allows."""
+        latest = self.get(topic, estimator)
+        return latest is None or latest.age(now) > SLOW_STALE_S.get(topic, STALE_S)
+
+    def window(self, topic: str, estimator: str, t0: float, t1: float) -> tuple[np.ndarray, np.ndarray]:
+        """Ring rows of a topic in a window; empty arrays when there are none. Call under the store's lock."""
+        ring = self.rings.get((topic, estimator))
+        return ring.window(t0, t1) if ring else (np.empty(0), np.empty((0, 32)))
+
+
+class Store:
+    """All devices, the recorder, and the last log lines."""
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()
+        self.devices: dict[str, Device] = {}
+        self.recorder: Latest | None = None
+        self.logs: list[tuple[float, str, str]] = []  # arrived, device, text
+        self.dropped = 0  # messages the feed could not keep up with
+
+    def names(self) -> list[str]:
+        """Devices heard so far, in the order of their names."""
+        with self.lock:
+            return sorted(self.devices)
+
+    def device(self, name: str) -> Device | None:
+        """A device; read it under the lock."""
+        with self.lock:
+            return self.devices.get(name)
+
+    def put(self, topic: tp.Topic, device: str, estimator: str, message: Message, arrived: float | None = None) -> None:
+        """Take one message in. `arrived` is time.monotonic() of its arrival, s."""
+        arrived = time.monotonic() if arrived is None else arrived
+        with self.lock:
+            if topic is tp.STATUS:
+                self.recorder = Latest(message, arrived, 0.0)
+            elif topic is tp.LOG:
+                self.logs = [*self.logs[-49:], (arrived, device, message.message)]
+            else:
+                self._put_device(topic, device, estimator, message, arrived)
+
+    def _put_device(self, topic: tp.Topic, name: str, estimator: str, message: Message, arrived: float) -> None:
+        utc_ns = message.header.utc_ns
+        known = self.devices.get(name)
+        if known is None:
+            known = self.devices[name] = Device(name, utc_ns)
+        t = (utc_ns - known.utc0_ns) * 1e-9
+        if utc_ns and abs(t - known.t_newest) > 30.0 and (known.t_newest - t > 30.0 or known.t_newest == 0.0):
+            # A replay started over, or the very first time stamp was not yet a clock: the old axis is of no use.
+            known = self.devices[name] = Device(name, utc_ns, generation=known.generation + 1)
+            t = 0.0
+        known.run = message.header.run or known.run
+        known.latest[topic.name, estimator] = Latest(message, arrived, t)
+        row = _ROWS.get(topic.name)
+        if row is not None:
+            row(known, topic, estimator, t, message)
+            known.t_newest = max(known.t_newest, t)
+
+
+def _ring(device: Device, topic: tp.Topic, estimator: str, columns: int, rate: float = 0.0) -> Ring:
+    key = topic.name, estimator
+    if key not in device.rings:
+        device.rings[key] = Ring(columns, int(HISTORY_S * (rate or topic.rate)))
+    return device.rings[key]
+
+
+def _sigmas(covariance: list[float]) -> list[float]:
+    """Standard deviations of a row-major 3 x 3 covariance; NaN where there is none."""
+    return list(np.sqrt(np.maximum(covariance[0::4], 0.0))) if len(covariance) == 9 else [np.nan] * 3
+
+
+def _three(values) -> list[float]:
+    return list(values) if len(values) == 3 else [np.nan] * 3
+
+
+def _six(values) -> list[float]:
+    return (list(values) + [np.nan] * 6)[:6]
+
+
+def _accel(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.AccelBatch) -> None:
+    if not m.axes or len(m.f_mps2) % m.axes:
+        return
+    ring = _ring(device, topic, estimator, m.axes, rate=200.0)
+    for i, row in enumerate(np.asarray(m.f_mps2).reshape(-1, m.axes)):
+        ring.append(t + i * m.period_s, row)
+
+
+def _imu(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.ImuBatch) -> None:
+    if len(m.f_b_mps2) != len(m.omega_ib_b_radps) or len(m.f_b_mps2) % 3:
+        return
+    ring = _ring(device, topic, estimator, 6, rate=200.0)
+    rows = np.hstack([np.asarray(m.f_b_mps2).reshape(-1, 3), np.asarray(m.omega_ib_b_radps).reshape(-1, 3)])
+    for i, row in enumerate(rows):
+        ring.append(t + i * m.period_s, row)
+
+
+def _tacho(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.TachoRate) -> None:
+    _ring(device, topic, estimator, 2, rate=100.0).append(t, [m.omega_radps, m.sigma_radps])
+
+
+def _truth(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.Truth) -> None:
+    row = _three(m.omega_ib_b_radps) + _three(m.f_b_mps2) + [m.angle_z_rad]
+    _ring(device, topic, estimator, 7).append(t, row)
+
+
+def _rate(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.RateEstimate) -> None:
+    nis = m.nis if m.innovation else np.nan
+    row = _three(m.omega_ib_b_radps) + _sigmas(m.omega_covariance) + _three(m.f_b_mps2) + [m.angle_z_rad, nis]
+    row += _three(m.p_n_m) + _six(m.innovation) + _six(m.innovation_sigma)
+    _ring(device, topic, estimator, 26).append(t, row)
+
+
+def _nav(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.NavSolution) -> None:
+    if len(m.p_ned_m) != 3 or m.mode < pb.NavSolution.MODE_COURSE:
+        return
+    device.origin = m.origin_latitude_deg, m.origin_longitude_deg, m.origin_height_m
+    w, x, y, z = m.q_nb if len(m.q_nb) == 4 else (1.0, 0.0, 0.0, 0.0)
+    yaw = float(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
+    row = list(m.p_ned_m) + _three(m.v_n_mps) + _sigmas(m.position_covariance) + [yaw]
+    _ring(device, topic, estimator, 10, rate=50.0).append(t, row)
+    device.tracks.setdefault(f"nav/{estimator}", Track(spacing=0.3)).add(m.p_ned_m)
+
+
+def _gnss(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.GnssFix) -> None:
+    if m.quality == pb.GnssFix.QUALITY_NONE or (m.latitude_deg == 0.0 and m.longitude_deg == 0.0):
+        return
+    origin = device.origin or (m.latitude_deg, m.longitude_deg, m.height_m)
+    p_n = ned_from_geodetic(m.latitude_deg, m.longitude_deg, m.height_m, origin)
+    _ring(device, topic, estimator, 9, rate=10.0).append(t, list(p_n))
+    if device.origin is not None:  # without an origin the fix would land in another frame than the trajectory
+        device.tracks.setdefault("fixes", Track(spacing=0.5)).add(p_n)
+
+
+def _innovation(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.Innovation) -> None:
+    row = _six(m.value) + _six(m.sigma) + [m.nis] + _three(m.error_to_reference)
+    _ring(device, topic, estimator, 16, rate=10.0).append(t, row)
+
+
+_ROWS = {
+    "accel": _accel,
+    "imu": _imu,
+    "tacho": _tacho,
+    "truth": _truth,
+    "rate": _rate,
+    "nav": _nav,
+    "gnss": _gnss,
+    "innovation": _innovation,
+}
