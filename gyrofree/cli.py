@@ -286,6 +286,56 @@ def doctor(
         raise typer.Exit(EXIT_FAILED)
 
 
+users = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Who may sign in to the dashboard.")
+app.add_typer(users, name="users")
+
+
+@users.command("add")
+def users_add(
+    name: Annotated[str, typer.Argument(help="User name.")],
+    role: Annotated[str, typer.Option(help="viewer looks, operator also records and drives, admin manages users.")],
+    config: Config = None,
+) -> None:
+    """Add a user or change password and role; the password is asked for, or read from standard input."""
+    from dashboard.users import UsersError, add_user
+
+    settings = _settings(config)
+    interactive = sys.stdin.isatty()
+    password = typer.prompt("Password", hide_input=True, confirmation_prompt=True) if interactive else input()
+    try:
+        add_user(settings.dashboard.users, name, password, role)
+    except UsersError as error:
+        raise fail(str(error), CONFIG) from None
+    print(f"{name} may sign in as {role}")
+
+
+@users.command("list")
+def users_list(as_json: AsJson = False, config: Config = None) -> None:
+    """Users and their roles."""
+    from dashboard.users import UsersError, load_users
+
+    try:
+        found = load_users(_settings(config).dashboard.users)
+    except UsersError as error:
+        raise fail(str(error)) from None
+    if as_json:
+        print(json.dumps([{"name": user.name, "role": user.role.name} for user in found.values()], indent=2))
+        return
+    for user in found.values():
+        print(f"{user.name}\t{user.role.name}")
+
+
+@users.command("remove")
+def users_remove(name: str, config: Config = None) -> None:
+    """Take a user's right to sign in."""
+    from dashboard.users import UsersError, remove_user
+
+    try:
+        remove_user(_settings(config).dashboard.users, name)
+    except UsersError as error:
+        raise fail(str(error)) from None
+
+
 def main() -> None:
     """Entry point of `gyrofree`."""
     app()

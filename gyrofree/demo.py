@@ -4,14 +4,13 @@ The configuration that the demo runs with is written to <folder>/gyrofree.toml, 
 """
 
 import secrets
-import shutil
 import time
 import urllib.error
 import urllib.request
 from dataclasses import dataclass
 from pathlib import Path
 
-from dashboard.auth import add_user, issue_link_token
+from dashboard.users import add_user, issue_link_token
 from gyrofree.config import Settings, load
 from gyrofree.doctor import port_taken
 from gyrofree.process import EXIT_FAILED, EXIT_TAKEN, fail, start_logging, stop_on_signals
@@ -112,7 +111,6 @@ def _supervise(plan: Plan, config: Path) -> Supervisor:
 def _sign_in_link(settings: Settings) -> str:
     """A fresh demo user with a password nobody knows, and the one-time link that signs in as it."""
     users = Path(settings.dashboard.users)
-    users.unlink(missing_ok=True)
     add_user(users, USER, secrets.token_urlsafe(24), "admin")
     token = issue_link_token(users, USER)
     return f"http://{settings.dashboard.host}:{settings.dashboard.port}/login/link?token={token}"
@@ -126,7 +124,3 @@ def _answers(settings: Settings) -> bool:
     except (urllib.error.URLError, OSError):
         return False
 
-
-def clear(folder: Path) -> None:
-    """Remove what earlier demo runs left."""
-    shutil.rmtree(folder, ignore_errors=True)

@@ -103,10 +103,13 @@ class Supervisor:
                 reader.join(0.5)
         return clean
 
+    def _command(self, child: Child) -> list[str]:
+        return [sys.executable, "-m", "gyrofree", *child.arguments]
+
     def _spawn(self, child: Child) -> None:
         child.started = time.monotonic()
         child.process = subprocess.Popen(
-            [sys.executable, "-m", "gyrofree", *child.arguments],
+            self._command(child),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
