@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 WRAP = 1 << 32
 _FIRST = struct.Struct("<I")
-_INDEXED = {type_: layout.offset("n") for type_, layout in SPEC.layouts.items()
+_INDEXED = {type_: layout.offsets["n"] for type_, layout in SPEC.layouts.items()
             if layout.fields and layout.fields[0].name in ("first_index", "first_pulse")}
 """Types whose payload starts with an index that counts on, and where their number of samples stands."""
 _PULSES = frozenset(t for t in _INDEXED if SPEC.layouts[t].fields[0].name == "first_pulse")

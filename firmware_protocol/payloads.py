@@ -2,6 +2,7 @@
 
 import struct
 from collections.abc import Callable
+from itertools import chain
 
 from firmware_protocol.frames import Payload, Unknown
 from firmware_protocol.spec import FORMATS, SPEC, Layout
@@ -21,7 +22,7 @@ def shortage(type_: int, payload: bytes) -> str:
         return ""
     need = layout.size
     if len(payload) >= need and layout.tail and not layout.tail.raw:
-        rows = payload[layout.offset(layout.tail.count)]
+        rows = payload[layout.offsets[layout.tail.count]]
         need += rows * layout.columns(payload) * struct.calcsize(FORMATS[layout.tail.type])
     return "" if len(payload) >= need else f"{layout.name} wants {need} bytes, got {len(payload)}"
 
@@ -32,23 +33,30 @@ def unpack(type_: int, payload: bytes) -> Payload:
     if layout is None:
         return Unknown(type_, payload)
     flat: tuple = layout.fixed.unpack_from(payload)
-    values = {}
-    for field in layout.fields:
-        values[field.name], flat = field.take(flat)
+    if layout.flat_names:
+        values = dict(zip(layout.flat_names, flat, strict=True))
+    else:
+        values = {}
+        for field in layout.fields:
+            values[field.name], flat = field.take(flat)
+    for name in layout.reserved:
+        del values[name]
     tail = layout.tail
     if tail and tail.raw:
         values[tail.name] = payload[layout.size :]
     elif tail:
         values[tail.name] = _rows(layout, payload, values.pop(tail.count))
-    return layout.payload_class(**{name: v for name, v in values.items() if not name.startswith("reserved")})
+    return layout.payload_class(**values)
 
 
 def _rows(layout: Layout, payload: bytes, count: int) -> tuple:
-    columns = layout.columns(payload)
-    flat = struct.unpack_from(f"<{count * columns}{FORMATS[layout.tail.type]}", payload, layout.size)
+    columns, code = layout.columns(payload), FORMATS[layout.tail.type]
     if layout.tail.columns == 1:
-        return flat
-    return tuple(flat[i * columns : (i + 1) * columns] for i in range(count))
+        return struct.unpack_from(f"<{count}{code}", payload, layout.size)
+    if columns == 0:
+        return ((),) * count
+    form = f"<{columns}{code}"
+    return tuple(struct.iter_unpack(form, payload[layout.size : layout.size + count * struct.calcsize(form)]))
 
 
 def pack(payload: Payload) -> bytes:
@@ -88,7 +96,7 @@ def _pack_tail(layout: Layout, head: bytes, data: bytes | tuple) -> bytes:
     rows = [(item,) for item in data] if tail.columns == 1 else data
     if wrong := next((row for row in rows if len(row) != columns), None):
         raise ValueError(f"a row of {tail.name} has {len(wrong)} values, wants {columns}")
-    return struct.pack(f"<{len(rows) * columns}{FORMATS[tail.type]}", *(value for row in rows for value in row))
+    return struct.pack(f"<{len(rows) * columns}{FORMATS[tail.type]}", *chain.from_iterable(rows))
 
 
 def _short(payload: Payload) -> str:
@@ -109,9 +117,9 @@ def length_rules() -> list[tuple[int, int, int, Callable[[bytes], int] | None] |
             continue
         width = struct.calcsize(FORMATS[tail.type])
         if isinstance(tail.columns, int):
-            rules[type_] = (layout.size, layout.offset(tail.count), width * tail.columns, None)
+            rules[type_] = (layout.size, layout.offsets[tail.count], width * tail.columns, None)
         else:
-            mask_at = layout.offset(tail.columns)
-            rules[type_] = (layout.size, layout.offset(tail.count), 0,
+            mask_at = layout.offsets[tail.columns]
+            rules[type_] = (layout.size, layout.offsets[tail.count], 0,
                             lambda payload, at=mask_at, width=width: payload[at].bit_count() * width)
     return rules

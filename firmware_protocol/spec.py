@@ -5,6 +5,7 @@ import struct
 import tomllib
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -101,20 +102,33 @@ class Layout:
     def fixed(self) -> struct.Struct:
         return struct.Struct("<" + "".join(field.format for field in self.fields))
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Smallest payload, bytes."""
         return self.fixed.size
 
-    def offset(self, name: str) -> int:
-        """Bytes before the field `name`."""
-        names = [field.name for field in self.fields]
-        return sum(field.size for field in self.fields[: names.index(name)])
+    @cached_property
+    def offsets(self) -> dict[str, int]:
+        """Bytes before each field."""
+        ends = [0, *accumulate(field.size for field in self.fields)]
+        return {field.name: end for field, end in zip(self.fields, ends, strict=False)}
+
+    @cached_property
+    def flat_names(self) -> tuple[str, ...] | None:
+        """Field names when each of them is one value of `fixed`, else None."""
+        if any(field.struct_class or (field.length > 1 and field.type != "u8") for field in self.fields):
+            return None
+        return tuple(field.name for field in self.fields)
+
+    @cached_property
+    def reserved(self) -> tuple[str, ...]:
+        """Fields that carry nothing yet."""
+        return tuple(field.name for field in self.fields if field.name.startswith("reserved"))
 
     def columns(self, payload: bytes) -> int:
         """Values per row of the tail."""
         columns = self.tail.columns
-        return columns if isinstance(columns, int) else payload[self.offset(columns)].bit_count()
+        return columns if isinstance(columns, int) else payload[self.offsets[columns]].bit_count()
 
 
 @dataclass(frozen=True)
