@@ -1,0 +1,227 @@
+"""One board: chunks in, bus messages out. Everything after the reader happens on one thread, `DeviceLink.run`."""
+
+import logging
+import queue
+import threading
+import time
+from collections.abc import Callable
+
+from google.protobuf.message import Message
+
+from firmware_protocol.codec import Deframer, Frame
+from firmware_protocol.frames import Acc12, Gps, Hello, Imu6, Status, Tacho
+from firmware_protocol.ledger import Ledger
+from gateway import convert
+from gateway.batch import Batch, Index, Joiner
+from gateway.clock import DeviceClock
+from gateway.gnss_link import GnssLink
+from gateway.journal import Journal
+from gateway.journal_file import BOARD, GNSS
+from gateway.link_report import LinkReport
+from gateway.reader import Chunk, Reader
+from gateway.settings import DeviceSettings, GatewaySettings
+from gateway.tacho import Tachometer
+from messages import gyrofree_pb2 as pb
+from messages.topics import ACCEL, IMU, LINK, LOCATION, TACHO, Topic
+from messages.topics import BOARD as BOARD_TOPIC
+from messages.topics import GNSS as GNSS_TOPIC
+
+log = logging.getLogger(__name__)
+
+TACHO_EVERY_US = 50_000  # 20 Hz
+JOIN_WAIT_S = 0.01  # samples held back for joining wait no longer than this for the next frame
+STATUS_EVERY_S = 1.0
+
+Put = Callable[[Topic, str, Message], None]
+
+
+class DeviceLink:
+    """A board from its port to the bus.
+
+    put(topic, device, message) publishes; it must not block. `run` returns when `stop` is set, at once after `wake`.
+    """
+
+    def __init__(self, device: DeviceSettings, settings: GatewaySettings, put: Put) -> None:
+        self.device = device
+        self.name = device.name
+        self.put = put
+        self.journal = Journal(
+            settings.journal / device.name, settings.journal_bytes, settings.segment_bytes, settings.sync_s
+        )
+        self.deframer = Deframer()
+        self.ledger = Ledger()
+        self.clock = DeviceClock(time_scale=device.time_scale)
+        self.tacho = Tachometer(device.tacho_pulses_per_rev)
+        self.gnss = GnssLink(device.gnss_latency_s)
+        self.report = LinkReport(self)
+        self.hello: Hello | None = None
+        self.status: Status | None = None
+        self.wall_offset_ns = time.time_ns() - time.monotonic_ns()
+        self.queue: queue.SimpleQueue[Chunk | None] = queue.SimpleQueue()
+        self.readers: list[Reader] = []
+        self._epoch: int | None = None
+        self._reboots = 0
+        self._flags = 0
+        self._tacho_said_us = 0
+        self._index: dict[type, Index] = {}
+        self._joiner: dict[type, Joiner] = {Acc12: Joiner(), Imu6: Joiner()}
+
+    def run(self, stop: threading.Event) -> None:
+        """Open the ports and publish until `stop` is set."""
+        device = self.device
+        self.readers = [Reader(device.port, device.baud, BOARD, self.journal, self.queue)]
+        if device.gnss_port:
+            self.readers.append(Reader(device.gnss_port, device.gnss_baud, GNSS, self.journal, self.queue))
+        try:
+            self._loop(stop)
+        finally:
+            for reader in self.readers:
+                reader.close()
+            self.journal.close()
+
+    def _loop(self, stop: threading.Event) -> None:
+        due = time.monotonic()
+        while not stop.is_set():
+            left = due - time.monotonic()
+            if left <= 0:
+                self._follow_wall_clock()
+                self._publish(LINK, self.report.message(), int(time.time_ns()))
+                due = max(due + STATUS_EVERY_S, time.monotonic())
+                continue
+            held = any(joiner.waiting for joiner in self._joiner.values())
+            try:
+                chunk = self.queue.get(timeout=min(left, JOIN_WAIT_S) if held else left)
+            except queue.Empty:
+                for joiner in self._joiner.values() if held else ():
+                    self._send(joiner.flush())
+                continue
+            if chunk is not None:
+                self.take(chunk)
+
+    def wake(self) -> None:
+        """Let `run` look at its stop event now."""
+        self.queue.put(None)
+
+    def take(self, chunk: Chunk) -> None:
+        """One read of one port."""
+        if chunk.channel == GNSS:
+            self._take_gnss(chunk.data, self.clock.device_us(chunk.monotonic_ns), chunk.monotonic_ns)
+            return
+        self.ledger.received(len(chunk.data))
+        for event in self.deframer.feed(chunk.data):
+            self.ledger.count(event)
+            if isinstance(event, Frame):
+                self._take_frame(event, chunk.monotonic_ns)
+
+    def _take_frame(self, frame: Frame, received_ns: int) -> None:
+        if frame.epoch != self._epoch or self.ledger.reboots != self._reboots:
+            self._restart(frame.epoch)
+        self._flags = frame.flags
+        match frame.payload:
+            case Acc12() | Imu6() as payload:
+                last_us = frame.t_us + (len(payload.counts) - 1) * payload.period_ns // 1000
+                self.clock.add(last_us, received_ns)
+                self._take_samples(frame, payload, received_ns)
+                self._take_tacho_time(last_us)
+            case Tacho() as payload:
+                times = [frame.t_us + offset / 100.0 for offset in payload.offsets_10ns]
+                self.tacho.add(times, bool(payload.edge & 2), bool(payload.edge & 4))
+            case Gps() as payload:
+                self._take_gnss(payload.data, frame.t_us, None)
+            case Hello() | Status() as payload:
+                self.clock.add(frame.t_us, received_ns)
+                if isinstance(payload, Hello):
+                    self.hello = payload
+                else:
+                    self.status = payload
+                self._publish(BOARD_TOPIC, convert.board_info(self.hello, self.status), None, frame.t_us)
+                self._take_tacho_time(frame.t_us)
+
+    def _restart(self, epoch: int) -> None:
+        """The board has booted: its clock and counters begin again."""
+        if self._epoch is not None:
+            log.warning("%s: the board restarted (boot %d -> %d)", self.name, self._epoch, epoch)
+        for joiner in self._joiner.values():
+            self._send(joiner.flush())
+        self._epoch, self._reboots = epoch, self.ledger.reboots
+        self.clock.reset()
+        self.tacho.reset()
+        self.gnss.restart()
+        self._index = {Acc12: Index(), Imu6: Index()}
+        self._tacho_said_us = 0
+
+    def _take_samples(self, frame: Frame, payload: Acc12 | Imu6, received_ns: int) -> None:
+        n = len(payload.counts)
+        first, lost = self._index[type(payload)].take(payload.first_index, n)
+        batch = Batch(first, frame.t_us, payload.period_ns, n, lost, frame.seq, received_ns, frame.flags)
+        if isinstance(payload, Acc12):
+            batch.stale_mask = payload.stale_mask
+            counts = [count for row in payload.counts for count in row]
+            batch.columns = (counts, convert.specific_force(counts, convert.axis_scales(self.hello)))
+        else:
+            batch.columns = convert.imu_si(payload)
+        self.report.samples += n
+        self._send(self._joiner[type(payload)].add(batch))
+
+    def _send(self, batches: list[Batch]) -> None:
+        for batch in batches:
+            common = dict(
+                first_index=batch.first_index, period_s=batch.period_ns * 1e-9, lost_samples=batch.lost,
+                frame_sequence=batch.frame_sequence, received_ns=batch.received_ns,
+            )  # fmt: skip
+            first, second = batch.columns
+            if isinstance(first[0], int):
+                message = pb.AccelBatch(
+                    axes=len(first) // batch.n, counts=first, f_mps2=second, stale_mask=batch.stale_mask, **common
+                )
+                self._publish(ACCEL, message, None, batch.device_us)
+            else:
+                message = pb.ImuBatch(f_b_mps2=first, omega_ib_b_radps=second, **common)
+                self._publish(IMU, message, None, batch.device_us)
+            self.report.latency_ns.append(time.monotonic_ns() - batch.received_ns)
+
+    def _take_tacho_time(self, now_us: int) -> None:
+        """Device time has come to now_us: a rate is due every 50 ms, also one of zero."""
+        if now_us - self._tacho_said_us < TACHO_EVERY_US:
+            return
+        rate = self.tacho.rate(now_us)
+        if rate is None:
+            return
+        self._tacho_said_us = now_us
+        message = pb.TachoRate(
+            omega_radps=rate.omega_radps, sigma_radps=rate.sigma_radps, pulses=self.tacho.pulses,
+            direction_known=rate.direction_known,
+        )  # fmt: skip
+        self._publish(TACHO, message, None, round(rate.device_us))
+
+    def _take_gnss(self, data: bytes, device_us: int, monotonic_ns: int | None) -> None:
+        for arrival in self.gnss.feed(data, device_us, monotonic_ns, time.time_ns()):
+            message = convert.gnss_fix(arrival.fix)
+            message.device_time_s = arrival.device_time_s
+            utc_ns = None if arrival.monotonic_ns is None else arrival.monotonic_ns + self.wall_offset_ns
+            self._publish(GNSS_TOPIC, message, utc_ns, arrival.device_us)
+            if message.quality:
+                self.put(LOCATION, self.name, convert.location_fix(message, self.name))
+
+    def _publish(self, topic: Topic, message: Message, utc_ns: int | None, device_us: int = 0) -> None:
+        """Fill the header and put; utc_ns None: from device time."""
+        header = message.header
+        header.device = self.name
+        header.epoch = self._epoch or 0
+        header.device_us = device_us
+        header.utc_ns = self.clock.host_ns(device_us) + self.wall_offset_ns if utc_ns is None else utc_ns
+        header.utc_sigma_s = self.clock.sigma_s
+        header.source = convert.source(self.hello, self._flags)
+        header.run = self.journal.run
+        self.put(topic, self.name, message)
+
+    def _follow_wall_clock(self) -> None:
+        """The host's UTC clock may be slewed or stepped under us; monotonic time is not."""
+        offset = time.time_ns() - time.monotonic_ns()
+        if abs(offset - self.wall_offset_ns) > 500_000_000:
+            log.warning(
+                "%s: the host's clock was stepped by %.3f s; UTC times follow it",
+                self.name,
+                (offset - self.wall_offset_ns) / 1e9,
+            )
+        self.wall_offset_ns = offset

@@ -1,0 +1,92 @@
+"""The journal's record, as bytes.
+
+    segment = magic "GFJSEG01" | u64 run | u64 first sequence | record ...
+    record  = magic "GFJ1" | u64 sequence | u64 monotonic ns | u64 UTC ns | u32 length | u8 channel | bytes | u32 crc
+
+all little-endian; crc is zlib's CRC-32 over everything before it. The magic lets a reader find the next record after
+damage.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+SEGMENT_MAGIC = b"GFJSEG01"
+RECORD_MAGIC = b"GFJ1"
+SEGMENT_HEAD = struct.Struct("<8sQQ")
+RECORD_HEAD = struct.Struct("<4sQQQIB")
+CRC = struct.Struct("<I")
+MAX_BYTES = 1 << 20  # of one read; a longer length is damage
+
+BOARD, GNSS = 0, 1  # channels
+
+
+@dataclass(frozen=True)
+class Record:
+    """One read of one port."""
+
+    sequence: int
+    monotonic_ns: int
+    utc_ns: int
+    channel: int
+    data: bytes
+
+
+def pack(record: Record) -> bytes:
+    """The record as it stands on the disk."""
+    body = RECORD_HEAD.pack(
+        RECORD_MAGIC, record.sequence, record.monotonic_ns, record.utc_ns, len(record.data), record.channel
+    )
+    body += record.data
+    return body + CRC.pack(zlib.crc32(body))
+
+
+@dataclass(frozen=True)
+class Scan:
+    """What a buffer holds: (start, end, record) of the good records, and the bytes that belong to none."""
+
+    records: list[tuple[int, int, Record]]
+    damaged_bytes: int
+
+    @property
+    def good_end(self) -> int:
+        """Where the last good record ends; the segment's head when there is none."""
+        return self.records[-1][1] if self.records else SEGMENT_HEAD.size
+
+
+def unpack_at(data: bytes, start: int) -> tuple[Record, int] | None:
+    """Record at `start` and where it ends; None when no whole, undamaged record begins there."""
+    body = start + RECORD_HEAD.size
+    if data[start : start + 4] != RECORD_MAGIC or body + CRC.size > len(data):
+        return None
+    _, sequence, monotonic_ns, utc_ns, length, channel = RECORD_HEAD.unpack_from(data, start)
+    end = body + length
+    if length > MAX_BYTES or end + CRC.size > len(data):
+        return None
+    if zlib.crc32(memoryview(data)[start:end]) != CRC.unpack_from(data, end)[0]:
+        return None
+    return Record(sequence, monotonic_ns, utc_ns, channel, bytes(data[body:end])), end + CRC.size
+
+
+def scan(data: bytes, start: int = SEGMENT_HEAD.size) -> Scan:
+    """All good records from `start` on; damage is stepped over to the next magic and counted."""
+    records = []
+    damaged = 0
+    while start < len(data):
+        found = unpack_at(data, start)
+        if found:
+            records.append((start, found[1], found[0]))
+            start = found[1]
+            continue
+        following = data.find(RECORD_MAGIC, start + 1)
+        following = len(data) if following < 0 else following
+        damaged += following - start
+        start = following
+    return Scan(records, damaged)
+
+
+def records(data: bytes) -> Iterator[Record]:
+    """Good records of concatenated record bytes, as a history reply carries them."""
+    for _, _, record in scan(data, 0).records:
+        yield record

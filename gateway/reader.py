@@ -1,0 +1,106 @@
+"""The thread between a port and the queue: read, journal, hand on; reopen what was lost.
+
+It sleeps in poll() until bytes come, so an idle line costs nothing and a byte is never older than the scheduler makes
+it.
+"""
+
+import logging
+import os
+import queue
+import select
+import threading
+import time
+from dataclasses import dataclass
+
+from gateway.journal import Journal
+from gateway.ports import Port, PortEnd, PortError, open_port
+
+log = logging.getLogger(__name__)
+
+FIRST_RETRY_S = 0.1
+LAST_RETRY_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """One read. monotonic_ns: just after the last byte was read."""
+
+    channel: int
+    data: bytes
+    monotonic_ns: int
+
+
+class Reader:
+    """Reads one port on its own thread into `out`; journals first."""
+
+    def __init__(
+        self, url: str, baud: int, channel: int, journal: Journal, out: "queue.SimpleQueue[Chunk | None]"
+    ) -> None:
+        self.url = url
+        self.baud = baud
+        self.connected = False
+        self.message = f"{url}: not opened yet"
+        self.reconnects = 0
+        self._opened = 0
+        self._channel = channel
+        self._journal = journal
+        self._out = out
+        self._stop = threading.Event()
+        self._wake_out, self._wake_in = os.pipe()
+        self._thread = threading.Thread(target=self._run, name=f"reader-{url}", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop and wait for the thread."""
+        self._stop.set()
+        os.write(self._wake_in, b"x")
+        self._thread.join()
+        os.close(self._wake_in)
+        os.close(self._wake_out)
+
+    def _run(self) -> None:
+        retry_s = FIRST_RETRY_S
+        while not self._stop.is_set():
+            try:
+                port = open_port(self.url, self.baud)
+            except (PortError, ValueError) as error:
+                self._say(str(error))
+                self._stop.wait(retry_s)
+                retry_s = min(2 * retry_s, LAST_RETRY_S)
+                continue
+            retry_s = FIRST_RETRY_S
+            self._opened += 1
+            self.reconnects = self._opened - 1
+            self.connected, self.message = True, ""
+            log.info("%s: open", self.url)
+            try:
+                self._read_until_lost(port)
+            except PortEnd as end:
+                self._say(str(end))
+                self._stop.wait()
+            except PortError as error:
+                self._say(str(error))
+                self._stop.wait(FIRST_RETRY_S)  # a port that opens and closes at once must not spin
+            finally:
+                self.connected = False
+                port.close()
+
+    def _read_until_lost(self, port: Port) -> None:
+        poller = select.poll()
+        poller.register(port.fileno(), select.POLLIN)
+        poller.register(self._wake_out, select.POLLIN)
+        while not self._stop.is_set():
+            poller.poll()
+            if self._stop.is_set():
+                return
+            data = port.read()
+            if not data:
+                continue
+            monotonic_ns = time.monotonic_ns()
+            self._journal.append(self._channel, data, monotonic_ns, time.time_ns())
+            self._out.put(Chunk(self._channel, data, monotonic_ns))
+
+    def _say(self, message: str) -> None:
+        if message != self.message:
+            log.warning("%s", message)
+        self.connected, self.message = False, message

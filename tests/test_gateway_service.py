@@ -1,0 +1,252 @@
+"""The whole gateway: virtual board -> pty -> gateway -> real Zenoh -> subscriber."""
+
+import os
+import threading
+import time
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+from gateway import service
+from gateway.board_link import PtyLink, TcpLink
+from gateway.journal_file import records, scan
+from gateway.settings import DeviceSettings, GatewaySettings
+from gateway.virtual_board import SIMULATED, BoardAccel, BoardPulse, VirtualBoard
+from messages import gyrofree_pb2 as pb
+from messages.bus import BusSettings, open_client, open_router, subscribe
+from messages.topics import ACCEL, BOARD, LINK, TACHO, history_key
+
+PERIOD_S = 0.002  # 500 Hz with n = 1: also exercises joining
+
+
+def wait_for(condition, seconds: float = 30.0):
+    """The condition's value once it is true; fails after a generous time."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.01)
+    raise AssertionError(f"still false after {seconds} s: {condition.__doc__ or condition}")
+
+
+def samples(n: int, first: int = 0, period_s: float = PERIOD_S) -> list[BoardAccel]:
+    return [
+        BoardAccel(i * period_s, tuple((i * 7 + axis) % 400 - 200 for axis in range(12)))
+        for i in range(first, first + n)
+    ]
+
+
+class Bench:
+    """Router, gateway and a subscriber to everything."""
+
+    def __init__(self, folder: Path, router_port: int) -> None:
+        endpoint = f"tcp/127.0.0.1:{router_port}"
+        self.bus = BusSettings(router=endpoint, listen=[endpoint])
+        self.router = open_router(self.bus)
+        self.folder = folder
+        self.session = open_client(self.bus, timeout_s=20)
+        self.seen: dict[str, list] = defaultdict(list)
+        self.subscribers = [
+            subscribe(
+                self.session,
+                topic,
+                self.bus.prefix,
+                lambda _, message, name=topic.name: self.seen[name].append(message),
+            )
+            for topic in (ACCEL, TACHO, LINK, BOARD)
+        ]
+        self.running: list[tuple[threading.Thread, threading.Event]] = []
+
+    def gateway(self, port: str, journal: str = "journal", **device) -> threading.Event:
+        settings = GatewaySettings(
+            devices=[DeviceSettings(name="cube", port=port, **device)], journal=self.folder / journal, sync_s=0.1
+        )
+        stop = threading.Event()
+        thread = threading.Thread(target=service.run, args=(settings, self.bus, stop))
+        thread.start()
+        self.running.append((thread, stop))
+        return stop
+
+    def status(self, condition) -> pb.LinkStatus:
+        """The next link status that meets the condition."""
+        return wait_for(lambda: next((s for s in reversed(self.seen["link"]) if condition(s)), None))
+
+    def close(self) -> None:
+        for _, stop in self.running:
+            stop.set()
+        for thread, _ in self.running:
+            thread.join(10)
+        assert not any(thread.is_alive() for thread, _ in self.running)
+        self.session.close()
+        self.router.close()
+
+
+@pytest.fixture
+def bench(tmp_path, free_port):
+    bench = Bench(tmp_path, free_port)
+    yield bench
+    bench.close()
+
+
+def test_every_sample_arrives_in_order_and_the_ledger_balances(bench):
+    link = PtyLink()
+    bench.gateway(link.path)
+    board = VirtualBoard(link, SIMULATED, epoch=3, sample_period_s=PERIOD_S)
+    sent = samples(1000)
+    board.run(sent, threading.Event(), wait_for_reader=True)
+    got = wait_for(lambda: (m := list(bench.seen["accel"])) and sum(len(b.counts) for b in m) >= 12 * len(sent) and m)
+
+    assert [c for b in got for c in b.counts] == [c for s in sent for c in s.counts12]
+    assert [b.header.sequence for b in got] == list(range(1, len(got) + 1))
+    assert all(a.first_index + len(a.counts) // 12 == b.first_index for a, b in zip(got, got[1:], strict=False))
+    assert all(len(b.counts) // 12 <= 5 for b in got) and len(got) < len(sent) / 3  # joined, up to 10 ms
+    first = got[0]
+    assert first.header.source == pb.SOURCE_SIMULATED and first.header.epoch == 3 and first.lost_samples == 0
+    assert first.period_s == pytest.approx(PERIOD_S)
+    assert first.f_mps2[0] == pytest.approx(first.counts[0] * 3.9e-3 * 9.80665)
+
+    status = bench.status(lambda s: s.good_frames == board.built)
+    assert status.connected and not status.message
+    assert status.bytes_in == status.good_bytes + status.bad_bytes + status.pending_bytes
+    assert (status.bad_chunks, status.lost_frames, status.lost_samples, status.reboots) == (0, 0, 0, 0)
+    assert bench.seen["board"][0].firmware.endswith("virtual board")
+    link.close()
+
+
+def test_utc_of_samples_follows_the_host_clock(bench):
+    link = TcpLink()
+    bench.gateway(link.path)
+    before = time.time_ns()
+    VirtualBoard(link, SIMULATED, sample_period_s=0.01).run(
+        samples(50, period_s=0.01), threading.Event(), wait_for_reader=True
+    )
+    got = wait_for(lambda: len(bench.seen["accel"]) >= 50 and list(bench.seen["accel"]))
+    times = [m.header.utc_ns for m in got]
+    assert times == sorted(times) and before < times[0] < times[-1] < time.time_ns()
+    assert 0.4e9 < times[-1] - times[0] < 0.6e9
+    assert all(m.header.utc_sigma_s > 0 for m in got[1:])
+    link.close()
+
+
+def test_unplugged_port_reconnects_and_the_gap_is_counted(bench, tmp_path):
+    name = tmp_path / "board"
+    link = PtyLink(name)
+    bench.gateway(str(name))
+    board = VirtualBoard(link, SIMULATED, sample_period_s=PERIOD_S)
+    board.run(samples(100), threading.Event(), wait_for_reader=True)
+    bench.status(lambda s: s.good_frames >= 100)
+    link.close()
+    lost = bench.status(lambda s: not s.connected and s.message)
+    assert "board" in lost.message
+
+    board.link = link = PtyLink(name)  # the same boot of the board, plugged in again 20 samples later
+    wait_for(lambda: link.connected)
+    board.run(samples(100, first=120), threading.Event())
+    status = bench.status(lambda s: s.connected and s.lost_samples)
+    assert status.lost_samples == 20 and status.reconnects == 1 and status.reboots == 0
+    assert sum(m.lost_samples for m in bench.seen["accel"]) == 20
+    link.close()
+
+
+def test_garbage_is_counted_and_costs_no_frame(bench):
+    link = TcpLink()
+    bench.gateway(link.path)
+    board = VirtualBoard(link, SIMULATED, sample_period_s=PERIOD_S)
+    wait_for(lambda: link.connected)
+    noise = bytes(range(1, 256)) * 4
+    link.write(noise)
+    for i, item in enumerate(samples(50)):
+        board.take(item)
+        if i % 10 == 5:
+            link.write(noise)
+    board.finish()
+    status = bench.status(lambda s: s.good_frames == board.built)
+    assert status.lost_frames == 0 and status.bad_chunks >= 6 and sum(status.damage.values()) == status.bad_chunks
+    assert status.bytes_in == status.good_bytes + status.bad_bytes + status.pending_bytes
+    link.close()
+
+
+def test_wrong_baud_says_so(bench):
+    link = TcpLink()
+    bench.gateway(link.path, baud=115200)
+    wait_for(lambda: link.connected)
+
+    def noisy():
+        link.write(os.urandom(400))
+        return next((s for s in bench.seen["link"] if "speed is wrong" in s.message), None)
+
+    status = wait_for(noisy)
+    assert "115200" in status.message and status.connected and status.good_frames == 0
+    link.close()
+
+
+def test_reboot_is_no_loss(bench):
+    link = TcpLink()
+    bench.gateway(link.path)
+    for epoch in (7, 8):
+        board = VirtualBoard(link, SIMULATED, epoch=epoch, sample_period_s=PERIOD_S)
+        board.run(samples(100), threading.Event(), wait_for_reader=True)
+    status = bench.status(lambda s: s.reboots)
+    assert status.reboots == 1 and status.lost_frames == 0 and status.lost_samples == 0
+    got = wait_for(lambda: sum(len(b.counts) for b in bench.seen["accel"]) >= 2400 and list(bench.seen["accel"]))
+    assert {m.header.epoch for m in got} == {7, 8} and [m.first_index for m in got].count(0) == 2
+    link.close()
+
+
+def test_tacho_rate_and_declared_standstill(bench):
+    """One turn per second in reverse, then silence: the rate, then zero with a shrinking bound."""
+    link = TcpLink()
+    bench.gateway(link.path)
+    pulses = [BoardPulse(k / 360, -1) for k in range(1, 360)]
+    items = sorted([*samples(2000, period_s=0.001), *pulses], key=lambda item: item.t_s)
+    VirtualBoard(link, SIMULATED, sample_period_s=0.001).run(items, threading.Event(), wait_for_reader=True)
+    got = wait_for(lambda: [m for m in bench.seen["tacho"] if m.omega_radps == 0][5:] and list(bench.seen["tacho"]))
+    turning = [m for m in got if m.omega_radps]
+    still = [m for m in got if not m.omega_radps]
+    assert all(abs(m.omega_radps + 6.283185) < 5 * m.sigma_radps + 1e-6 for m in turning) and len(turning) > 10
+    assert turning[-1].pulses == 359 and turning[-1].direction_known
+    assert still[-1].sigma_radps < still[0].sigma_radps < 0.2
+    link.close()
+
+
+def test_second_gateway_with_the_same_name_is_refused_and_takes_over(bench, caplog):
+    first, second = PtyLink(), PtyLink()
+    stop = bench.gateway(first.path)
+    wait_for(lambda: first.connected)
+    bench.gateway(second.path, journal="other")
+    wait_for(lambda: "another gateway serves this device name" in caplog.text)
+    assert not second.connected
+    stop.set()
+    wait_for(lambda: second.connected)
+    first.close()
+    second.close()
+
+
+def test_unwritable_journal_is_said_and_data_go_on(bench):
+    (bench.folder / "journal").write_text("a file where a folder is wanted")
+    link = TcpLink()
+    bench.gateway(link.path)
+    VirtualBoard(link, SIMULATED, sample_period_s=PERIOD_S).run(samples(50), threading.Event(), wait_for_reader=True)
+    status = bench.status(lambda s: s.good_frames >= 50)
+    assert "NOT KEPT" in status.message and status.journal_sequence == 0
+    wait_for(lambda: sum(len(b.counts) for b in bench.seen["accel"]) == 600)
+    link.close()
+
+
+def test_history_answers_the_very_records(bench):
+    link = TcpLink()
+    bench.gateway(link.path)
+    VirtualBoard(link, SIMULATED, sample_period_s=PERIOD_S).run(samples(100), threading.Event(), wait_for_reader=True)
+    status = bench.status(lambda s: s.good_frames >= 100 and s.durable_sequence == s.journal_sequence)
+    key = history_key(bench.bus.prefix, "cube")
+    replies = list(bench.session.get(f"{key}?first=2;last={status.journal_sequence}"))
+    got = list(records(replies[0].ok.payload.to_bytes()))
+    assert [r.sequence for r in got] == list(range(2, status.journal_sequence + 1))
+    files = sorted((bench.folder / "journal" / "cube").glob("*.gfj"))
+    kept = [r for f in files for _, _, r in scan(f.read_bytes()).records]
+    assert got == kept[1 : status.journal_sequence]
+    refused = list(bench.session.get(f"{key}?first=x"))
+    assert refused[0].err is not None
+    link.close()
