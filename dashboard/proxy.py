@@ -43,9 +43,10 @@ FOREIGN_PARAMETERS = {"websocket", "playbackPath"}  # they point viser's page at
 
 _decode = msgspec.msgpack.Decoder(dict)
 
-# viser's page is one file that unpacks itself: inline script, inline style, WebAssembly, workers from blobs.
+# viser's page is one file that unpacks itself: inline script and style, WebAssembly with generated glue code (eval),
+# workers from blobs. What this policy is for: nothing is fetched from and no socket opened to another server.
 SCENE_CSP = (
-    "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:; style-src 'unsafe-inline'; "
+    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob:; style-src 'unsafe-inline'; "
     "img-src 'self' data: blob:; font-src data:; worker-src blob:; connect-src data: blob: ws://{host} wss://{host}; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )
@@ -126,6 +127,7 @@ def router(
         }
         return HTMLResponse(page, headers=headers)
 
+    @routes.websocket("/scene")  # viser's page drops the last slash of its own address
     @routes.websocket("/scene/")
     async def scene_socket(socket: WebSocket) -> None:
         if gate.session_of(socket) is None:
