@@ -65,9 +65,7 @@ def outer_product(six: Array) -> Array:
 def cube_specific_force(a: Array) -> Array:
     """p of the paper's cube from a11 a12 a13 a21 ... a43, (12,), the paper's (25)."""
     a11, a12, a13, a21, a22, a23, a31, a32, a33, a41, a42, a43 = a
-    return (
-        np.array([-a12 + a22 + a32 - a42, a11 - a21 + a31 - a41, a13 + a23 - a33 - a43]) / 4.0
-    )
+    return np.array([-a12 + a22 + a32 - a42, a11 - a21 + a31 - a41, a13 + a23 - a33 - a43]) / 4.0
 
 
 def cube_angular_acceleration(a: Array, side: float) -> Array:

@@ -170,7 +170,7 @@ def CHEN(half_side: float) -> Layout:
 
 
 def NINE(half_side: float) -> Layout:
-    """Nine axes: opposed pairs a1 a2 (x at z = +-1), a3 a4 (y at x = +-1), a5 a6 (z at y = +-1), a triad at the centre."""
+    """Nine axes: opposed pairs of x at z = +-1, y at x = +-1, z at y = +-1 (a1 to a6), a triad at the centre."""
     x, y, z = np.eye(3)
     r = np.array([z, -z, x, -x, y, -y, 0 * x, 0 * x, 0 * x])
     return Layout("nine", half_side * r, np.array([x, -x, y, -y, z, -z, x, y, z]), half_side)

@@ -131,8 +131,7 @@ class LeastSquares:
         self.S = np.ascontiguousarray(layout.S)
         self.SQ = np.ascontiguousarray(layout.S @ layout.Q)
         self._R_alpha = config.still.sigma_axis**2 * self.S[:3] @ self.S[:3].T
-        # across the still windows only omega' is watched: products need rank 12, which this estimator does not
-        self._detector = stillness.StillDetector(layout.axes, self.S[:3], config.still)
+        self._detector = stillness.StillDetector(layout.axes, stillness.quiet_map(layout), config.still)
         self._standstill = stillness.Standstill(layout.axes, config.still.window)
         self._dt = 0.01
         self.P = covariance(self.state, self._R_alpha, self._dt)

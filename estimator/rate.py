@@ -10,12 +10,14 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator import least_squares
+from estimator import least_squares, products_ekf
+from estimator import products_model as model
+from estimator.field import checked
 from estimator.layout import Layout
 
 Array = NDArray[np.float64]
 
-LONGEST_SKIP_S = 1.0  # s; after a longer gap the rate is unknown and a standstill is needed
+LONGEST_GAP_S = 0.5  # s; after a longer one the rate is unknown and a standstill is needed
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,4 +119,78 @@ class LeastSquaresRate:
         self._core.gap()
 
 
-ESTIMATORS = {"least-squares": LeastSquaresRate}
+class ProductsRate:
+    """Estimator "products-ekf": Kalman filter on the six products (products_ekf.py)."""
+
+    name = "products-ekf"
+
+    def __init__(self, layout: Layout, config: products_ekf.Config = products_ekf.Config()) -> None:
+        """Raises GeometryError when the layout does not see the products of the rate."""
+        self._core = products_ekf.ProductsEkf(layout, config)
+        self._clock = _Clock()
+        self._dt = 0.01
+
+    def step(self, index: int, t_s: float, f_axis: Array) -> RateState:
+        """See RateEstimator.step."""
+        core = self._core
+        f_axis = checked(core.layout, f_axis)
+        dt = self._clock.advance(t_s)
+        if dt is not None and dt > LONGEST_GAP_S:
+            core.restart()
+        elif dt is not None:
+            self._dt = dt
+        core.step(f_axis, self._dt)
+        return self._waiting(f_axis) if core.state is None else self._running(f_axis)
+
+    def skip(self, n: int) -> None:
+        """See RateEstimator.skip; the next step predicts across the gap."""
+        self._core.gap()
+
+    def _running(self, f_axis: Array) -> RateState:
+        core, state, correction = self._core, self._core.state, self._core.correction
+        x = state.x
+        field = core.sensor.inverse @ f_axis
+        return RateState(
+            omega_b=x[model.OMEGA].copy(),
+            P=state.P[model.OMEGA, model.OMEGA].copy(),
+            alpha_b=field[:3] - x[model.B_ALPHA],
+            f_b=field[3:6] - x[model.B_F],
+            q_nb=state.q_nb.copy(),
+            angle_z=float(state.angle_z),
+            innovation=EMPTY if correction is None else correction.innovation,
+            innovation_sigma=EMPTY if correction is None else correction.sigma,
+            nis=0.0 if correction is None else correction.nis,
+            nis_dof=0 if correction is None else 6,
+            still=core.still,
+            p_n=state.p_n.copy(),
+            v_n=state.v_n.copy(),
+            bias=np.concatenate([x[model.B_ALPHA], x[model.B_F], x[model.B_W]]),
+            phase=core.phase,
+            innovation_unit="(rad/s)^2",
+        )
+
+    def _waiting(self, f_axis: Array) -> RateState:
+        field, zero = self._core.sensor.inverse @ f_axis, np.zeros(3)
+        return RateState(
+            omega_b=zero,
+            P=products_ekf.UNKNOWN_RATE**2 * np.eye(3),
+            alpha_b=field[:3],
+            f_b=field[3:6],
+            q_nb=np.array([1.0, 0.0, 0.0, 0.0]),
+            angle_z=0.0,
+            innovation=EMPTY,
+            innovation_sigma=EMPTY,
+            nis=0.0,
+            nis_dof=0,
+            still=self._core.still,
+            p_n=zero,
+            v_n=zero,
+            bias=np.zeros(12),
+            phase=self._core.phase,
+        )
+
+
+ESTIMATORS: dict[str, type[LeastSquaresRate] | type[ProductsRate]] = {
+    LeastSquaresRate.name: LeastSquaresRate,
+    ProductsRate.name: ProductsRate,
+}

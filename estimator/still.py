@@ -4,7 +4,8 @@ Three questions on the newest samples (E-20 to E-22):
   spread    do the axes scatter more than their noise?               chi-square of N (window - 1) degrees
   quiet     do the mean angular acceleration and the mean products
             differ from those of the last standstill?                chi-square of their dimension, two windows
-  rate      does the caller's rate exclude zero?                     waived after `patience` seconds of the others
+  rate      does the caller's rate exclude zero?                     waived after `patience_s` of the others
+When biases have moved for good, `quiet` would fail for ever: it is waived after twice `patience_s` of the others.
 
 A body that turns steadily below about 10 deg/s reads the same as one that stands: products are too small. The third
 question is for that; none of them can help when the rate is wrong as well.
@@ -14,6 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from estimator.layout import Layout
 
 Array = NDArray[np.float64]
 
@@ -33,6 +36,13 @@ class Config:
     drift: float = 0.02  # 1/s^2, sigma by which biases of the quiet quantities may have moved since
 
 
+def quiet_map(layout: Layout) -> Array:
+    """What must not move at rest, from the axes: omega' (3) and, where the layout sees them, the products (6)."""
+    if layout.rank < 12:
+        return layout.S[:3]
+    return np.delete(layout.field_inverse, slice(3, 6), axis=0)
+
+
 class StillDetector:
     """Ring of the newest samples; `update` answers for the newest. Deterministic, no time of day."""
 
@@ -48,11 +58,11 @@ class StillDetector:
         self._next = 0
         self._reference = np.zeros(len(quiet_map))
         self._reference_samples = 0
-        self._quiet_for = 0
+        self._quiet_for = self._slow_for = 0  # samples
 
     def forget(self) -> None:
         """After a gap: the window must fill anew; the reference of the last standstill stays."""
-        self._filled = self._next = self._quiet_for = 0
+        self._filled = self._next = self._quiet_for = self._slow_for = 0
 
     def learn(self, mean_axis: Array, samples: int) -> None:
         """The mean (axes,) of `samples` readings of a standstill becomes the reference of `quiet`."""
@@ -71,21 +81,25 @@ class StillDetector:
         self._ring[self._next] = f_axis
         self._next = (self._next + 1) % c.window
         self._filled = min(self._filled + 1, c.window)
-        if self._filled < c.window or not self._axes_are_still():
-            self._quiet_for = 0
-            return False
-        self._quiet_for += 1
-        if self._quiet_for * dt >= c.patience_s:
-            return True
-        W = P + c.rate_slack**2 * np.eye(3)
-        return bool(omega_b @ np.linalg.solve(W, omega_b) < c.rate_limit)
-
-    def _axes_are_still(self) -> bool:
-        c = self.config
         mean = self._ring.mean(axis=0)
-        scatter = np.sum((self._ring - mean) ** 2) / ((c.window - 1) * self._ring.shape[1] * c.sigma_axis**2)
-        if scatter > c.spread_limit:
+        if self._filled < c.window or not self._spread_is_noise(mean):
+            self._quiet_for = self._slow_for = 0
             return False
+        W = P + c.rate_slack**2 * np.eye(3)
+        slow = bool(omega_b @ np.linalg.solve(W, omega_b) < c.rate_limit)
+        if self._is_quiet(mean):
+            self._quiet_for, self._slow_for = self._quiet_for + 1, 0
+            return slow or self._quiet_for * dt >= c.patience_s
+        self._quiet_for, self._slow_for = 0, self._slow_for + 1 if slow else 0
+        return self._slow_for * dt >= 2.0 * c.patience_s
+
+    def _spread_is_noise(self, mean: Array) -> bool:
+        c = self.config
+        scatter = np.sum((self._ring - mean) ** 2)
+        return bool(scatter <= c.spread_limit * (c.window - 1) * self._ring.shape[1] * c.sigma_axis**2)
+
+    def _is_quiet(self, mean: Array) -> bool:
+        c = self.config
         if self._reference_samples == 0:
             return True
         newest = self._ring[(self._next - 1 - np.arange(c.short_window)) % c.window].mean(axis=0)
