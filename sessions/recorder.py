@@ -186,10 +186,9 @@ class Recorder:
 
     def _describe(self, store: SessionStore) -> pb.RecorderStatus:
         manifest = store.manifest
-        end = time.time_ns() if store is self._store and self._recording else manifest.end_utc_ns
         return pb.RecorderStatus(
             session=manifest.id,
-            seconds=max(0.0, (end - manifest.start_utc_ns) / 1e9),
+            seconds=store.seconds,
             messages=store.messages,
             bytes=store.size,
             durable_messages=store.durable_messages,

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from messages.topics import TopicError, parse
+from sessions.keys import KeyState
 from sessions.manifest import (
     RECORDING,
     RECOVERED,
@@ -21,7 +22,7 @@ from sessions.manifest import (
     write_manifest,
 )
 from sessions.mcap_log import Damage, McapLog, read
-from sessions.store import KeyState, lock, sha256
+from sessions.store import lock, sha256
 
 log = logging.getLogger(__name__)
 

@@ -16,11 +16,10 @@ import time
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from google.protobuf.message import DecodeError
-
 from messages import gyrofree_pb2 as pb
-from messages.topics import Address, TopicError, parse
-from sessions.manifest import RECORDING, KeyCount, Manifest, sync_folder, write_manifest
+from messages.topics import TopicError, parse
+from sessions.keys import KeyState
+from sessions.manifest import RECORDING, Manifest, sync_folder, write_manifest
 from sessions.mcap_log import McapLog
 from sessions.settings import RecorderSettings
 
@@ -53,63 +52,6 @@ def lock(fd: int) -> bool:
     return True
 
 
-class KeyState:
-    """What is known of one key while it is recorded: its channel, its counts, the last header."""
-
-    __slots__ = ("channel", "count", "device", "foreign", "last_run", "last_sequence", "sources")
-
-    def __init__(self, channel: int, address: Address) -> None:
-        self.channel = channel
-        self.device = address.device
-        type_ = address.topic.type
-        self.foreign = None if "header" in type_.DESCRIPTOR.fields_by_name else type_  # foxglove: time, no Header
-        self.count = KeyCount()
-        self.last_run: int | None = None
-        self.last_sequence = 0
-        self.sources: set[int] = set()
-
-    def publish_time(self, payload: bytes) -> int:
-        """The payload's own time, ns since 1970, 0 when it says none; counts jumps of the sequence.
-
-        Of our own messages only the header, which stands first, is parsed: the whole would cost more than recording it.
-        """
-        self.count.messages += 1
-        try:
-            if self.foreign is not None:
-                return self.foreign.FromString(payload).timestamp.ToNanoseconds()
-            header = pb.Header.FromString(_first_field(payload))
-        except (DecodeError, ValueError):
-            self.count.unreadable += 1
-            return 0
-        sequence, run = header.sequence, header.run
-        if self.last_run is not None:
-            jump = sequence - self.last_sequence
-            if run != self.last_run or jump < 0:
-                self.count.restarts += 1
-            elif jump == 0:
-                self.count.repeated += 1
-            else:
-                self.count.lost += jump - 1
-        self.last_run, self.last_sequence = run, sequence
-        self.sources.add(header.source)
-        return header.utc_ns
-
-
-def _first_field(payload: bytes) -> bytes:
-    """Content of field 1 when it stands first and is length-delimited; raises ValueError otherwise."""
-    if len(payload) < 2 or payload[0] != 0x0A:
-        raise ValueError("field 1 does not stand first")
-    size, at, shift = payload[1] & 0x7F, 2, 7
-    while payload[at - 1] & 0x80:
-        if at >= len(payload) or at > 4:
-            raise ValueError("length of field 1 does not end")
-        size |= (payload[at] & 0x7F) << shift
-        at, shift = at + 1, shift + 7
-    if at + size > len(payload):
-        raise ValueError("field 1 is longer than the message")
-    return payload[at : at + size]
-
-
 class SessionStore:
     """An open session. Made by `start`; every method is for the owner's thread, the sync thread is inside."""
 
@@ -134,6 +76,7 @@ class SessionStore:
             os.close(self._fd)
             shutil.rmtree(folder, ignore_errors=True)  # made above, nothing in it yet: no heap of empty sessions
             raise
+        self._last_ns = manifest.start_utc_ns  # receive time of the last message, ns since 1970
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._sync_loop, name="sync", daemon=True)
         self._thread.start()
@@ -149,13 +92,18 @@ class SessionStore:
         return self._log.size
 
     @property
+    def seconds(self) -> float:
+        """Start to last message, s."""
+        return max(0.0, (self._last_ns - self.manifest.start_utc_ns) / 1e9)
+
+    @property
     def messages(self) -> int:
         """Messages accepted so far."""
         return self._accepted
 
     def lost(self) -> dict[str, int]:
         """Messages missing so far by jumps of header.sequence, per key."""
-        return {key: state.count.lost for key, state in self._keys.items() if state is not None}
+        return {key: state.lost for key, state in self._keys.items() if state is not None}
 
     def add(self, received_ns: int, key: str, payload: bytes) -> None:
         """Record one message. Unknown keys and messages beyond max_pending_bytes are counted, not kept."""
@@ -168,7 +116,7 @@ class SessionStore:
         publish_ns = state.publish_time(payload) or received_ns
         self._log.add(state.channel, received_ns, publish_ns, payload, state.last_sequence)
         self._accepted += 1
-        self.manifest.end_utc_ns = received_ns
+        self._last_ns = received_ns
 
     def _open_key(self, key: str) -> KeyState | None:
         if key not in self._keys:
@@ -209,7 +157,8 @@ class SessionStore:
     def _snapshot(self) -> Manifest:
         """session.json as it should stand now."""
         known = {key: state for key, state in self._keys.copy().items() if state is not None}
-        self.manifest.keys = {key: state.count.model_copy() for key, state in known.items()}
+        self.manifest.end_utc_ns = self._last_ns
+        self.manifest.keys = {key: state.count for key, state in known.items()}
         self.manifest.channels = {state.channel: key for key, state in known.items()}
         self.manifest.devices = sorted({state.device for state in known.values()})
         sources = set().union(*(state.sources.copy() for state in known.values()))

@@ -1,0 +1,109 @@
+"""CPU of the recorder at 1000 messages a second: one JSON line on standard output.
+
+A real router and publisher run in this process, the recorder in its own, whose CPU time (user and system, all threads)
+is read before and after SECONDS. Twelve-axis accelerometer messages of one sample each: the worst case, a board in use
+sends ten samples in one message. Usage: python tests/bench/bench_recorder.py [seconds]
+"""
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+import psutil
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT))
+
+from messages import gyrofree_pb2 as pb  # noqa: E402
+from messages.bus import BusSettings, open_client, open_router  # noqa: E402
+from messages.topics import ACCEL  # noqa: E402
+from sessions.catalogue import Catalogue  # noqa: E402
+
+RATE = 1000.0  # messages/s
+LIMIT = 2.0  # % of one core
+SERVE = """
+import signal, sys, threading
+from pathlib import Path
+from messages.bus import BusSettings
+from sessions import recorder
+from sessions.settings import RecorderSettings
+stop = threading.Event()
+signal.signal(signal.SIGTERM, lambda *_: stop.set())
+recorder.run(RecorderSettings(root=Path(sys.argv[1])), BusSettings(prefix="bench", router=sys.argv[2]), stop)
+"""
+
+
+def cpu_s(process: psutil.Process) -> float:
+    """CPU seconds of all threads of a process."""
+    times = process.cpu_times()
+    return times.user + times.system
+
+
+def publish(session, stop: threading.Event, rate: float) -> None:
+    """One AccelBatch of one sample every 1/rate s, in steps of 2 ms."""
+    key = ACCEL.key("bench", "cube")
+    publisher = session.declare_publisher(key)
+    message = pb.AccelBatch(axes=12, period_s=1.0 / rate)
+    sent, begun = 0, time.monotonic()
+    while not stop.is_set():
+        while sent < (time.monotonic() - begun) * rate:
+            sent += 1
+            counts = [(sent * 37 + k * 113) % 521 - 260 for k in range(12)]
+            message.header.CopyFrom(pb.Header(device="cube", sequence=sent, run=1, utc_ns=time.time_ns()))
+            message.counts[:] = counts
+            message.f_mps2[:] = [count * 0.0382459 for count in counts]
+            publisher.put(message.SerializeToString())
+        time.sleep(0.002)
+
+
+def measure(seconds: float) -> dict:
+    """Run everything and measure."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    bus = BusSettings(prefix="bench", router=endpoint, listen=[endpoint])
+    stop = threading.Event()
+    with tempfile.TemporaryDirectory() as root, open_router(bus), open_client(bus) as session:
+        recorder = subprocess.Popen([sys.executable, "-c", SERVE, root, bus.router], cwd=ROOT)
+        publisher = threading.Thread(target=publish, args=(session, stop, RATE))
+        try:
+            while not Catalogue(Path(root)).list():
+                time.sleep(0.05)
+            publisher.start()
+            time.sleep(2.0)  # the first chunks, caches warm
+            process = psutil.Process(recorder.pid)
+            cpu, begun = cpu_s(process), time.monotonic()
+            time.sleep(seconds)
+            used, span = cpu_s(process) - cpu, time.monotonic() - begun
+            memory = process.memory_info().rss
+        finally:
+            stop.set()
+            publisher.join()
+            recorder.send_signal(signal.SIGTERM)
+            recorder.wait(30)
+        (info,) = Catalogue(Path(root)).list()
+    percent = 100.0 * used / span
+    return {
+        "bench": "recorder",
+        "cpu_percent_of_core": round(percent, 2),
+        "limit_percent": LIMIT,
+        "ok": percent < LIMIT and info.lost == 0,
+        "messages_per_s": round(info.messages / info.seconds),
+        "messages": info.messages,
+        "lost": info.lost,
+        "seconds": round(span, 1),
+        "bytes_per_message": round(info.bytes / info.messages, 1),
+        "rss_mib": round(memory / 2**20, 1),
+    }
+
+
+if __name__ == "__main__":
+    result = measure(float(sys.argv[1]) if len(sys.argv) > 1 else 15.0)
+    print(json.dumps(result))
+    sys.exit(0 if result["ok"] else 1)
