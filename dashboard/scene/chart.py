@@ -27,6 +27,7 @@ class Curve:
     dash: bool = False
     stale: bool = False
     width: float = 1.6
+    about_zero: bool = False  # the band is what an error is allowed to be, so it lies around zero
     live: bool = True  # its newest value stands in the heading
 
 
@@ -57,21 +58,22 @@ class Chart:
             self._heading.content = heading
         curves = [curve for curve in curves if len(curve.t)]
         if not curves:
-            self._remove()
+            if self._plot is not None and self._plot.visible:
+                self._plot.visible = False
             return
         data = _data(curves, t0, t1, min(primary, len(curves) - 1))
         signature = (dark, *((c.label, c.colour, c.half is not None, c.dash, c.width) for c in curves))
-        if self._plot is None or signature != self._signature:
-            self._remove()
-            self._signature = signature
+        if self._plot is None:
             self._build(curves, data, dark)
+        elif signature != self._signature:
+            # Changed in place: a browser that is behind would complain of an update of a chart already removed.
+            self._plot.series, self._plot.bands = _lines(curves, dark)
+            self._plot.data = data
         else:
             self._plot.data = data
-
-    def _remove(self) -> None:
-        if self._plot is not None:
-            self._plot.remove()
-            self._plot = None
+        self._signature = signature
+        if not self._plot.visible:
+            self._plot.visible = True
 
     def _heading_html(self, curves: Sequence[Curve]) -> str:
         items = []
@@ -93,32 +95,12 @@ class Chart:
         )
 
     def _build(self, curves: Sequence[Curve], data: tuple[np.ndarray, ...], dark: bool) -> None:
-        lines: list[dict] = [{"label": "t"}]
-        bands: list[dict] = []
-        for curve in curves:
-            line = {"label": curve.label, "stroke": curve.colour, "width": curve.width, "points": {"show": False}}
-            lines.append(line | ({"dash": (6, 4)} if curve.dash else {}))
-            if curve.half is not None:
-                bands.append({"series": (len(lines), len(lines) + 1), "fill": rgba(curve.colour, 0.20)})
-                edge = {"stroke": rgba(curve.colour, 0.35), "width": 0.7, "points": {"show": False}}
-                lines += [edge | {"label": f"{curve.label} +3σ"}, edge | {"label": f"{curve.label} −3σ"}]
-        gap = "#3b3b3b" if dark else "#d5d5d5"
-        lines.append(
-            {
-                "label": "gap",
-                "scale": "gap",
-                "stroke": gap,
-                "width": 0,
-                "fill": gap,
-                "fillTo": 0,
-                "points": {"show": False},
-            }
-        )
+        lines, bands = _lines(curves, dark)
         with self._folder:
             self._plot = self._client.gui.add_uplot(
                 data,
-                series=tuple(lines),
-                bands=tuple(bands) or None,
+                series=lines,
+                bands=bands,
                 scales={"x": {"time": False}, "y": {}, "gap": {"range": (0, 1)}},
                 axes=({"size": 26, "font": "11px sans-serif"}, {"size": 46, "font": "11px sans-serif"}),
                 legend={"show": False},
@@ -128,19 +110,40 @@ class Chart:
             )
 
 
+def _lines(curves: Sequence[Curve], dark: bool) -> tuple[tuple[dict, ...], tuple[dict, ...] | None]:
+    """uPlot's description of the series that _data gives, and of the bands between them."""
+    lines: list[dict] = [{"label": "t"}]
+    bands: list[dict] = []
+    for curve in curves:
+        line = {"label": curve.label, "stroke": curve.colour, "width": curve.width, "points": {"show": False}}
+        lines.append(line | ({"dash": (6, 4)} if curve.dash else {}))
+        if curve.half is not None:
+            bands.append({"series": (len(lines), len(lines) + 1), "fill": rgba(curve.colour, 0.20)})
+            edge = {"stroke": rgba(curve.colour, 0.35), "width": 0.7, "points": {"show": False}}
+            lines += [edge | {"label": f"{curve.label} +3σ"}, edge | {"label": f"{curve.label} −3σ"}]
+    grey = "#3b3b3b" if dark else "#d5d5d5"
+    gap = {"label": "gap", "scale": "gap", "stroke": grey, "width": 0, "fill": grey, "fillTo": 0}
+    lines.append(gap | {"points": {"show": False}})
+    return tuple(lines), tuple(bands) or None
+
+
 def _data(curves: Sequence[Curve], t0: float, t1: float, primary: int) -> tuple[np.ndarray, ...]:
     """The arrays of a chart: time, each curve with the edges of its band, and the gap mask; all of one length."""
     edges, x = series.grid(t0, t1)
     lines = [series.decimate(curve.t, curve.y, edges)[0] for curve in curves]
     low, high = min(float(y.min()) for y in lines), max(float(y.max()) for y in lines)
-    # A band that grows without bound would press the curves flat: it is cut a third of their range outside.
-    reach = max((high - low) / 3, 1e-9)
+    # A band that grows without bound would press the curves flat: it is cut half their range outside.
+    reach = max((high - low) / 2, 1e-9)
     out = [x]
     for curve, y in zip(curves, lines, strict=True):
         out.append(y)
         if curve.half is not None:
             half = series.decimate(curve.t, curve.half, edges)[0]
-            out += [np.clip(y + half, low - reach, high + reach), np.clip(y - half, low - reach, high + reach)]
+            centre = np.zeros_like(y) if curve.about_zero else y
+            out += [
+                np.clip(centre + half, low - reach, high + reach),
+                np.clip(centre - half, low - reach, high + reach),
+            ]
     t = curves[primary].t
     out.append(series.gap_mask(t, edges, max(series.gap_limit(t), 2.5 * (edges[1] - edges[0]))))
     return tuple(out)

@@ -28,7 +28,9 @@ from dashboard.scene.store import Device
 ARROW_PER_RADPS = 0.55  # half sides per rad/s; 180 deg/s gives 1.7
 ARROW_LONGEST = 2.2
 CUBE_CAMERA = (4.3, -3.6, 2.6)
-VEHICLE_CAMERA = (-22.0, -20.0, 14.0)
+VEHICLE_CAMERA = (-17.0, -14.0, 9.0)
+
+LABEL_CORNERS = ((1, 1, 1.1), (-1, -1, 1.1), (1, -1, 1.6), (-1, 1, 1.6))  # apart, so that names do not hide another
 
 LAYERS = ("truth", "estimates", "sensors", "rate", "trajectory", "fixes", "ellipsoid", "grid")
 
@@ -52,6 +54,7 @@ class SceneView:
         self._sent: dict[str, tuple] = {}
         self._pieces: dict[str, int] = {}  # points of each track piece that the browser has
         self._thinned: dict[str, int] = {}
+        self._turning = False  # fast enough for an arrow
         self._scene.set_up_direction("+z")
         self._lights()
 
@@ -91,8 +94,9 @@ class SceneView:
         else:
             self._update_cube(device, estimators)
         for node, layer in self._layers():
-            if node.visible != self._choice.layers[layer]:
-                node.visible = self._choice.layers[layer]
+            visible = self._choice.layers[layer] and (layer != "rate" or self._turning)
+            if node.visible != visible:
+                node.visible = visible
 
     def update_tracks(self, device: Device) -> None:
         """Trajectories and fixes; only pieces that grew are sent. Call under the store's lock, twice a second."""
@@ -110,8 +114,8 @@ class SceneView:
         """Our own lights: the default ones are so strong that colours turn to white."""
         self._scene.configure_default_lights(enabled=False)
         self._scene.configure_environment_map(None)
-        self._scene.add_light_ambient("/lights/ambient", intensity=1.6)
-        self._scene.add_light_directional("/lights/sun", intensity=1.7, position=(3.0, -4.0, 8.0))
+        self._scene.add_light_ambient("/lights/ambient", intensity=1.0)
+        self._scene.add_light_directional("/lights/sun", intensity=1.5, position=(3.0, -4.0, 8.0))
 
     def _build(self, vehicle: bool, estimators: list[str], truth: bool) -> None:
         scene, dark = self._scene, self._choice.dark
@@ -128,7 +132,7 @@ class SceneView:
                     path, radius=1.0, color=rgb(colour), opacity=0.22, cast_shadow=False, visible=False
                 )
             else:
-                self._cube_body(body, colour, name, main=index == 0)
+                self._cube_body(body, colour, name, index)
         if not vehicle:
             self._table()
         if truth:
@@ -179,8 +183,8 @@ class SceneView:
             "/world/table/marks", marks.astype(np.float32), rgb(GREY), thickness=2.0, thickness_units="screen"
         )
 
-    def _cube_body(self, body: str, colour: str, name: str, main: bool) -> None:
-        scene = self._scene
+    def _cube_body(self, body: str, colour: str, name: str, index: int) -> None:
+        scene, main = self._scene, index == 0
         scene.add_line_segments(
             f"{body}/edges", geo.box_edges((1, 1, 1)), rgb(colour), thickness=3.0, thickness_units="screen"
         )
@@ -196,7 +200,7 @@ class SceneView:
         scene.add_label(
             f"{body}/label",
             estimator_title(name),
-            position=(0.0, 0.0, 1.28 if main else 1.08),
+            position=LABEL_CORNERS[index % len(LABEL_CORNERS)],
             anchor="bottom-center",
             font_screen_scale=0.8,
         )
@@ -292,17 +296,20 @@ class SceneView:
         if node is None or omega.shape != (3,) or not np.all(np.isfinite(omega)):
             return
         size = float(np.linalg.norm(omega))
-        text = f"ω {number(np.degrees(size), 0, '°/s')}" if size > 0.05 else ""
-        length = min(ARROW_PER_RADPS * size, ARROW_LONGEST)
-        direction = omega / size if size > 0.05 else np.array([0.0, 0.0, 1.0])
-        # It starts on the face it leaves the cube through, so that a slow rate is seen outside the cube as well.
-        start = direction / np.max(np.abs(direction))
-        tip = start + direction * (length + 0.25 if size > 0.05 else 1e-3)
+        self._turning = size > 0.05
+        if not self._turning:
+            return
+        text, direction = f"ω {number(np.degrees(size), 0, '°/s')}", omega / size
+        # It stands on the face it leaves the cube through, so that a slow rate is seen outside the cube as well; one
+        # that points into the table comes from above instead.
+        face = direction / np.max(np.abs(direction))
+        reach = direction * (0.25 + min(ARROW_PER_RADPS * size, ARROW_LONGEST))
+        start, tip = (face, face + reach) if direction[2] > -0.5 else (-face - reach, -face)
         key = tuple(np.round(np.concatenate([start, tip]), 2))
         if self._sent.get(path) != key:
             self._sent[path] = key
             node.points = np.array([[start, tip]], dtype=np.float32)
-            label.position = tuple(tip + direction * 0.12)
+            label.position = tuple((tip if direction[2] > -0.5 else start) + [0.0, 0.0, 0.15])
         if label.text != text:
             label.text = text
 
@@ -354,7 +361,7 @@ class SceneView:
             line = np.asarray(piece, dtype=np.float32)
             if points:
                 self._nodes[path] = self._scene.add_point_cloud(
-                    path, line, colour, point_size=0.7, point_shape="circle", precision="float32"
+                    path, line, colour, point_size=0.4, point_shape="circle", precision="float32"
                 )
             else:
                 segments = np.stack([line[:-1], line[1:]], axis=1)

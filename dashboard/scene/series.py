@@ -36,10 +36,10 @@ def decimate(t: np.ndarray, y: np.ndarray, edges: np.ndarray) -> tuple[np.ndarra
     low, high = np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts)
     rising = y[np.append(starts[1:], len(y)) - 1] >= y[starts]
     filled[held] = True
-    where = np.arange(buckets)
-    first = np.interp(where, held, np.where(rising, low, high))
-    second = np.interp(where, held, np.where(rising, high, low))
-    return np.column_stack([first, second]).ravel(), filled
+    quarter = np.array([0.25, 0.75])
+    values = np.column_stack([np.where(rising, low, high), np.where(rising, high, low)]).ravel()
+    at = (np.arange(buckets)[:, None] + quarter).ravel()
+    return np.interp(at, (held[:, None] + quarter).ravel(), values), filled
 
 
 def gap_mask(t: np.ndarray, edges: np.ndarray, gap_s: float) -> np.ndarray:

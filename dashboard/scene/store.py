@@ -52,7 +52,7 @@ class Ring:
 # Columns of the rings.
 RATE_OMEGA, RATE_SIGMA, RATE_F = slice(0, 3), slice(3, 6), slice(6, 9)
 RATE_ANGLE, RATE_NIS, RATE_POSITION = 9, 10, slice(11, 14)
-RATE_INNOVATION, RATE_INNOVATION_SIGMA = slice(14, 20), slice(20, 26)
+RATE_INNOVATION, RATE_INNOVATION_SIGMA, RATE_NIS_DOF = slice(14, 20), slice(20, 26), 26
 TRUTH_OMEGA, TRUTH_F, TRUTH_ANGLE = slice(0, 3), slice(3, 6), 6
 NAV_POSITION, NAV_VELOCITY, NAV_SIGMA_POSITION, NAV_YAW = slice(0, 3), slice(3, 6), slice(6, 9), 9
 INNOVATION_VALUE, INNOVATION_SIGMA, INNOVATION_NIS, INNOVATION_ERROR = slice(0, 6), slice(6, 12), 12, slice(13, 16)
@@ -209,8 +209,8 @@ def _truth(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.Trut
 def _rate(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.RateEstimate) -> None:
     nis = m.nis if m.innovation else np.nan
     row = _three(m.omega_ib_b_radps) + _sigmas(m.omega_covariance) + _three(m.f_b_mps2) + [m.angle_z_rad, nis]
-    row += _three(m.p_n_m) + _six(m.innovation) + _six(m.innovation_sigma)
-    _ring(device, topic, estimator, 26).append(t, row)
+    row += _three(m.p_n_m) + _six(m.innovation) + _six(m.innovation_sigma) + [m.nis_dof]
+    _ring(device, topic, estimator, 27).append(t, row)
 
 
 def _nav(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.NavSolution) -> None:

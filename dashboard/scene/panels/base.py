@@ -58,7 +58,7 @@ class Panel:
         """Set an HTML element's content when it changed; make it at first use."""
         if handle is None:
             with self.folder:
-                return self.client.gui.add_html(content, order=self._order)
+                return self.client.gui.add_html(content, order=1.0)  # above the charts
         if handle.content != content:
             handle.content = content
         return handle

@@ -61,7 +61,7 @@ class Devices(Panel):
             m = s.device.get("rate", name).message
             omega = m.omega_ib_b_radps[2] * DEG if len(m.omega_ib_b_radps) == 3 else None
             sub = "still" if m.still else f"angle {number(m.angle_z_rad * DEG, 0, '°')}"
-            tiles.append(_tile(s, name, "rate", number(omega, 1), "°/s about z", sub))
+            tiles.append(_tile(s, name, "rate", number(omega, 1), "°/s", sub))
         tacho = s.device.get("tacho")
         if tacho is not None:
             sub = "" if tacho.message.direction_known else "magnitude only"

@@ -50,7 +50,9 @@ class Errors(Panel):
                     omega = omega if reference == "tachometer" else np.abs(omega)
                 inside = (t >= true_t[0]) & (t <= true_t[-1])
                 error, sigma = ((omega - true) * DEG)[inside], (r[:, RATE_SIGMA][:, k] * DEG)[inside]
-                curves.append(estimator_curve(s, "rate", name, t[inside], error, 3 * sigma))
+                curve = estimator_curve(s, "rate", name, t[inside], error, 3 * sigma)
+                curve.about_zero = True
+                curves.append(curve)
                 if len(error):
                     value = number(float(np.sqrt(np.nanmean(error**2))), 2, "°/s")
                     rms.append((f"RMS ω<sub>{axis}</sub>, {estimator_title(name)}", value))
@@ -73,7 +75,9 @@ class Errors(Panel):
                 error, half = -r[:, INNOVATION_VALUE][:, :3], [3 * r[:, INNOVATION_SIGMA][:, k] for k in range(3)]
                 what = "prediction minus the fix about to be used"
             for k, axis in enumerate(("North", "East", "Down")):
-                curve = Curve(axis, AXES[k], t, error[:, k], half[k], stale=s.stale("innovation", name))
+                curve = Curve(
+                    axis, AXES[k], t, error[:, k], half[k], stale=s.stale("innovation", name), about_zero=True
+                )
                 self.show(f"{name}{k}", f"{axis}: {what}", "m", [curve], s, height=150, digits=2)
             if len(error):
                 horizontal = float(np.sqrt(np.nanmean(error[:, 0] ** 2 + error[:, 1] ** 2)))

@@ -1,6 +1,7 @@
 """Is a filter honest: innovations inside their 3-sigma, NIS inside the chi-square bounds of its degrees of freedom."""
 
 import numpy as np
+import viser
 from scipy.stats import chi2
 
 from dashboard.scene.chart import Curve
@@ -13,6 +14,7 @@ from dashboard.scene.store import (
     RATE_INNOVATION,
     RATE_INNOVATION_SIGMA,
     RATE_NIS,
+    RATE_NIS_DOF,
 )
 
 INSIDE = 0.95  # share of NIS values that an honest filter has between the two bounds
@@ -23,6 +25,10 @@ class Innovations(Panel):
 
     title = "NIS"
     _table = None
+
+    def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
+        super().__init__(client, folder)
+        self._units: dict[str, str] = {}  # of the last correction: a message without one does not name it
 
     def update(self, s: Snapshot) -> None:
         topic = "innovation" if s.device.is_vehicle else "rate"
@@ -36,12 +42,16 @@ class Innovations(Panel):
             else:
                 t, r = s.rows("rate", name)
                 nis, value, sigma = r[:, RATE_NIS], r[:, RATE_INNOVATION], r[:, RATE_INNOVATION_SIGMA]
-                dof, unit = message.nis_dof, message.innovation_unit or "1"
+                dof = r[:, RATE_NIS_DOF]
+                if message.innovation_unit:
+                    self._units[name] = message.innovation_unit
+                unit = self._units.get(name, "")
                 labels = _PRODUCTS if value.shape[1] == 6 else []
             good = np.isfinite(nis)
             if not good.any():
                 continue
-            items += self._nis(s, topic, name, t[good], nis[good], int(dof))
+            count = dof if topic == "innovation" else int(np.max(dof[good]))
+            items += self._nis(s, topic, name, t[good], nis[good], count)
             self._innovations(s, topic, name, (t[good], value[good], sigma[good]), labels, unit)
         note = '<p class="gf-note">No corrections yet: a filter without measurements has no innovations.</p>'
         self._table = self.html(rows(items) if items else note, self._table)
@@ -73,6 +83,7 @@ class Innovations(Panel):
                     value[:, k],
                     3 * sigma[:, k] if k == first else None,
                     stale=s.stale(topic, name),
+                    about_zero=True,
                 )
                 for k in range(first, first + 3)
                 if np.isfinite(value[:, k]).any()
