@@ -1,5 +1,6 @@
 """Bus messages to arrays and states to bus messages. With service.py the only file here that knows messages."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -8,6 +9,8 @@ import numpy as np
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from numpy.typing import NDArray
 
+from estimator.fix import Fix, typical_sigma
+from estimator.navigation import INNOVATIONS, Correction, Solution
 from messages import gyrofree_pb2 as pb
 
 Array = NDArray[np.float64]
@@ -55,6 +58,41 @@ def imu_samples(batch: pb.ImuBatch) -> tuple[Samples, Array]:
             f"{len(rate.values)} of rate"
         )
     return force, rate.values
+
+
+def fix_of(message: pb.GnssFix, every: int, clock_offset_s: float) -> Fix:
+    """A fix on the board's clock; all but each every-th, by header.sequence, are withheld. Raises BadMessage.
+
+    Its time is device_time_s where the board measured it, else its arrival. A receiver on a port of its own has no
+    device time at all: then UTC minus clock_offset_s (UTC - board's clock, s) stands for it.
+    """
+    header = message.header
+    arrival = header.device_us * MICRO if header.device_us else header.utc_ns * 1e-9 - clock_offset_s
+    position, velocity = typical_sigma(message.quality)
+    numbers = (message.latitude_deg, message.longitude_deg, message.height_m, arrival)
+    if not all(map(math.isfinite, numbers)) or abs(message.latitude_deg) >= 90.0:
+        raise BadMessage(f"gnss {header.sequence} of {header.device}: not a position: {numbers}")
+    v_n = np.array(message.v_n_mps) if len(message.v_n_mps) == 3 else None
+    sigma_v = None if v_n is None else _sigma(message.velocity_sigma_ned_mps, velocity)
+    return Fix(
+        t=message.device_time_s or arrival,
+        arrival=arrival,
+        latitude=math.radians(message.latitude_deg),
+        longitude=math.radians(message.longitude_deg),
+        height=message.height_m,
+        quality=message.quality,
+        sigma_p=_sigma(message.position_sigma_ned_m, position),
+        v_n=v_n,
+        sigma_v=sigma_v,
+        withheld=header.sequence % every != 0,
+        key=header.sequence,
+    )
+
+
+def _sigma(said: Iterable[float], typical: Array) -> Array:
+    """The receiver's own sigma where it is one."""
+    values = np.array(said, dtype=np.float64)
+    return values if values.shape == (3,) and (values > 0.0).all() else typical
 
 
 def sample_header(first: pb.Header, offset_s: float) -> pb.Header:
@@ -107,6 +145,47 @@ def pose_message(header: pb.Header, name: str, p_n_m: Iterable[float], q_nb: Ite
     t.x, t.y, t.z = (float(value) for value in p_n_m)
     q.w, q.x, q.y, q.z = (float(value) for value in q_nb)
     return message
+
+
+def nav_message(header: pb.Header, batch: pb.ImuBatch, index: int, name: str, s: Solution) -> pb.NavSolution:
+    """Solution as published."""
+    return pb.NavSolution(
+        header=header,
+        estimator=name,
+        for_sequence=batch.header.sequence,
+        for_index=index,
+        mode=int(s.mode),
+        latitude_deg=math.degrees(s.latitude),
+        longitude_deg=math.degrees(s.longitude),
+        height_m=s.height,
+        p_ned_m=as_list(s.p_ned),
+        v_n_mps=as_list(s.v_n),
+        q_nb=as_list(s.q_nb),
+        bias_f_b_mps2=as_list(s.bias_f_b),
+        bias_omega_b_radps=as_list(s.bias_omega_b),
+        sigma=as_list(s.sigma),
+        position_covariance=as_list(s.position_covariance),
+        origin_latitude_deg=math.degrees(s.origin[0]),
+        origin_longitude_deg=math.degrees(s.origin[1]),
+        origin_height_m=s.origin[2],
+        fix_age_s=s.fix_age,
+    )
+
+
+def innovation_message(header: pb.Header, name: str, c: Correction) -> pb.Innovation:
+    """Correction as published; a withheld fix is a reference the filter did not see."""
+    return pb.Innovation(
+        header=header,
+        estimator=name,
+        for_sequence=c.fix.key,
+        name=INNOVATIONS[: len(c.values)],
+        value=as_list(c.values),
+        sigma=as_list(c.sigma),
+        nis=c.nis,
+        dof=len(c.values),
+        accepted=c.accepted,
+        error_to_reference=as_list(c.error_ned) if c.fix.withheld else [],
+    )
 
 
 def as_list(values: Any) -> list[float]:

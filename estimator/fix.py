@@ -54,8 +54,8 @@ class FixSettings:
     """How far a receiver is believed."""
 
     floor_p: tuple[float, float, float] = (0.02, 0.02, 0.03)  # m: no fix is better, whatever its receiver says
-    floor_v: tuple[float, float, float] = (0.05, 0.05, 0.05)  # m/s
-    timing: float = 0.005  # s, of the fix's time against the samples' clock: counts with the speed
+    floor_v: tuple[float, float, float] = (0.1, 0.1, 0.15)  # m/s: a receiver's velocity lags in turns
+    timing: float = 0.002  # s, of the fix's time against the samples' clock: counts with the speed
     false_alarm: float = 1e-6  # chance that the NIS gate refuses a good fix of a filter whose model is right
     readmit_after: int = 5  # rejections in a row after which the filter, not the receiver, is taken to be wrong
 

@@ -7,11 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.stream import Stream, every
+from estimator.stream import Stream, every, worth_a_line
 
 log = logging.getLogger(__name__)
 
 Array = NDArray[np.float64]
+
+
+class WrongAxes(ValueError):
+    """Batches that the layout of their device does not describe."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +32,9 @@ class RateBoard:
     """Feeds batches to every estimator; tells them of gaps, starts them anew after a reboot."""
 
     def __init__(self, device: str, layout: Any, names: list[str], rate_limit_hz: float) -> None:
-        """Names are keys of estimator.rate.ESTIMATORS; KeyError with the known ones for another name."""
-        from estimator.rate import ESTIMATORS  # here: compiled functions, seconds of import
+        """Names are keys of estimator.rate.ESTIMATORS."""
+        from estimator.rate import ESTIMATORS  # here: loads only where accelerometers are
 
-        unknown = sorted(set(names) - set(ESTIMATORS))
-        if unknown:
-            raise KeyError(f"[estimator] rate: no estimator {unknown[0]!r}; want some of {', '.join(ESTIMATORS)}")
         self.device = device
         self.layout = layout
         self.stream = Stream()
@@ -41,18 +42,37 @@ class RateBoard:
         self._make = {name: ESTIMATORS[name] for name in names}
         self._limit = rate_limit_hz
         self._estimators: dict[str, Any] = {}
+        self._last_t: float | None = None
+
+    def _start(self, reason: str) -> None:
+        if reason:
+            log.warning("%s: %s: rate estimators start anew", self.device, reason)
+        self._estimators = {name: make(self.layout) for name, make in self._make.items()}
 
     def feed(self, epoch: int, first_index: int, period_s: float, t_s: Array, f_axis: Array) -> list[RateOutput]:
-        """Step through a batch: times (n,) in s of the board's clock, axis readings (n, axes) in m/s^2."""
+        """Step through a batch: times (n,) in s of the board's clock, axis readings (n, axes) in m/s^2.
+
+        Raises WrongAxes.
+        """
+        axes = len(self.layout.theta_b)
+        if f_axis.shape[1] != axes:
+            raise WrongAxes(
+                f"{self.device}: batches of {f_axis.shape[1]} axes, layout {self.layout.name} has {axes}: "
+                f"name the right one in [estimator] layouts"
+            )
         admission = self.stream.admit(epoch, first_index, len(t_s))
         if admission.restart or not self._estimators:
-            if admission.reason:
-                log.warning("%s: %s: rate estimators start anew", self.device, admission.reason)
-            self._estimators = {name: make(self.layout) for name, make in self._make.items()}
+            self._start(admission.reason)
+            self._last_t = None
         elif admission.missing:
-            log.warning("%s: %d samples missing before %d", self.device, admission.missing, first_index)
+            if worth_a_line(self.stream.gaps):
+                log.warning("%s: %d samples missing before %d (gap %d)", self.device, admission.missing, first_index,
+                            self.stream.gaps)  # fmt: skip
             for estimator in self._estimators.values():
                 estimator.skip(admission.missing)
+        if self._last_t is not None and not t_s[0] > self._last_t:
+            self._start(f"board clock went from {self._last_t:.6f} s to {t_s[0]:.6f} s")
+        self._last_t = float(t_s[-1])
         step = every(period_s, self._limit)
         out = []
         for row in range(len(t_s)):

@@ -16,19 +16,28 @@ from typing import Any, NamedTuple
 from google.protobuf.message import Message
 
 from estimator import convert
-from estimator.rate_board import RateBoard
+from estimator.nav_board import NavBoard
+from estimator.navigation import NAVIGATORS, Correction, Mode, NavigatorConfig
+from estimator.rate_board import RateBoard, WrongAxes
 from estimator.settings import EstimatorSettings, LayoutSettings
-from estimator.stream import Stream, every
+from estimator.stream import Stream, every, worth_a_line
+from estimator.warm import warm
 from messages import gyrofree_pb2 as pb
 from messages.bus import BusSettings, BusUnavailable, Publishers, open_client, subscribe
-from messages.topics import ACCEL, ESTIMATOR, POSE, RATE, Topic
+from messages.topics import ACCEL, ESTIMATOR, GNSS, IMU, INNOVATION, NAV, POSE, RATE, Topic
 
 log = logging.getLogger(__name__)
 
 POSE_HZ = 20.0
-INPUTS = (ACCEL,)
+INPUTS = (ACCEL, IMU, GNSS)
 BACKLOG = 20_000  # messages; more than a minute of a full-rate board, then the newest are dropped and counted
 NO_TRANSLATION = (0.0, 0.0, 0.0)  # a cube on its table turns and stays
+STATES = {
+    Mode.WAITING: "waiting for samples",
+    Mode.LEVELLING: "levelling: stand still for 10 s",
+    Mode.COURSE: "finding heading: drive faster than 4 m/s",
+    Mode.NAVIGATING: "navigating",
+}
 
 
 class Output(NamedTuple):
@@ -44,18 +53,24 @@ class Pipeline:
     """All estimators of all devices."""
 
     def __init__(self, settings: EstimatorSettings, clock: Callable[[], int] = time.perf_counter_ns) -> None:
-        """`clock` (ns) measures the cost per sample for EstimatorStatus and touches nothing else."""
+        """`clock` (ns) measures the cost per sample for EstimatorStatus and touches nothing else.
+
+        Raises UnknownEstimator for settings that name one that does not exist.
+        """
+        check_names("rate", settings.rate, rate_estimators())
+        check_names("navigators", settings.navigators, NAVIGATORS)
         self._settings = settings
         self._clock = clock
         self._boards: dict[str, RateBoard] = {}
+        self._vehicles: dict[str, NavBoard] = {}
+        self._clock_offset: dict[str, float] = {}
         self._cost = _Cost()
         self._second: dict[tuple[str, str], int] = {}
 
     def on(self, topic: Topic, message: Message) -> list[Output]:
         """Take one message of any topic; raises convert.BadMessage for one that cannot be used."""
-        if topic is ACCEL:
-            return self.on_accel(message)
-        return []
+        handler = {ACCEL: self.on_accel, IMU: self.on_imu, GNSS: self.on_gnss}.get(topic)
+        return handler(message) if handler else []
 
     def on_accel(self, batch: pb.AccelBatch) -> list[Output]:
         """Rate estimates, poses and, once per second of data, the health of each estimator."""
@@ -67,7 +82,10 @@ class Pipeline:
             board = RateBoard(device, layout, self._settings.rate, self._settings.rate_limit_hz)
             self._boards[device] = board
         started = self._clock()
-        states = board.feed(batch.header.epoch, batch.first_index, batch.period_s, samples.t_s, samples.values)
+        try:
+            states = board.feed(batch.header.epoch, batch.first_index, batch.period_s, samples.t_s, samples.values)
+        except WrongAxes as error:
+            raise convert.BadMessage(str(error)) from None
         self._cost.add(device, self._clock() - started, len(samples.t_s))
         pose_step = every(batch.period_s, POSE_HZ)
         out = []
@@ -83,6 +101,56 @@ class Pipeline:
                 out.append(Output(ESTIMATOR, device, name, self._rate_status(header, board, name)))
         return out
 
+    def on_imu(self, batch: pb.ImuBatch) -> list[Output]:
+        """Solutions, poses, corrections that became due and, once per second of data, the health of each filter."""
+        samples, rates = convert.imu_samples(batch)
+        device = batch.header.device
+        board = self._vehicles.get(device)
+        if board is None:
+            config = NavigatorConfig(lever_arm_b=self._settings.vehicle_of(device).lever_arm_b_m)
+            board = NavBoard(device, config, self._settings.navigators, self._settings.nav_limit_hz)
+            self._vehicles[device] = board
+        self._clock_offset[device] = batch.header.utc_ns * 1e-9 - batch.header.device_us * 1e-6
+        started = self._clock()
+        said = board.feed(
+            batch.header.epoch, batch.first_index, batch.period_s, samples.t_s, samples.values, rates
+        )  # fmt: skip
+        self._cost.add(device, self._clock() - started, len(samples.t_s))
+        out = []
+        for o in said:
+            if isinstance(o.what, Correction):
+                header = convert.sample_header(batch.header, o.what.fix.t - samples.t_s[0])
+                out.append(
+                    Output(INNOVATION, device, o.estimator, convert.innovation_message(header, o.estimator, o.what))
+                )
+                continue
+            header = convert.sample_header(batch.header, o.row * batch.period_s)
+            nav = convert.nav_message(header, batch, o.index, o.estimator, o.what)
+            out.append(Output(NAV, device, o.estimator, nav))
+            pose = convert.pose_message(header, o.estimator, o.what.p_ned, o.what.q_nb)
+            out.append(Output(POSE, device, o.estimator, pose))
+        if self._new_second(device, "imu", samples.t_s[-1]):
+            header = convert.sample_header(batch.header, (len(samples.t_s) - 1) * batch.period_s)
+            for name in self._settings.navigators:
+                out.append(Output(ESTIMATOR, device, name, self._nav_status(header, board, name)))
+        return out
+
+    def on_gnss(self, message: pb.GnssFix) -> list[Output]:
+        """Keep the fix; its corrections come out of on_imu, when samples have passed its arrival."""
+        device = message.header.device
+        board = self._vehicles.get(device)
+        if board is not None:
+            fix = convert.fix_of(message, self._settings.use_every_fix, self._clock_offset[device])
+            board.fix(fix)
+        return []
+
+    def _nav_status(self, header: pb.Header, board: NavBoard, name: str) -> pb.EstimatorStatus:
+        status = self._status(header, board.stream, name)
+        navigator = board.navigators[name]
+        status.state = STATES[navigator.mode]
+        status.message = ", ".join(f"fixes {what} {count}" for what, count in navigator.counts.items() if count)
+        return status
+
     def _new_second(self, device: str, what: str, t_s: float) -> bool:
         second = int(t_s)
         changed = self._second.get((device, what)) != second
@@ -92,12 +160,12 @@ class Pipeline:
     def _rate_status(self, header: pb.Header, board: RateBoard, name: str) -> pb.EstimatorStatus:
         status = self._status(header, board.stream, name)
         state = board.last[name]
-        status.state = "standing still" if state.still else "turning"
+        status.state = state.phase or ("standing still" if state.still else "turning")
         status.layout = board.layout.name
         bias = convert.as_list(state.bias)
         if len(bias) >= 6:
-            status.bias_f_b_mps2[:] = bias[:3]
-            status.bias_alpha_radps2[:] = bias[3:6]
+            status.bias_alpha_radps2[:] = bias[:3]
+            status.bias_f_b_mps2[:] = bias[3:6]
         return status
 
     def _status(self, header: pb.Header, stream: Stream, name: str) -> pb.EstimatorStatus:
@@ -130,6 +198,24 @@ class _Cost:
         before = self._asked.get((device, estimator), (0, 0))
         self._asked[device, estimator] = now
         return (now[0] - before[0]) / max(1, now[1] - before[1]) / 1000.0
+
+
+class UnknownEstimator(ValueError):
+    """Settings name an estimator that does not exist."""
+
+
+def rate_estimators() -> dict[str, Any]:
+    """The table of rate estimators."""
+    from estimator.rate import ESTIMATORS  # here: the tables of names need not load with the settings
+
+    return ESTIMATORS
+
+
+def check_names(key: str, names: list[str], known: dict[str, Any]) -> None:
+    """Raises UnknownEstimator with the known names."""
+    for name in names:
+        if name not in known:
+            raise UnknownEstimator(f"[estimator] {key}: no estimator {name!r}; want some of {', '.join(known)}")
 
 
 def make_layout(settings: LayoutSettings) -> Any:
@@ -177,7 +263,7 @@ class Service:
             outputs = self._pipeline.on(topic, message)
         except convert.BadMessage as error:
             self._bad += 1
-            if self._bad & (self._bad - 1) == 0:  # 1st, 2nd, 4th, 8th ...: a flood of them stays readable
+            if worth_a_line(self._bad):
                 log.warning("%s: ignored (%d so far)", error, self._bad)
             return
         for output in outputs:
@@ -186,6 +272,8 @@ class Service:
 
 def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) -> None:
     """Estimate until `stop` is set; sets it itself and raises when the worker fails."""
+    pipeline = Pipeline(settings)
+    warm()
     try:
         session = open_client(bus, stop)
     except BusUnavailable:
@@ -194,7 +282,7 @@ def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) ->
         raise
     with session:
         publishers = Publishers(session, bus.prefix)
-        service = Service(Pipeline(settings), lambda o: publishers.put(o.topic, o.device, o.message, o.estimator))
+        service = Service(pipeline, lambda o: publishers.put(o.topic, o.device, o.message, o.estimator))
         worker = threading.Thread(target=service.work, args=(stop,), name="estimator", daemon=True)
         worker.start()
         subscribers = [subscribe(session, topic, bus.prefix, _on(service, topic)) for topic in INPUTS]

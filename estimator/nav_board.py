@@ -1,0 +1,69 @@
+"""All navigation filters of one six-axis board, side by side on the same samples and fixes."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.fix import Fix
+from estimator.navigation import NAVIGATORS, Correction, NavigatorConfig, Solution
+from estimator.stream import Stream, every, worth_a_line
+
+log = logging.getLogger(__name__)
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class NavOutput:
+    """What one filter has to say after the sample of this index."""
+
+    row: int  # of the batch
+    index: int
+    estimator: str
+    what: Solution | Correction
+
+
+class NavBoard:
+    """Feeds batches and fixes to every filter; starts them anew after a reboot."""
+
+    def __init__(self, device: str, config: NavigatorConfig, names: list[str], limit_hz: float) -> None:
+        """Names are keys of NAVIGATORS."""
+        self.device = device
+        self.stream = Stream()
+        self.navigators: dict[str, Any] = {}
+        self._make: dict[str, Callable[[], Any]] = {name: lambda n=name: NAVIGATORS[n](config) for name in names}
+        self._limit = limit_hz
+
+    def feed(
+        self, epoch: int, first_index: int, period_s: float, t_s: Array, f_b: Array, omega_b: Array
+    ) -> list[NavOutput]:
+        """Step through a batch: times (n,) in s of the board's clock, force and rate (n, 3) in m/s^2 and rad/s."""
+        admission = self.stream.admit(epoch, first_index, len(t_s))
+        if admission.restart or not self.navigators:
+            if admission.reason:
+                log.warning("%s: %s: navigation starts anew", self.device, admission.reason)
+            self.navigators = {name: make() for name, make in self._make.items()}
+        elif admission.missing and worth_a_line(self.stream.gaps):
+            log.warning("%s: %d samples missing before %d (gap %d)", self.device, admission.missing, first_index,
+                        self.stream.gaps)  # fmt: skip
+        step = every(period_s, self._limit)
+        out = []
+        for row in range(len(t_s)):
+            index = first_index + row
+            for name, navigator in self.navigators.items():
+                for correction in navigator.imu(float(t_s[row]), f_b[row], omega_b[row]):
+                    if correction.reason and not correction.fix.withheld and not correction.accepted:
+                        log.info("%s: %s: fix refused: %s", self.device, name, correction.reason)
+                    out.append(NavOutput(row, index, name, correction))
+                if index % step == step - 1:
+                    out.append(NavOutput(row, index, name, navigator.solution()))
+        return out
+
+    def fix(self, fix: Fix) -> None:
+        """Hand a fix to every filter; one that comes before the first sample has nothing to correct."""
+        for navigator in self.navigators.values():
+            navigator.fix(fix)

@@ -1,0 +1,80 @@
+"""Fill the compile cache: `python -m estimator.warm`. The first sample of a live stream must not wait for a compiler.
+
+numba notices a change of the file a compiled function is in, not of a file that one calls into. So a cache older than
+any source of this folder is thrown away first.
+"""
+
+import itertools
+import logging
+import time
+from pathlib import Path
+
+import numpy as np
+
+from estimator.fix import RTK_FIXED, Fix
+from estimator.navigation import NAVIGATORS, Mode
+from estimator.rate import ESTIMATORS
+from estimator.simulation import TableTest
+
+log = logging.getLogger(__name__)
+
+RATE_SAMPLES = 800  # at 100 Hz: the standstill of the published test and the start of the first turn
+HERE = Path(__file__).resolve().parent
+
+
+def drop_stale(folder: Path = HERE) -> int:
+    """Remove compiled functions that are older than a source of the folder; returns how many files went."""
+    newest = max(s.stat().st_mtime for s in folder.glob("*.py") if "@njit" in s.read_text(encoding="utf-8"))
+    stale = [f for f in (folder / "__pycache__").glob("*.nb[ic]") if f.stat().st_mtime < newest]
+    if not stale:
+        return 0
+    everything = list((folder / "__pycache__").glob("*.nb[ic]"))
+    for file in everything:
+        file.unlink(missing_ok=True)
+    return len(everything)
+
+
+def warm() -> None:
+    """Compile, or load from the cache, every function of the live path by running it on made-up motion."""
+    _warm_navigators()
+    _warm_rates()
+
+
+def _warm_rates() -> None:
+    test = TableTest()
+    for make in ESTIMATORS.values():
+        estimator = make(test.layout)
+        for index, sample in enumerate(itertools.islice(test, RATE_SAMPLES)):
+            estimator.step(index, sample.t_s, sample.counts * test.sensor.count)
+
+
+def _warm_navigators() -> None:
+    for make in NAVIGATORS.values():
+        navigator = make()
+        f, w = np.array([0.0, 0.0, -9.8]), np.zeros(3)
+        for k in range(1200):
+            t = 0.01 * k
+            if k in (1110, 1150, 1190):
+                navigator.fix(_fix(t - 0.05))
+            navigator.imu(t, f, w)
+            navigator.solution()
+        if navigator.mode != Mode.NAVIGATING:
+            raise RuntimeError("the made-up drive did not reach navigation: warm.py does not fit alignment.py any more")
+
+
+def _fix(t: float) -> Fix:
+    sigma = np.full(3, 0.02)
+    return Fix(t, t, 0.7, 0.1, 100.0 + t, RTK_FIXED, sigma, np.array([5.0, 0.0, 0.0]), np.full(3, 0.05))
+
+
+def main() -> None:
+    """Entry point."""
+    logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
+    dropped = drop_stale()
+    started = time.perf_counter()
+    warm()
+    print(f"compile cache ready in {time.perf_counter() - started:.1f} s ({dropped} stale files dropped)")
+
+
+if __name__ == "__main__":
+    main()
