@@ -148,13 +148,14 @@ class Store:
         if known is None:
             known = self.devices[name] = Device(name, utc_ns)
         t = (utc_ns - known.utc0_ns) * 1e-9
-        if utc_ns and abs(t - known.t_newest) > 30.0 and (known.t_newest - t > 30.0 or known.t_newest == 0.0):
-            # A replay started over, or the very first time stamp was not yet a clock: the old axis is of no use.
+        row, before = _ROWS.get(topic.name), known.get(topic.name, estimator)
+        back = before is not None and before.t - t > 1.0
+        if row is not None and utc_ns and (back or t - known.t_newest > 3600.0):
+            # A replay started over, or the first time stamps were not yet those of a clock: the old axis is of no use.
             known = self.devices[name] = Device(name, utc_ns, generation=known.generation + 1)
             t = 0.0
         known.run = message.header.run or known.run
         known.latest[topic.name, estimator] = Latest(message, arrived, t)
-        row = _ROWS.get(topic.name)
         if row is not None:
             row(known, topic, estimator, t, message)
             known.t_newest = max(known.t_newest, t)
