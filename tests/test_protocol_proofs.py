@@ -154,13 +154,14 @@ def test_4_gaps_in_first_index_are_the_lost_samples(truth, received):
     assert ledger.lost_samples == total - sum(truth.samples[seq] for seq in arrived) > 0
 
 
-@pytest.mark.parametrize("longest", [3, 64, 5000])
+@pytest.mark.parametrize("longest", [3, 20, 5000])
 def test_5_any_cutting_gives_the_same_events(truth, received, longest):
     chance, deframer, events, at = random.Random(longest), Deframer(), [], 0
-    wire = truth.wire if longest > 3 else truth.wire[:500_000]
+    wire = truth.wire[: 100_000 * longest]  # small pieces take long
     while at < len(wire):
         size = chance.randint(0, longest)
         events += deframer.feed(wire[at : at + size])
         at += size
     assert events == received[2][: len(events)]
-    assert longest == 3 or (len(events) == len(received[2]) and deframer.pending == received[0].pending)
+    if len(wire) == len(truth.wire):
+        assert len(events) == len(received[2]) and deframer.pending == received[0].pending
