@@ -43,10 +43,7 @@ class GnssLink:
         for fix in self.decoder.feed(data):
             fix = replace(fix, fix_utc_ns=unroll_weeks(fix.fix_utc_ns, utc_ns))
             yield Arrival(fix, self._first_us, self._first_ns, self._device_time(fix))
-        if self.decoder.idle:
-            return
-        if self.decoder.stream.pending < len(data):  # the next epoch began within these bytes
-            self._first_us, self._first_ns = device_us, monotonic_ns
+            self._first_us, self._first_ns = device_us, monotonic_ns  # what follows it came with these bytes
 
     def _device_time(self, fix: Fix) -> float:
         if not fix.fix_utc_ns or not self._first_us:

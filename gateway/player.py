@@ -84,7 +84,7 @@ class PlayLog:
 
 
 def table_pulses(angle: float, rate: float, t0_s: float, t1_s: float, pitch: float) -> Iterator[BoardPulse]:
-    """Pulses of a table that turns by `rate` (rad/s) from t0_s to t1_s: one at each multiple of the pitch it crosses."""
+    """Pulses of a table turning by `rate` (rad/s) from t0_s to t1_s: one at each multiple of the pitch it crosses."""
     if rate == 0.0:
         return
     end = angle + rate * (t1_s - t0_s)
@@ -118,7 +118,7 @@ def load(path: Path, gnss: Path | None = None, pulses_per_rev: int = 360) -> Pla
 
 def sample_period(times_s: list[float]) -> float:
     """Time between samples, s: the median over stretches of 100, so that neither gaps nor rounded stamps count."""
-    step = min(100, len(times_s) - 1)
+    step = max(1, min(100, len(times_s) // 10))
     spans = sorted(b - a for a, b in zip(times_s, times_s[step:], strict=False))
     return spans[len(spans) // 2] / step
 
