@@ -180,10 +180,12 @@ def find_session(front: Front, session: str) -> SessionInfo:
 
 
 def file_of(front: Front, session: str) -> Path:
-    """The MCAP file of a session; HTTP 404 when there is none, 409 when it cannot be read."""
+    """The MCAP file of a session; HTTP 404 when there is none, 409 when it is unreadable or still written."""
     info = find_session(front, session)
     if info.path is None:
         raise HTTPException(409, f"session {session} has no readable recording")
+    if info.state == "open":
+        raise HTTPException(409, f"session {session} is being recorded: stop the recording first")
     return info.path
 
 

@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 
 ADDRESSES = 4096  # addresses whose failures are remembered; the oldest go first
 SESSIONS = 1024  # sign-ins at a time
-PARALLEL = 2  # passwords verified at once: each takes 64 MiB and a core
+PARALLEL = 2  # passwords verified at once: each takes 32 MiB and a core
 
 
 @dataclass

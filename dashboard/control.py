@@ -114,8 +114,8 @@ class Replay(Protocol):
 class ProcessReplay:
     """Replay in a process of its own: `<command> <path> --speed N`; one at a time."""
 
-    def __init__(self, command: Sequence[str]) -> None:
-        self._command = list(command)
+    def __init__(self, command: Sequence[str], look_s: float = 0.5) -> None:
+        self._command, self._look_s = list(command), look_s  # look_s: how long start() waits for an early end
         self._lock = threading.Lock()
         self._process: subprocess.Popen | None = None
         self._path: Path | None = None
@@ -132,7 +132,7 @@ class ProcessReplay:
                 raise ControlError(f"{command[0]}: {error.strerror}: no replay") from None
             self._path = path
             try:  # a recording that cannot be opened ends the process at once; then say so to the one who clicked
-                code = self._process.wait(0.5)
+                code = self._process.wait(self._look_s)
             except subprocess.TimeoutExpired:
                 return
             if code:
