@@ -19,7 +19,7 @@ from estimator.strapdown import SIZE, orthonormalise, rotation, step, turn
 Array = NDArray[np.float64]
 
 INTERVAL = 0.1  # s, over which F is taken as constant
-# acc: integral of f_n over the open interval (3), its length (s), time of the state (s)
+# acc: integral of f_n over the open interval (3), its length (s), time of the state (s), integral of C_nb (9)
 ACC_LENGTH, ACC_TIME = 3, 4
 
 
@@ -31,7 +31,7 @@ class InsState:
     P: Array = field(default_factory=lambda: np.eye(STATES))  # covariance just after the last fix
     Phi: Array = field(default_factory=lambda: np.eye(STATES))  # since the last fix, closed intervals
     Q: Array = field(default_factory=lambda: np.zeros((STATES, STATES)))
-    acc: Array = field(default_factory=lambda: np.zeros(5))
+    acc: Array = field(default_factory=lambda: np.zeros(14))
 
     @property
     def t(self) -> float:
@@ -63,7 +63,11 @@ def _close(x: Array, Phi: Array, Q: Array, acc: Array, noise: Array, F: Array, m
     for i in range(3):
         f_n[i] = acc[i] / T
         acc[i] = 0.0
-    fill_error_matrix(x, f_n, noise[15], noise[16], F)
+    middle = x.copy()  # C_nb averaged: at its end a turning body would be half an interval ahead
+    for i in range(9):
+        middle[6 + i] = acc[5 + i] / T
+        acc[5 + i] = 0.0
+    fill_error_matrix(middle, f_n, noise[15], noise[16], F)
     accumulate(F, T, noise, Phi, Q, matrices)
     orthonormalise(x)
     acc[3] = 0.0
@@ -88,6 +92,8 @@ def advance(
             step(x, f[k], w[k], dt, work)
             for i in range(3):
                 acc[i] += work[12, i] * dt
+                for j in range(3):
+                    acc[5 + 3 * i + j] += 0.5 * (work[9 + i, j] + x[6 + 3 * i + j]) * dt
             acc[3] += dt
             acc[4] = end
         if t[k] > until:
