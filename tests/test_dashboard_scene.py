@@ -299,7 +299,7 @@ def test_scene_is_served_and_idle_without_browsers(bus):
         try:
             with urllib.request.urlopen(f"http://127.0.0.1:{handle.port}/", timeout=20) as page:
                 assert page.status == 200 and b"<html" in page.read(2000)
-            assert handle.clients == 0 and handle.operator_uuids() == frozenset()
+            assert handle.clients == 0 and handle.viewer_uuids() == frozenset()
         finally:
             handle.stop()
 

@@ -6,23 +6,14 @@ up), so every node below it carries its quaternion and position as they stand in
 
 import numpy as np
 
+from estimator.layout import CUBE
 from messages import gyrofree_pb2 as pb
 
 # Rotation n (north, east, down) -> display (east, north, up): half a turn about (1, 1, 0), w x y z.
 Q_DISPLAY_N = (0.0, 0.5**0.5, 0.5**0.5, 0.0)
 
-# Corners and axes of the cube's four triads, in half sides; rows of the axes are sensor x, y, z in b
-# (Hoseini and Moradi 2017, recovered from their equations (25) and (26)).
-TRIADS_B = np.array([[1, -1, 1], [-1, 1, 1], [-1, -1, -1], [1, 1, -1]], dtype=float)
-TRIAD_AXES_B = np.array(
-    [
-        [[0, 1, 0], [-1, 0, 0], [0, 0, 1]],
-        [[0, -1, 0], [1, 0, 0], [0, 0, 1]],
-        [[0, 1, 0], [1, 0, 0], [0, 0, -1]],
-        [[0, -1, 0], [-1, 0, 0], [0, 0, -1]],
-    ],
-    dtype=float,
-)
+_CUBE = CUBE(half_side=1.0)
+SENSORS_B, DIRECTIONS_B = _CUBE.r_b, _CUBE.theta_b  # (12, 3): a11 a12 ... a43, in half sides
 
 _WGS84_A, _WGS84_E2 = 6378137.0, 6.69437999014e-3  # m, first eccentricity squared
 

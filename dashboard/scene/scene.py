@@ -210,8 +210,7 @@ class SceneView:
 
     def _sensors(self, body: str) -> None:
         """Twelve arrows at their corners, drawn along each sensor's direction, with the axis' name at the tip."""
-        start = np.repeat(geo.TRIADS_B, 3, axis=0)
-        direction = geo.TRIAD_AXES_B.reshape(12, 3)
+        start, direction = geo.SENSORS_B, geo.DIRECTIONS_B
         group = f"{body}/axes"
         self._nodes[group] = self._scene.add_frame(group, show_axes=False)
         colours = np.tile(np.array([rgb(c) for c in _SENSOR_COLOURS], dtype=np.uint8), (4, 1))

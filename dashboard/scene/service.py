@@ -10,9 +10,11 @@ from collections.abc import Callable
 from typing import Protocol
 
 import viser
+from viser._messages import ShareUrlDisconnect, ShareUrlRequest
 
 from dashboard.scene.feed import Feed
 from dashboard.scene.store import Store
+from dashboard.scene.style import LEFT_WIDTH, css
 from dashboard.scene.view import View
 from messages import gyrofree_pb2 as pb
 from messages.bus import BusSettings
@@ -57,10 +59,13 @@ class SceneHandle:
         for thread in self._threads:
             thread.start()
 
-    def operator_uuids(self) -> frozenset[str]:
-        """GUI elements that only an operator may use: the proxy drops a viewer's message that names one of them."""
+    def viewer_uuids(self) -> frozenset[str]:
+        """Inputs that anybody may use, because they change only that browser's own view.
+
+        The proxy drops a viewer's message for any other one, such as the record buttons.
+        """
         with self._lock:
-            return frozenset(uuid for view in self._views.values() for uuid in view.operator_uuids)
+            return frozenset().union(*(view.own_uuids for view in self._views.values()))
 
     @property
     def clients(self) -> int:
@@ -131,8 +136,20 @@ def start(
         raise SceneError(
             f"[dashboard] viser_port {settings.viser_port}: already in use; stop the other program or set it to 0"
         )
+    _dress(server)
     store = store or Store()
     return SceneHandle(server, Feed(bus, store, threading.Event()), store, on_record)
+
+
+def _dress(server: viser.ViserServer) -> None:
+    """What a browser sees before its own view is there: our colours and a line of text, not viser's own controls."""
+    server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
+    server.gui.add_html(css(), order=-1.0)
+    server.gui.main_panel.dock_left()
+    server.gui.main_panel.set_width(LEFT_WIDTH)
+    # Anybody could ask viser for a public tunnel to this server: that door does not exist here.
+    for message in (ShareUrlRequest, ShareUrlDisconnect):
+        server._websock_server.unregister_handler(message)
 
 
 def _free_port(host: str) -> int:

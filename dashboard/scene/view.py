@@ -10,7 +10,6 @@ from dashboard.scene.feed import Feed
 from dashboard.scene.panels import PAGES, Devices, Record, Snapshot
 from dashboard.scene.scene import LAYERS, Choice, SceneView
 from dashboard.scene.store import Device, Store
-from dashboard.scene.style import css
 from messages import gyrofree_pb2 as pb
 
 WINDOWS = {"10 s": 10.0, "30 s": 30.0, "60 s": 60.0, "5 min": 300.0}
@@ -43,9 +42,9 @@ class View:
             self._build_right()
 
     @property
-    def operator_uuids(self) -> frozenset[str]:
-        """GUI elements that need the operator's role."""
-        return self._record.uuids
+    def own_uuids(self) -> frozenset[str]:
+        """Inputs that change nothing but this browser's own view: all except the recorder's."""
+        return frozenset(self._client.gui._gui_input_handle_from_uuid) - self._record.uuids
 
     # --- ticks ----------------------------------------------------------------------------------------------------
 
@@ -87,7 +86,6 @@ class View:
 
     def _build_left(self, on_record: Callable) -> None:
         gui = self._client.gui
-        gui.add_html(css())
         gui.set_panel_label("gyrofree")
         self._chooser = gui.add_dropdown("Device", ("–",), visible=False)
         self._chooser.on_update(lambda _: self._choose(self._chooser.value))
@@ -98,8 +96,6 @@ class View:
         self._record = Record(self._client, on_record)
         with gui.add_folder("View", expand_by_default=False):
             self._build_controls()
-        gui.main_panel.dock_left()
-        gui.main_panel.set_width(300)
         self._commands()
 
     def _build_controls(self) -> None:
