@@ -12,8 +12,8 @@ from rich.console import Console
 from rich.table import Table
 
 from gyrofree.config import ConfigError, Settings, load_or_default
-from gyrofree.process import EXIT_FAILED, fail, run_service
 from gyrofree.process import EXIT_CONFIG as CONFIG
+from gyrofree.process import EXIT_FAILED, fail, run_service
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -208,7 +208,8 @@ def play(
 ) -> None:
     """Play a log of real sensors through the wire, the gateway and everything behind it.
 
-    The columns are described in docs/logs.md. Like `gyrofree demo`, this prints one URL; with --link it is only the board.
+    The columns are described in docs/logs.md. Like `gyrofree demo`, this prints one URL; with --link
+    it is only the board.
     """
     kind = _check_log(log, gnss)
     if link is not None:
@@ -232,7 +233,9 @@ def play(
 
 @app.command()
 def replay(
-    session: Annotated[str, typer.Argument(help="Id of a recording (`--list` shows them) or path of an MCAP file.")] = "",
+    session: Annotated[
+        str, typer.Argument(help="Id of a recording (`--list` shows them) or path of an MCAP file.")
+    ] = "",
     speed: Speed = 1.0,
     check: Annotated[
         bool, typer.Option(help="Do not publish: run the estimators on it and compare bit for bit.")

@@ -1,6 +1,7 @@
 """`gyrofree demo`: all services on this machine, fed by a simulated table or a played log, behind one printed URL.
 
-The configuration that the demo runs with is written to <folder>/gyrofree.toml, so that every process can also be started by hand.
+The configuration that the demo runs with is written to <folder>/gyrofree.toml, so that every process can also be
+started by hand.
 """
 
 import secrets

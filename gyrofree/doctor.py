@@ -62,8 +62,6 @@ def _versions() -> Finding:
     names = ("gyrofree", "eclipse-zenoh", "viser", "numpy", "fastapi", "pyserial")
     found = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in names)
     python = ".".join(map(str, sys.version_info[:3]))
-    if sys.version_info < (3, 11):
-        return Finding("versions", "fail", f"Python {python}, {found}", "install Python 3.11 or newer")
     return Finding("versions", "ok", f"Python {python}, {found}")
 
 
@@ -72,19 +70,17 @@ def _ports(settings: Settings) -> list[Finding]:
     seen = ", ".join(path.name for path in by_id) or "no USB serial adapter is plugged in"
     findings = [Finding("serial ports", "ok", seen)]
     for device in settings.gateway.devices:
-        port = device.port
+        port, name = device.port, f"port of {device.name}"
         if "://" in port:
-            findings.append(Finding(f"port of {device.name}", "ok", f"{port} (checked when it is opened)"))
+            findings.append(Finding(name, "ok", f"{port} (checked when it is opened)"))
         elif not os.path.exists(port):
-            findings.append(
-                Finding(f"port of {device.name}", "warn", f"{port} is not there", "plug the board in; the gateway waits")
-            )
+            findings.append(Finding(name, "warn", f"{port} is not there", "plug the board in; the gateway waits"))
         elif not os.access(port, os.R_OK | os.W_OK):
             group = grp.getgrgid(os.stat(port).st_gid).gr_name
             remedy = f"sudo usermod -aG {group} $USER, then sign in again"
-            findings.append(Finding(f"port of {device.name}", "fail", f"{port}: no permission to read and write", remedy))
+            findings.append(Finding(name, "fail", f"{port}: no permission to read and write", remedy))
         else:
-            findings.append(Finding(f"port of {device.name}", "ok", port))
+            findings.append(Finding(name, "ok", port))
     return findings
 
 
@@ -95,7 +91,8 @@ def _clock() -> Finding:
         return Finding("clock", "warn", "the kernel does not tell whether UTC is disciplined")
     status = struct.unpack_from("i", buffer, 40)[0]  # struct timex: modes, offset, freq, maxerror, esterror, status
     if status & STA_UNSYNC:
-        return Finding("clock", "warn", "UTC is not disciplined", "start chrony or systemd-timesyncd; rates are unaffected")
+        remedy = "start chrony or systemd-timesyncd; rates are unaffected"
+        return Finding("clock", "warn", "UTC is not disciplined", remedy)
     return Finding("clock", "ok", "UTC is disciplined")
 
 
@@ -123,7 +120,9 @@ def _folder(check: str, folder: Path) -> Finding:
         return Finding(check, "fail", f"{folder}: no permission to write in {there}", f"sudo chown $USER {there}")
     free = shutil.disk_usage(there).free
     text = f"{folder}: {free / 2**30:.1f} GiB free"
-    return Finding(check, "ok", text) if free > LEAST_FREE else Finding(check, "warn", text, "make room: 1 GiB at least")
+    if free < LEAST_FREE:
+        return Finding(check, "warn", text, "make room: 1 GiB at least")
+    return Finding(check, "ok", text)
 
 
 def _compile_cache() -> Finding:

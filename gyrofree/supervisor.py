@@ -144,4 +144,5 @@ class Supervisor:
 
     def _print(self, name: str, colour: str, text: str, style: str) -> None:
         clock = time.strftime("%H:%M:%S")
-        self.console.print(Text.assemble((clock, "dim"), " ", (f"{name:<10}", colour), " ", (text, style)), soft_wrap=True)
+        line = Text.assemble((clock, "dim"), " ", (f"{name:<10}", colour), " ", (text, style))
+        self.console.print(line, soft_wrap=True)

@@ -16,11 +16,13 @@ import zenoh
 from google.protobuf.message import DecodeError, Message
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from messages.topics import NAME, Topic
+from messages.topics import ACCEL, IMU, NAME, NAV, RATE, Topic
 
 log = logging.getLogger(__name__)
 
 M = TypeVar("M", bound=Message)
+
+EXPRESS = (ACCEL, IMU, RATE, NAV)  # on the way from sensor to solution: sent at once, not batched with others
 
 
 class BusSettings(BaseModel):
@@ -45,13 +47,17 @@ class BusSettings(BaseModel):
 
 def _config(settings: BusSettings, mode: str) -> zenoh.Config:
     config = zenoh.Config()
+    patience_us = 20_000 if mode == "router" else 100_000
     values = {
         "mode": mode,
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
         "timestamping/enabled": True,
         "transport/link/tx/lease": settings.lease_ms,
-        "transport/link/tx/queue/size/data": 16,  # batches of 64 KiB that a stalled link may hold before DROP drops
+        # A process that gets no processor for a while must not lose messages at once: room for 16 batches (each
+        # express message takes one), and some patience before DROP drops; less in the router, which serves all.
+        "transport/link/tx/queue/size/data": 16,
+        "transport/link/tx/queue/congestion_control/drop/wait_before_drop": patience_us,
     }
     if mode == "router":
         values["listen/endpoints"] = settings.listen
@@ -126,7 +132,7 @@ class Publishers:
         key = topic.key(self._prefix, device, estimator)
         if key not in self._by_key:
             self._by_key[key] = self._session.declare_publisher(
-                key, congestion_control=zenoh.CongestionControl.DROP, express=True
+                key, congestion_control=zenoh.CongestionControl.DROP, express=topic in EXPRESS
             )
         if "header" in message.DESCRIPTOR.fields_by_name and not message.header.sequence:
             self._sequence[key] = self._sequence.get(key, 0) + 1

@@ -1,7 +1,7 @@
 """Serial byte to published solution at 100 Hz, through the real gateway, bus and estimator. Prints one JSON line.
 
-The bench writes one ACC12 frame every 10 ms into a pseudo-terminal and notes the time of the write; it also subscribes to the
-products filter's estimates. Both times are of one monotonic clock.
+The bench writes one ACC12 frame every 10 ms into a pseudo-terminal and notes the time of the write; it also
+subscribes to the products filter's estimates. Both times are of one monotonic clock.
 """
 
 import json
