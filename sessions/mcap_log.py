@@ -3,6 +3,7 @@
 The file can be opened by any MCAP viewer; layout and records: https://mcap.dev/spec. Nothing here looks into a payload.
 """
 
+import hashlib
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -58,6 +59,7 @@ class Sink:
     def __init__(self, fd: int) -> None:
         self._fd = fd
         self._written = 0
+        self.hash = hashlib.sha256()  # of what the file holds; the writer never goes back, so no second reading
         self.pending = bytearray()
 
     def write(self, data: bytes) -> int:
@@ -75,6 +77,7 @@ class Sink:
         while self.pending:
             n = os.write(self._fd, self.pending)
             self._written += n
+            self.hash.update(memoryview(self.pending)[:n])
             del self.pending[:n]
 
 
@@ -102,6 +105,11 @@ class McapLog:
     def size(self) -> int:
         """Bytes of the file once everything pending is written."""
         return self._sink.tell()
+
+    @property
+    def sha256(self) -> str:
+        """Hex digest of what has been written to the file."""
+        return self._sink.hash.hexdigest()
 
     def open_channel(self, key: str, topic: Topic) -> int:
         """Channel number of a key, made when it is new."""

@@ -206,7 +206,9 @@ def run(
 
     `configuration` goes into session.json of every session. A router that is not there yet is waited for.
     """
-    recover_all(settings.root)
+    # Beside the recording, not before it: a large file takes a minute, and what runs is locked against recovery. When
+    # the process ends first, the session stays open and the next start does it.
+    threading.Thread(target=recover_all, args=(settings.root,), name="recovery", daemon=True).start()
     try:
         session = open_client(bus, stop)
     except BusUnavailable:

@@ -22,7 +22,7 @@ from sessions.manifest import (
     write_manifest,
 )
 from sessions.mcap_log import Damage, McapLog, read
-from sessions.store import lock, sha256
+from sessions.store import lock
 
 log = logging.getLogger(__name__)
 
@@ -38,6 +38,7 @@ class Salvage:
     damage: Damage
     start_utc_ns: int = 0
     end_utc_ns: int = 0
+    sha256: str = ""  # of the new file
 
     @property
     def messages(self) -> int:
@@ -88,6 +89,7 @@ def _copy(source: Path, fd: int, channels: dict[int, str] | None) -> Salvage:
     out.push()
     result.keys = {key: state.count for key, state in states.items()}
     result.channels = out.channels
+    result.sha256 = out.sha256
     return result
 
 
@@ -113,7 +115,7 @@ def recover_session(folder: Path) -> Manifest | None:
     manifest.start_utc_ns = manifest.start_utc_ns or found.start_utc_ns
     manifest.end_utc_ns = found.end_utc_ns or manifest.start_utc_ns
     manifest.bytes = (folder / RECOVERED).stat().st_size
-    manifest.sha256 = sha256(folder / RECOVERED)
+    manifest.sha256 = found.sha256
     manifest.recovery = (
         f"{found.messages} messages from {original.stat().st_size} bytes of {RECORDING}, which was not closed: "
         f"{found.damage}"

@@ -6,7 +6,6 @@ took up to 464 ms on the measured disk, so it runs in a thread of its own, every
 
 import contextlib
 import fcntl
-import hashlib
 import logging
 import os
 import platform
@@ -35,12 +34,6 @@ def versions() -> dict[str, str]:
         with contextlib.suppress(PackageNotFoundError):
             found[name] = version(name)
     return found
-
-
-def sha256(path: Path) -> str:
-    """Hex digest of a file; raises OSError."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def lock(fd: int) -> bool:
@@ -191,7 +184,7 @@ class SessionStore:
             self._log.push()
             os.fsync(self._fd)
             self.manifest.bytes = self._log.size
-            self.manifest.sha256 = sha256(self.folder / RECORDING)
+            self.manifest.sha256 = self._log.sha256
             self.manifest.state = "closed"
             write_manifest(self.folder, self._snapshot())
         except OSError as error:

@@ -199,6 +199,7 @@ def test_a_killed_recorder_loses_less_than_a_second_and_is_recovered_at_the_next
     process = spawn(tmp_path, bus)
     try:
         until(lambda: (s := order(client)) and s.recording and s.session != cut.id, "the new recording")
+        until(lambda: Catalogue(tmp_path).get(cut.id).state == "recovered", "the recovery")
     finally:
         process.terminate()
     assert process.wait(PATIENCE) == 0
