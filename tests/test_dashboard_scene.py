@@ -23,6 +23,10 @@ from messages import topics as tp
 from messages.bus import BusSettings, Publishers, open_client, open_router
 
 
+# Chromium without a GPU: WebGL is drawn in software.
+FLAGS = ["--no-sandbox", "--disable-background-networking", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+
+
 class Direct:
     """Stands where the feeder wants publishers and puts straight into a store."""
 
@@ -323,9 +327,7 @@ def test_browser_shows_the_cube_as_the_truth_has_it(bus):
     handle = start(bus, SimpleNamespace(viser_port=0), store)
     try:
         with sync_api.sync_playwright() as playwright:
-            browser = playwright.chromium.launch(
-                executable_path="/usr/bin/chromium", args=["--no-sandbox", "--disable-background-networking"]
-            )
+            browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=FLAGS)
             page = browser.new_page(viewport={"width": 1440, "height": 900})
             errors = []
             page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)

@@ -131,8 +131,8 @@ class Track:
     and the spacing doubles.
     """
 
-    PIECE = 500
-    PIECES = 80
+    PIECE = 250
+    PIECES = 160
 
     def __init__(self, spacing: float) -> None:
         self.spacing = spacing

@@ -99,7 +99,7 @@ class SceneView:
                 node.visible = visible
 
     def update_tracks(self, device: Device) -> None:
-        """Trajectories and fixes; only pieces that grew are sent. Call under the store's lock, twice a second."""
+        """Trajectories and fixes; only pieces that grew are sent. Call under the store's lock."""
         for name, track in device.tracks.items():
             if name == "fixes":
                 self._track("/world/fixes", track, rgb(FIX), points=True)

@@ -6,6 +6,7 @@ import logging
 import socket
 import threading
 import time
+import warnings
 from collections.abc import Callable
 from typing import Protocol
 
@@ -126,6 +127,8 @@ def start(
     `on_record` gets the orders of the record buttons and returns the recorder's answer or raises ConnectionError; by
     default the recorder is asked on the bus. Raises SceneError when the port is taken.
     """
+    # A browser may go while it is brought up to date; its view is dropped a moment later.
+    warnings.filterwarnings("ignore", message="Queued a .* on a closed connection", category=UserWarning)
     with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner that would stand among our data
         server = viser.ViserServer(
             host=host, port=settings.viser_port or _free_port(host), label="gyrofree", verbose=False

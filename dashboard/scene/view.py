@@ -13,7 +13,7 @@ from dashboard.scene.store import Device, Store
 from messages import gyrofree_pb2 as pb
 
 WINDOWS = {"10 s": 10.0, "30 s": 30.0, "60 s": 60.0, "5 min": 300.0}
-TRACK_S = 0.5  # trajectories are looked at twice a second
+TRACK_S = 0.2  # trajectories grow five times a second
 
 
 class View:
