@@ -69,7 +69,7 @@ def fix_of(message: pb.GnssFix, every: int, clock_offset_s: float) -> Fix:
     header = message.header
     arrival = header.device_us * MICRO if header.device_us else header.utc_ns * 1e-9 - clock_offset_s
     position, velocity = typical_sigma(message.quality)
-    numbers = (message.latitude_deg, message.longitude_deg, message.height_m, arrival)
+    numbers = (message.latitude_deg, message.longitude_deg, message.height_m, arrival, message.device_time_s)
     if not all(map(math.isfinite, numbers)) or abs(message.latitude_deg) >= 90.0:
         raise BadMessage(f"gnss {header.sequence} of {header.device}: not a position: {numbers}")
     v_n = np.array(message.v_n_mps) if len(message.v_n_mps) == 3 else None

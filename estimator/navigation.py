@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 INNOVATIONS = ("position N m", "position E m", "height m", "velocity N m/s", "velocity E m/s", "velocity D m/s")
 
 
+FUTURE = 10.0  # s; a fix further ahead of the newest sample than this is not waited for
 WITHHELD = "withheld to score the filter"
 
 
@@ -112,7 +113,7 @@ class EkfNavigator:
     def __init__(self, config: NavigatorConfig = NavigatorConfig()) -> None:
         self.config = config
         self.mode = Mode.WAITING
-        self.counts = {"used": 0, "rejected": 0, "withheld": 0, "late": 0, "readmitted": 0}
+        self.counts = {"used": 0, "rejected": 0, "withheld": 0, "late": 0, "ahead": 0, "readmitted": 0}
         self._align = Alignment(config.alignment)
         self._work = ins_ekf.Workspace(config.imu)
         self._history = History()
@@ -146,6 +147,10 @@ class EkfNavigator:
 
     def fix(self, fix: Fix) -> None:
         """Take a fix; it is used, and answered for, once samples have passed its arrival."""
+        newest = self._history.newest
+        if newest is None or not fix.due(self.config.settle) < newest + FUTURE:
+            self.counts["ahead"] += 1  # samples have stopped, or the clocks are not one clock
+            return
         self._pending.append(fix)
         self._pending.sort(key=lambda f: f.due(self.config.settle))
 
