@@ -92,8 +92,8 @@ class DeviceLink:
             try:
                 chunk = self.queue.get(timeout=min(left, JOIN_WAIT_S) if held else left)
             except queue.Empty:
-                for joiner in self._joiner.values() if held else ():
-                    self._send(joiner.flush())
+                if held:
+                    self._send_held()
                 continue
             if chunk is not None:
                 self.take(chunk)
@@ -118,7 +118,7 @@ class DeviceLink:
             self._restart(frame.epoch)
         self._flags = frame.flags
         match frame.payload:
-            case Acc12() | Imu6() as payload:
+            case Acc12() | Imu6() as payload if payload.counts:
                 last_us = frame.t_us + (len(payload.counts) - 1) * payload.period_ns // 1000
                 self.clock.add(last_us, received_ns)
                 self._take_samples(frame, payload, received_ns)
@@ -141,8 +141,7 @@ class DeviceLink:
         """The board has booted: its clock and counters begin again."""
         if self._epoch is not None:
             log.warning("%s: the board restarted (boot %d -> %d)", self.name, self._epoch, epoch)
-        for joiner in self._joiner.values():
-            self._send(joiner.flush())
+        self._send_held()
         self._epoch, self._reboots = epoch, self.ledger.reboots
         self.clock.reset()
         self.tacho.reset()
@@ -161,16 +160,19 @@ class DeviceLink:
         else:
             batch.columns = convert.imu_si(payload)
         self.report.samples += n
-        self._send(self._joiner[type(payload)].add(batch))
+        self._send(type(payload), self._joiner[type(payload)].add(batch))
 
-    def _send(self, batches: list[Batch]) -> None:
+    def _send(self, kind: type, batches: list[Batch]) -> None:
         for batch in batches:
             common = dict(
-                first_index=batch.first_index, period_s=batch.period_ns * 1e-9, lost_samples=batch.lost,
-                frame_sequence=batch.frame_sequence, received_ns=batch.received_ns,
-            )  # fmt: skip
+                first_index=batch.first_index,
+                period_s=batch.period_ns * 1e-9,
+                lost_samples=batch.lost,
+                frame_sequence=batch.frame_sequence,
+                received_ns=batch.received_ns,
+            )
             first, second = batch.columns
-            if isinstance(first[0], int):
+            if kind is Acc12:
                 message = pb.AccelBatch(
                     axes=len(first) // batch.n, counts=first, f_mps2=second, stale_mask=batch.stale_mask, **common
                 )
@@ -179,6 +181,10 @@ class DeviceLink:
                 message = pb.ImuBatch(f_b_mps2=first, omega_ib_b_radps=second, **common)
                 self._publish(IMU, message, None, batch.device_us)
             self.report.latency_ns.append(time.monotonic_ns() - batch.received_ns)
+
+    def _send_held(self) -> None:
+        for kind, joiner in self._joiner.items():
+            self._send(kind, joiner.flush())
 
     def _take_tacho_time(self, now_us: int) -> None:
         """Device time has come to now_us: a rate is due every 50 ms, also one of zero."""

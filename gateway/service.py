@@ -61,6 +61,10 @@ def _serve(
     links.append(link)
     try:
         link.run(stop)
+    except Exception:  # a bug of ours: end the process, so that its supervisor starts a sound one
+        log.exception("%s: the gateway failed and stops", device.name)
+        stop.set()
+        raise
     finally:
         history.undeclare()
         token.undeclare()

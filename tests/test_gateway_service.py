@@ -11,11 +11,13 @@ import pytest
 from gateway import service
 from gateway.board_link import PtyLink, TcpLink
 from gateway.journal_file import records, scan
+from gateway.player import LOG_EPOCH_S
 from gateway.settings import DeviceSettings, GatewaySettings
-from gateway.virtual_board import SIMULATED, BoardAccel, BoardPulse, VirtualBoard
+from gateway.ubx import Epoch, ubx_bytes
+from gateway.virtual_board import SIMULATED, BoardAccel, BoardBytes, BoardPulse, VirtualBoard
 from messages import gyrofree_pb2 as pb
 from messages.bus import BusSettings, open_client, open_router, subscribe
-from messages.topics import ACCEL, BOARD, LINK, TACHO, history_key
+from messages.topics import ACCEL, BOARD, GNSS, LINK, LOCATION, TACHO, history_key
 
 PERIOD_S = 0.002  # 500 Hz with n = 1: also exercises joining
 
@@ -55,7 +57,7 @@ class Bench:
                 self.bus.prefix,
                 lambda _, message, name=topic.name: self.seen[name].append(message),
             )
-            for topic in (ACCEL, TACHO, LINK, BOARD)
+            for topic in (ACCEL, TACHO, LINK, BOARD, GNSS, LOCATION)
         ]
         self.running: list[tuple[threading.Thread, threading.Event]] = []
 
@@ -250,3 +252,54 @@ def test_history_answers_the_very_records(bench):
     refused = list(bench.session.get(f"{key}?first=x"))
     assert refused[0].err is not None
     link.close()
+
+
+def epoch_bytes(t_s: float) -> bytes:
+    return ubx_bytes(
+        Epoch(LOG_EPOCH_S, t_s, 40.0966268, -105.1474483, 1601.474, 1, (0.01, 0.01, 0.02), (3.0, 4.0, 0.5))
+    )
+
+
+def test_gnss_in_frames_of_the_board(bench):
+    """Without delay the time of fix on the board's clock is exact; the location repeats the position."""
+    link = TcpLink()
+    bench.gateway(link.path)
+    items = sorted(
+        [*samples(200, period_s=0.01), *(BoardBytes(k / 4, epoch_bytes(k / 4)) for k in range(1, 8))],
+        key=lambda item: item.t_s,
+    )
+    VirtualBoard(link, SIMULATED, sample_period_s=0.01).run(items, threading.Event(), wait_for_reader=True)
+    got = wait_for(lambda: len(bench.seen["gnss"]) >= 6 and list(bench.seen["gnss"]))
+    for k, fix in enumerate(got, start=1):
+        assert fix.fix_utc_ns == LOG_EPOCH_S * 10**9 + k * 250_000_000
+        assert fix.device_time_s == pytest.approx(k / 4, abs=1e-5)
+        assert fix.header.device_us == pytest.approx(k * 250_000, abs=2)
+        assert fix.quality == pb.GnssFix.QUALITY_RTK_FIXED and list(fix.v_n_mps) == pytest.approx([3.0, 4.0, 0.5])
+    place = bench.seen["location"][0]
+    assert (place.latitude, place.longitude, place.altitude) == (
+        got[0].latitude_deg,
+        got[0].longitude_deg,
+        got[0].height_m,
+    )
+    link.close()
+
+
+def test_gnss_on_its_own_port(bench):
+    link, receiver = TcpLink(), TcpLink()
+    bench.gateway(link.path, gnss_port=receiver.path)
+    wait_for(lambda: receiver.connected)
+    stop = threading.Event()
+    board = VirtualBoard(link, SIMULATED, sample_period_s=0.01)
+    running = threading.Thread(target=board.run, args=(samples(100_000, period_s=0.01), stop, 1.0, True))
+    running.start()
+    wait_for(lambda: bench.seen["accel"])
+    for k in range(1, 5):
+        receiver.write(epoch_bytes(float(k)))
+        receiver.write(b"$GPGGA,damaged*00\r\n")
+    got = wait_for(lambda: len(bench.seen["gnss"]) >= 3 and list(bench.seen["gnss"]))
+    assert got[0].header.device_us > 0 and abs(got[0].header.utc_ns - time.time_ns()) < 30e9
+    assert bench.status(lambda s: s.gnss_bad == 4).gnss_good == 8
+    stop.set()
+    running.join(10)
+    link.close()
+    receiver.close()
