@@ -99,7 +99,7 @@ def align(state: State, S: Array, mean_axis: Array, samples: int) -> State:
     bias = np.concatenate([x[:3], f_b * (1.0 - GRAVITY / np.linalg.norm(f_b))])
     y = np.zeros(14)
     y[Q_NB] = q_nb
-    return State(y, bias, np.zeros(6), samples, 0.0, state.steps)
+    return State(y, bias, x - bias, samples, 0.0, state.steps)
 
 
 def step(state: State, u: Array, SQ: Array, dt: float) -> State:
@@ -171,7 +171,7 @@ class LeastSquares:
         if self.still:
             self._standstill.add(f_axis)
             if enough:
-                self._align()
+                self._align(self._standstill.samples % self.config.still.window == 0)
         elif enough:
             # the turn began before the detector saw it: integrate what was held back
             for held in self._standstill.held:
@@ -181,10 +181,11 @@ class LeastSquares:
             self._standstill.clear()
         return True
 
-    def _align(self) -> None:
+    def _align(self, learn: bool) -> None:
         mean, samples = self._standstill.mean(), self._standstill.samples
         self.state = align(self.state, self.S, mean, samples)
-        self._detector.learn(mean, samples)
+        if learn:  # now and then: costly
+            self._detector.learn(mean, samples)
 
     def _publish(self, f_axis: Array) -> None:
         z = products(self.state.y[OMEGA])

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from estimator import products_model as model
 from estimator import still as stillness
 from estimator.attitude import from_rotation_vector, level, multiply, tilt_correction, to_dcm
-from estimator.layout import Layout, products
+from estimator.layout import Layout
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,9 @@ class Config:
     still_rate: float = 0.01  # rad/s, of a standstill over one window
     force_gate: float = 30.0  # NIS, 3 degrees: above it the centre accelerates, gravity is not used
     products_gate: float = 60.0  # NIS, 6 degrees: above it the sample is damaged
-    replay: int = 20  # samples taken back when a turn is noticed
+    unseen_rate: float = 0.03  # rad/s, of a turn that has begun and is not noticed yet
+    unseen_alpha: float = 5.0  # rad/s^2, of a turn during a damaged sample
+    replay: int = 60  # samples taken back when a turn is noticed
 
 
 @dataclass(frozen=True)
@@ -149,48 +151,70 @@ def _filter(
     return x, P, innovation, C, nis, force_nis
 
 
-def step(state: State, s: Sensor, f_axis: Array, dt: float, turning: bool, config: Config) -> tuple[State, Correction]:
-    """One sample: axis readings (N,), m/s^2, dt (s) after the last; turning is what the still detector denies."""
-    y = s.inverse @ f_axis
-    omega = state.x[model.OMEGA]
-    alpha_m = 0.5 * (state.alpha_m + y[:3])
-    Q_bias, spread = _bias_growth(state, s, config, dt, turning)
-    n = config.still.window
-    moved = config.offset * (omega @ omega) if turning else 0.0
-    centre = config.centre**2 if turning else 0.0
-    rates = np.array([n * config.still_rate**2, centre + moved**2, config.products_gate, config.force_gate])
-    x, P, innovation, C, nis, force_nis = _filter(state.x, state.P, alpha_m, y, s.R, Q_bias, dt, turning, rates)
-    mean_rate = 0.5 * (omega + x[model.OMEGA])
-    q_nb = multiply(state.q_nb, from_rotation_vector(dt * mean_rate))
-    q_nb = tilt_correction(q_nb, x[model.U], 1.0)
-    force_n = to_dcm(q_nb) @ (y[3:6] - x[model.B_F]) + np.array([0.0, 0.0, GRAVITY])
-    v_n = state.v_n + 0.5 * dt * (state.force_n + force_n)
-    p_n = state.p_n + 0.5 * dt * (state.v_n + v_n)
-    reference = state.reference
-    if not turning:
-        reference, spread = s.theta_b @ x[model.U], np.zeros_like(spread)
-    angle = state.angle_z + dt * mean_rate[2]
-    new = State(x, P, q_nb, angle, v_n, p_n, y[:3], force_n, spread, reference)
-    sigma = np.sqrt(np.diag(C))
-    used, force_used = nis <= config.products_gate, force_nis <= config.force_gate
-    return new, Correction(innovation, sigma, nis, used, force_nis, force_used)
-
-
-def _bias_growth(state: State, s: Sensor, config: Config, dt: float, turning: bool) -> tuple[Array, Array]:
-    """Covariance (12, 12) that biases gain in dt, and the scale-error variance (N,) then accounted for (E-37).
+@njit(cache=True)
+def _bias_growth(
+    omega: Array,
+    u: Array,
+    Q: Array,
+    theta_b: Array,
+    unit: Array,
+    spread: Array,
+    reference: Array,
+    scale: float,
+    drift: float,
+) -> tuple[Array, Array]:
+    """Covariance (12, 12) that biases gain in one step, and the scale-error variance (N,) then accounted for (E-37).
 
     A scale error e of an axis is a bias e (f - f at the last standstill): constant on a plateau, so it grows only
     while the axis reading changes, and not again for every sample.
     """
-    variance = np.full(len(state.spread), config.drift**2 * dt)
-    spread = state.spread
-    if turning:
-        f_axis = s.Q @ products(state.x[model.OMEGA]) + s.theta_b @ state.x[model.U]
-        target = (config.scale * (f_axis - state.reference)) ** 2
-        change = np.abs(target - spread)
-        if change.max() > 0.2 * max(target.max(), spread.max()):
-            variance, spread = variance + change, target
-    return (s.unit * variance) @ s.unit.T, spread
+    z = np.empty(6)
+    for k in range(6):
+        z[k] = omega[model.FIRST[k]] * omega[model.SECOND[k]]
+    target = (scale * (Q @ z + theta_b @ u - reference)) ** 2
+    change = np.abs(target - spread)
+    variance = np.full(len(spread), drift)
+    if change.max() > 0.2 * max(target.max(), spread.max()):
+        variance, spread = variance + change, target
+    return (unit * variance) @ unit.T, spread
+
+
+@njit(cache=True)
+def _navigate(
+    q_nb: Array, v_n: Array, p_n: Array, force_n: Array, omega: Array, u: Array, f_b: Array, dt: float
+) -> tuple[Array, Array, Array, Array]:
+    """Attitude by the mean rate, tilt by u; then velocity and position from f_b (E-12, E-13)."""
+    q_nb = tilt_correction(multiply(q_nb, from_rotation_vector(dt * omega)), u, 1.0)
+    new_force = to_dcm(q_nb) @ f_b
+    new_force[2] += GRAVITY
+    new_v = v_n + 0.5 * dt * (force_n + new_force)
+    return q_nb, new_v, p_n + 0.5 * dt * (v_n + new_v), new_force
+
+
+def step(state: State, s: Sensor, f_axis: Array, dt: float, turning: bool, config: Config) -> tuple[State, Correction]:
+    """One sample: axis readings (N,), m/s^2, dt (s) after the last; turning is what the still detector denies."""
+    y = s.inverse @ f_axis
+    omega, u, c = state.x[model.OMEGA], state.x[model.U], config
+    scale = c.scale if turning else 0.0
+    growth = _bias_growth(omega, u, s.Q, s.theta_b, s.unit, state.spread, state.reference, scale, c.drift**2 * dt)
+    force = c.centre**2 + (c.offset * float(omega @ omega)) ** 2 if turning else 0.0
+    rates = np.array([c.still.window * c.still_rate**2, force, c.products_gate, c.force_gate])
+    alpha_m = 0.5 * (state.alpha_m + y[:3])
+    x, P, innovation, C, nis, force_nis = _filter(state.x, state.P, alpha_m, y, s.R, growth[0], dt, turning, rates)
+    used, force_used = nis <= c.products_gate, force_nis <= c.force_gate
+    if not used:  # a damaged sample: its omega' must not be integrated either
+        y = np.concatenate([state.alpha_m, state.x[model.U] + state.x[model.B_F], y[6:]])
+        rates[2:] = -1.0
+        x, P, *_ = _filter(state.x, state.P, y[:3].copy(), y, s.R, growth[0], dt, True, rates)
+        P[model.OMEGA, model.OMEGA] += (c.unseen_alpha * dt) ** 2 * np.eye(3)
+    mean_rate = 0.5 * (omega + x[model.OMEGA])
+    q_nb, v_n, p_n, force_n = _navigate(
+        state.q_nb, state.v_n, state.p_n, state.force_n, mean_rate, x[model.U], y[3:6] - x[model.B_F], dt
+    )
+    reference = state.reference if turning else s.theta_b @ x[model.U]
+    angle = state.angle_z + dt * float(mean_rate[2])
+    new = State(x, P, q_nb, angle, v_n, p_n, y[:3], force_n, growth[1], reference)
+    return new, Correction(innovation, np.sqrt(np.diag(C)), nis, used, force_nis, force_used)
 
 
 class ProductsEkf:
@@ -256,7 +280,7 @@ class ProductsEkf:
 
     def _hold(self, f_axis: Array, dt: float) -> None:
         self._standstill.add(f_axis)
-        if self._standstill.samples >= self.config.still.window:
+        if self._standstill.samples and self._standstill.samples % self.config.still.window == 0:
             self._detector.learn(self._standstill.mean(), self._standstill.samples)
         self._held.append((self.state, f_axis, dt))
         if len(self._held) > self.config.replay:

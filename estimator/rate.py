@@ -146,13 +146,19 @@ class ProductsRate:
         """See RateEstimator.skip; the next step predicts across the gap."""
         self._core.gap()
 
+    @property
+    def refused(self) -> dict[str, int]:
+        """Corrections not used because their NIS was beyond its gate: by the products, by gravity ("force")."""
+        return dict(self._core.refused)
+
     def _running(self, f_axis: Array) -> RateState:
         core, state, correction = self._core, self._core.state, self._core.correction
         x = state.x
         field = core.sensor.inverse @ f_axis
+        unseen = core.config.unseen_rate**2 if core.still else 0.0
         return RateState(
             omega_b=x[model.OMEGA].copy(),
-            P=state.P[model.OMEGA, model.OMEGA].copy(),
+            P=state.P[model.OMEGA, model.OMEGA] + unseen * np.eye(3),
             alpha_b=field[:3] - x[model.B_ALPHA],
             f_b=field[3:6] - x[model.B_F],
             q_nb=state.q_nb.copy(),

@@ -163,7 +163,7 @@ class TableTest:
         )
 
     def pulses(self, start_s: float, end_s: float) -> list[Pulse]:
-        """Tachometer edges with start_s <= t < end_s, in order; rounded to nothing, as the light falls."""
+        """Tachometer edges with start_s < t <= end_s, in order."""
         pitch = 2.0 * np.pi / self.pulses_per_rev
         step = 0.25 * pitch / max(self.profile.max_rate, 1e-3)
         n = max(2, int(np.ceil((end_s - start_s) / min(step, 0.01))) + 1)
@@ -178,7 +178,7 @@ class TableTest:
             middle = 0.5 * (low + high)
             before = (self.profile.motion(middle)[0] < edge) == rising
             low, high = np.where(before, middle, low), np.where(before, high, middle)
-        return [Pulse(float(s), 1 if up else -1) for s, up in zip(high, rising, strict=True) if start_s <= s < end_s]
+        return [Pulse(float(s), 1 if up else -1) for s, up in zip(high, rising, strict=True)]
 
     def _attitude(self, angle: Array, rate: Array, acceleration: Array) -> tuple[Array, Array]:
         """C_nb (n, 3, 3) and its second time derivative, from cos and sin of the angle and their derivatives."""

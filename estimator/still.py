@@ -14,6 +14,7 @@ question is for that; none of them can help when the rate is wrong as well.
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from estimator.layout import Layout
@@ -43,6 +44,32 @@ def quiet_map(layout: Layout) -> Array:
     return np.delete(layout.field_inverse, slice(3, 6), axis=0)
 
 
+@njit(cache=True)
+def _statistics(
+    ring: Array, newest: int, quiet: Array, reference: Array, long_weight: Array, short_weight: Array, short: int
+) -> tuple[float, float, float]:
+    """Mean square scatter, and chi-squares of the quiet quantities over the whole ring and its newest samples."""
+    window, axes = ring.shape
+    mean, recent, scatter = np.zeros(axes), np.zeros(axes), 0.0
+    for k in range(window):
+        mean += ring[k] / window
+    for k in range(window):
+        for i in range(axes):
+            scatter += (ring[k, i] - mean[i]) ** 2
+    for k in range(1, short + 1):
+        recent += ring[(newest - k) % window] / short
+    off, off_recent = quiet @ mean - reference, quiet @ recent - reference
+    long_square = np.sum(off * (long_weight @ off))
+    return scatter / ((window - 1) * axes), long_square, np.sum(off_recent * (short_weight @ off_recent))
+
+
+@njit(cache=True)
+def _exclusion(omega_b: Array, P: Array, slack: float) -> float:
+    """Chi-square of zero rate."""
+    W = P + slack * np.eye(3)
+    return np.sum(omega_b * np.linalg.solve(W, omega_b))
+
+
 class StillDetector:
     """Ring of the newest samples; `update` answers for the newest. Deterministic, no time of day."""
 
@@ -52,7 +79,8 @@ class StillDetector:
         self._map = np.ascontiguousarray(quiet_map)
         covariance = config.sigma_axis**2 * quiet_map @ quiet_map.T
         self._covariance = covariance
-        self._weight = {n: self._weights(n, 0) for n in (config.window, config.short_window)}
+        self._long = self._weights(config.window, 0)
+        self._short = self._weights(config.short_window, 0)
         self._ring = np.zeros((config.window, axes))
         self._filled = 0
         self._next = 0
@@ -68,8 +96,8 @@ class StillDetector:
         """The mean (axes,) of `samples` readings of a standstill becomes the reference of `quiet`."""
         self._reference = self._map @ mean_axis
         self._reference_samples = samples
-        for n in self._weight:
-            self._weight[n] = self._weights(n, samples)
+        self._long = self._weights(self.config.window, samples)
+        self._short = self._weights(self.config.short_window, samples)
 
     def mean(self) -> Array:
         """Mean of the window, (axes,), m/s^2."""
@@ -81,33 +109,18 @@ class StillDetector:
         self._ring[self._next] = f_axis
         self._next = (self._next + 1) % c.window
         self._filled = min(self._filled + 1, c.window)
-        mean = self._ring.mean(axis=0)
-        if self._filled < c.window or not self._spread_is_noise(mean):
+        scatter, long, short = _statistics(
+            self._ring, self._next, self._map, self._reference, self._long, self._short, c.short_window
+        )
+        if self._filled < c.window or scatter > c.spread_limit * c.sigma_axis**2:
             self._quiet_for = self._slow_for = 0
             return False
-        W = P + c.rate_slack**2 * np.eye(3)
-        slow = bool(omega_b @ np.linalg.solve(W, omega_b) < c.rate_limit)
-        if self._is_quiet(mean):
+        slow = _exclusion(omega_b, P, c.rate_slack**2) < c.rate_limit
+        if self._reference_samples == 0 or max(long, short) <= c.quiet_limit:
             self._quiet_for, self._slow_for = self._quiet_for + 1, 0
-            return slow or self._quiet_for * dt >= c.patience_s
+            return bool(slow or self._quiet_for * dt >= c.patience_s)
         self._quiet_for, self._slow_for = 0, self._slow_for + 1 if slow else 0
-        return self._slow_for * dt >= 2.0 * c.patience_s
-
-    def _spread_is_noise(self, mean: Array) -> bool:
-        c = self.config
-        scatter = np.sum((self._ring - mean) ** 2)
-        return bool(scatter <= c.spread_limit * (c.window - 1) * self._ring.shape[1] * c.sigma_axis**2)
-
-    def _is_quiet(self, mean: Array) -> bool:
-        c = self.config
-        if self._reference_samples == 0:
-            return True
-        newest = self._ring[(self._next - 1 - np.arange(c.short_window)) % c.window].mean(axis=0)
-        for n, value in ((c.window, mean), (c.short_window, newest)):
-            off = self._map @ value - self._reference
-            if off @ self._weight[n] @ off > c.quiet_limit:
-                return False
-        return True
+        return bool(self._slow_for * dt >= 2.0 * c.patience_s)
 
     def _weights(self, n: int, reference_samples: int) -> Array:
         covariance = self._covariance / n + self.config.drift**2 * np.eye(len(self._covariance))
