@@ -22,7 +22,6 @@ from messages import gyrofree_pb2 as pb
 from messages import topics as tp
 from messages.bus import BusSettings, Publishers, open_client, open_router
 
-
 # Chromium without a GPU: WebGL is drawn in software.
 FLAGS = ["--no-sandbox", "--disable-background-networking", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
@@ -319,7 +318,8 @@ def test_a_port_in_use_is_an_error_with_its_remedy(bus, free_port):
 
 @pytest.mark.browser
 def test_browser_shows_the_cube_as_the_truth_has_it(bus):
-    sync_api = pytest.importorskip("playwright.sync_api")
+    from playwright import sync_api  # here: only this test needs it
+
     store = Store()
     feeder = Feeder(Direct(store))
     for k in range(700):
@@ -328,7 +328,7 @@ def test_browser_shows_the_cube_as_the_truth_has_it(bus):
     try:
         with sync_api.sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=FLAGS)
-            page = browser.new_page(viewport={"width": 1440, "height": 900})
+            page = browser.new_page(viewport={"width": 800, "height": 500})
             errors = []
             page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
             page.goto(f"http://127.0.0.1:{handle.port}/")

@@ -208,7 +208,7 @@ def _truth(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.Trut
 
 
 def _rate(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.RateEstimate) -> None:
-    nis = m.nis if m.innovation else np.nan
+    nis = m.nis if m.nis_dof else np.nan
     row = _three(m.omega_ib_b_radps) + _sigmas(m.omega_covariance) + _three(m.f_b_mps2) + [m.angle_z_rad, nis]
     row += _three(m.p_n_m) + _six(m.innovation) + _six(m.innovation_sigma) + [m.nis_dof]
     _ring(device, topic, estimator, 27).append(t, row)

@@ -16,6 +16,7 @@ from dashboard.scene.store import (
     RATE_NIS,
     RATE_NIS_DOF,
 )
+from estimator.layout import PRODUCTS
 
 INSIDE = 0.95  # share of NIS values that an honest filter has between the two bounds
 
@@ -94,6 +95,5 @@ class Innovations(Panel):
                 )
 
 
-_PRODUCTS = ["ω<sub>x</sub>²", "ω<sub>y</sub>²", "ω<sub>z</sub>²"] + [
-    f"ω<sub>{a}</sub>ω<sub>{b}</sub>" for a, b in ("xy", "xz", "yz")
-]
+# The products w_i w_j in the estimators' order.
+_PRODUCTS = [f"ω<sub>{'xyz'[i]}</sub>ω<sub>{'xyz'[j]}</sub>" for i, j in zip(*PRODUCTS, strict=True)]
