@@ -11,8 +11,7 @@ from dashboard.auth import Role
 from dashboard.control import ControlError, Device
 from dashboard.front import Asker, Front, asker, front_of, needs
 from messages import gyrofree_pb2 as pb
-from sessions.catalogue import SessionInfo
-from sessions.manifest import SessionError
+from sessions.catalogue import SessionError, SessionInfo
 
 routes = APIRouter(prefix="/api")
 RECORDER_STALE_S = 5.0
@@ -96,7 +95,7 @@ class SessionOut(BaseModel):
     sources: list[str]
     start_s: float = Field(description="s since 1970, UTC")
     seconds: float
-    state: str = Field(description="open, closed, recovered or unreadable")
+    state: str = Field(description="recording, open (cut off, not recovered yet), closed, recovered or unreadable")
     bytes: int
     messages: int
     lost: int
@@ -137,30 +136,32 @@ def device_out(device: Device, age_s: float, stale: bool) -> DeviceOut:
     )
 
 
-def session_out(info: SessionInfo) -> SessionOut:
-    """One recorded session as JSON."""
+def session_out(info: SessionInfo, recording: str = "") -> SessionOut:
+    """One recorded session as JSON; `recording` is the id of the one that is being written now."""
     expected = info.messages + info.lost
+    now = info.state == "open" and info.id == recording
     return SessionOut(
         id=info.id,
         devices=list(info.devices),
-        sources=[source.lower() for source in info.sources],
+        sources=[source.lower() for source in info.sources if source != "UNKNOWN" or len(info.sources) == 1],
         start_s=info.start_utc_ns / 1e9,
         seconds=info.seconds,
-        state=info.state,
+        state="recording" if now else info.state,
         bytes=info.bytes,
         messages=info.messages,
         lost=info.lost,
         completeness=info.messages / expected if expected else None,
         note=info.note,
-        problem=info.problem,
-        downloadable=info.path is not None,
+        problem="" if now else info.problem,
+        downloadable=info.path is not None and info.state != "open",
     )
 
 
 def list_sessions(front: Front, text: str = "") -> list[SessionOut]:
     """Sessions whose id, device, note, source or state contains all words of `text`; newest first."""
     try:
-        rows = [session_out(info) for info in front.catalogue.list()]
+        now = recording_out(front)
+        rows = [session_out(info, now.session if now.recording else "") for info in front.catalogue.list()]
     except SessionError as error:
         raise HTTPException(503, str(error)) from None
     words = text.lower().split()
@@ -285,7 +286,8 @@ def sessions(request: Request, who: SignedIn, q: Annotated[str, Query(max_length
 
 @routes.get("/sessions/{session}", summary="One recorded session")
 def session(request: Request, session: str, who: SignedIn) -> SessionOut:
-    return session_out(find_session(front_of(request), session))
+    now = recording_out(front_of(request))
+    return session_out(find_session(front_of(request), session), now.session if now.recording else "")
 
 
 @routes.get("/sessions/{session}/download", summary="Its MCAP file", response_class=FileResponse)

@@ -23,7 +23,7 @@ from sessions.catalogue import Catalogue
 log = logging.getLogger(__name__)
 
 STOP_LOOK_S = 0.1  # s between two looks at the stop event
-GRACE_S = 2  # s, for answers under way when the process ends
+GRACE_S = 1  # s, for answers under way when the process ends
 
 
 class PortTaken(OSError):
@@ -67,6 +67,7 @@ def serve(front: Front, bound: socket.socket, stop: threading.Event) -> None:
     config = uvicorn.Config(
         create_app(front),
         log_config=None,
+        log_level="warning",  # our own line says where the dashboard is
         access_log=False,  # it would write the tokens of sign-in links
         ws_max_size=settings.message_limit,
         ws_per_message_deflate=False,  # the scene is compressed already

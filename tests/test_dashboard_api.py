@@ -189,7 +189,9 @@ def test_record_download_and_replay_through_the_real_recorder(bus, tmp_path):
             started = client.post("/api/recording/start", json={"name": "bench", "note": "first <b>run</b>"})
             assert started.status_code == 200 and started.json()["recording"], started.text
             wait_for(lambda: client.get("/api/recording").json()["messages"] > 10, "messages recorded")
-            assert client.get(f"/api/sessions/{started.json()['session']}/download").status_code == 409
+            running = f"/api/sessions/{started.json()['session']}"
+            assert client.get(running).json()["state"] == "recording"
+            assert client.get(running + "/download").status_code == 409
             assert client.post("/api/recording/stop").json()["recording"] is False
             (row,) = client.get("/api/sessions", params={"q": "BENCH cube"}).json()
             assert row["state"] == "closed" and row["completeness"] == 1.0 and row["sources"] == ["simulated"]
