@@ -68,6 +68,11 @@ class DeviceClock:
         self.residual_s = 0.0
         self.span_s = 0.0
 
+    @property
+    def started(self) -> bool:
+        """True from the first receipt on."""
+        return self._line is not None
+
     def add(self, device_us: int, host_ns: int) -> None:
         """One receipt: device time of the frame and host monotonic time of its last byte."""
         if self._line is None:

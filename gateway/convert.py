@@ -4,7 +4,7 @@ from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
 
 from firmware_protocol.codec import FLAG_SIMULATED
 from firmware_protocol.frames import Hello, Imu6, Status
-from gateway.gnss import Fix
+from gateway.gnss_fix import Fix
 from messages import gyrofree_pb2 as pb
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, CGPM 1901

@@ -117,6 +117,8 @@ class DeviceLink:
         if frame.epoch != self._epoch or self.ledger.reboots != self._reboots:
             self._restart(frame.epoch)
         self._flags = frame.flags
+        if not self.clock.started:  # later only from frames that leave with their last datum
+            self.clock.add(frame.t_us, received_ns)
         match frame.payload:
             case Acc12() | Imu6() as payload if payload.counts:
                 last_us = frame.t_us + (len(payload.counts) - 1) * payload.period_ns // 1000

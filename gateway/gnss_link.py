@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from gateway.clock import DeviceClock
-from gateway.gnss import Fix, GnssDecoder, unroll_weeks
+from gateway.gnss import GnssDecoder
+from gateway.gnss_fix import Fix, unroll_weeks
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ class Journal:
     """
 
     def __init__(
-        self, folder: Path, max_bytes: int = 2 << 30, segment_bytes: int = 16 << 20, sync_s: float = 0.5
+        self, folder: Path, max_bytes: int = 2 << 30, segment_bytes: int = 4 << 20, sync_s: float = 0.5
     ) -> None:
         self.folder = folder
         self.max_bytes = max_bytes

@@ -38,7 +38,7 @@ class GatewaySettings(BaseModel):
     devices: list[DeviceSettings] = Field(default_factory=list)
     journal: Path = Path("journal")  # folder; one sub-folder per device
     journal_bytes: int = Field(default=2 << 30, ge=1 << 20)  # bytes kept per device, oldest segments go first
-    segment_bytes: int = Field(default=16 << 20, ge=1 << 16)  # bytes, size at which a new segment starts
+    segment_bytes: int = Field(default=4 << 20, ge=1 << 16)  # bytes; a history query reads whole segments
     sync_s: float = Field(default=0.5, gt=0.0, le=60.0)  # s between fdatasync calls: what a power cut may cost
 
     @model_validator(mode="after")

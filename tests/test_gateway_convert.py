@@ -7,7 +7,7 @@ from firmware_protocol.codec import FLAG_SIMULATED
 from firmware_protocol.frames import Hello, Imu6, SensorInfo, Status
 from gateway import convert
 from gateway.batch import Batch, Index, Joiner
-from gateway.gnss import AUTONOMOUS, Fix
+from gateway.gnss_fix import AUTONOMOUS, Fix
 from gateway.settings import DeviceSettings, GatewaySettings
 from messages import gyrofree_pb2 as pb
 

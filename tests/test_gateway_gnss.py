@@ -8,14 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from gateway.gnss import (
-    DAY_NS,
-    RTK_FIXED,
-    WEEK_ROLLOVER_NS,
-    GnssDecoder,
-    tod_of,
-    unroll_weeks,
-)
+from gateway.gnss import GnssDecoder
+from gateway.gnss_fix import DAY_NS, RTK_FIXED, WEEK_ROLLOVER_NS, tod_of, unroll_weeks
 from gateway.gnss_link import GnssLink
 from gateway.gnss_stream import GnssStream, nmea_checksum
 from gateway.player import LOG_EPOCH_S

@@ -1,7 +1,6 @@
 """The journal: what was said is kept, whatever happens to disk and process."""
 
 import random
-import resource
 import signal
 import subprocess
 import sys
@@ -83,18 +82,16 @@ def test_any_damage_costs_only_the_records_it_hits(tmp_path):
 
 def test_oldest_segments_go_first_and_history_says_what_is_left(tmp_path):
     journal = Journal(tmp_path, max_bytes=20_000, segment_bytes=2_000, sync_s=0.01)
-    for _ in range(10):
-        fill(journal, 50)
-        wait_for(lambda: journal.durable_seq == journal.last_seq)
-    wait_for(lambda: sum(p.stat().st_size for p in tmp_path.glob("*.gfj")) <= 22_000)
+    fill(journal, 500)
+    journal.close()
+    assert sum(p.stat().st_size for p in tmp_path.glob("*.gfj")) <= 20_000
     kept = journal.first_kept()
-    assert 300 < kept <= 500
+    assert 300 < kept <= 400
     got = [r.sequence for r in records(b"".join(journal.history(1, 10**9)))]
     assert got == list(range(kept, 501))
     assert [r.sequence for r in records(b"".join(journal.history(480, 490)))] == list(range(480, 491))
     capped = [r.sequence for r in records(b"".join(journal.history(kept, 10**9, max_bytes=1000)))]
     assert capped == list(range(kept, kept + len(capped))) and 5 < len(capped) < 12
-    journal.close()
 
 
 FULL = """
@@ -139,8 +136,3 @@ def test_killed_while_writing(tmp_path):
     last = journal.last_seq
     journal.close()
     assert last > 100 and [r.sequence for r in all_records(tmp_path)] == list(range(1, last + 1))
-
-
-def test_limits_are_restored():
-    """The full-disk test limits only its own child."""
-    assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] != 5000

@@ -9,7 +9,8 @@ from firmware_protocol.codec import Deframer, Frame
 from firmware_protocol.frames import Acc12, Gps, Hello, Imu6, Status, Tacho
 from firmware_protocol.ledger import Ledger
 from gateway.convert import imu_si
-from gateway.gnss import RTK_FIXED, GnssDecoder
+from gateway.gnss import GnssDecoder
+from gateway.gnss_fix import RTK_FIXED
 from gateway.player import CUBE, PlayError, load
 from gateway.virtual_board import PLAYED, BoardImu, VirtualBoard
 
