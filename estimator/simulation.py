@@ -108,8 +108,10 @@ class TableTest:
         centre_b: tuple[float, float, float] = (0.0, 0.0, 0.0),
         pulses_per_rev: int = 360,
         layout: Layout | None = None,
+        run: int = 0,
     ) -> None:
-        """half_side in m, tilt in rad, centre_b (m) from the table's axis to the body's centre.
+        """half_side in m, tilt in rad, centre_b (m) from the table's axis to the body's centre. `run` draws other
+        noise for the same sensors.
 
         Raises ValueError for a profile that is not in PROFILES or a rate that is not positive.
         """
@@ -124,6 +126,7 @@ class TableTest:
         self.sensor = sensor
         self._rate_hz = rate_hz
         self._seed = seed
+        self._run = [run] if run else []
         self._tilt = tilt
         self._arms = self.layout.r_b + np.asarray(centre_b)
         self._centre = np.asarray(centre_b, dtype=np.float64)
@@ -211,7 +214,7 @@ class TableTest:
         return np.einsum("tji,tkj->tki", C_nb, felt_n)
 
     def _read(self, number: int, f_axis: Array) -> tuple[NDArray[np.int64], Array]:
-        draw = np.random.default_rng([self._seed, 1, number])
+        draw = np.random.default_rng([self._seed, 1, number, *self._run])
         noise = draw.normal(0.0, 1.0, f_axis.shape) * self.sensor.noise
         read = f_axis * self.scale + self.bias + noise
         if self.sensor.count == 0.0:

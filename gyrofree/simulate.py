@@ -1,7 +1,8 @@
 """`gyrofree simulate`: the simulated table as a board on a line, and its truth on the bus.
 
 Samples, pulses and GPS sentences go through the wire like those of any board; only the truth goes straight to the bus,
-under its own topic, marked simulated. The wire does not wait for the bus.
+under its own topic, marked simulated. The wire does not wait for the bus. Each run of the profile is a new boot of the
+board (same sensors, other noise), so that every estimator starts over with it.
 """
 
 import datetime
@@ -112,7 +113,7 @@ def sentences(place_noise: np.ndarray, utc: datetime.datetime) -> bytes:
 
 def _receiver(seed: int) -> Iterator[BoardBytes]:
     """One epoch per second, for ever."""
-    draw = np.random.default_rng([seed, 2])
+    draw = np.random.default_rng([seed, 2, time.time_ns() & 0xFFFFFFFF])  # the sky is another in each run
     for number in itertools.count():
         noise = draw.normal(0.0, 1.0, 3) * GPS_SIGMA
         yield BoardBytes(number * GPS_PERIOD + 0.005, sentences(noise, datetime.datetime.now(datetime.UTC)))
@@ -138,19 +139,30 @@ def _table(test: TableTest, truths: TruthPublisher) -> Iterator[Item]:
 
 def run(options: Options, bus: BusSettings, stop: threading.Event) -> None:
     """Be the board until `stop` is set; raises ValueError for an unknown profile, OSError for a path or port in use."""
-    test = TableTest(seed=options.seed, profile=options.profile)
+    test = TableTest(seed=options.seed, profile=options.profile)  # before the link: an unknown profile is said at once
     link = TcpLink(options.tcp) if options.tcp is not None else PtyLink(options.link)
     truths = TruthPublisher(bus, options.device, stop)
-    epoch = int(time.time()) & 0xFF  # another number at each boot
-    truths.begin(epoch)
-    board = VirtualBoard(link, SIMULATED, epoch=epoch, firmware="simulated table")
     port = str(options.link or link.path)
     log.info("simulated cube, profile %s, seed %d, on %s", options.profile, options.seed, port)
-    items: Iterator[Item] = heapq.merge(_table(test, truths), _receiver(options.seed), key=lambda item: item.t_s)
-    if options.once:
-        items = itertools.takewhile(lambda item: item.t_s < test.profile.seconds, items)
+    first = int(time.time()) & 0xFF  # boot counters differ from those of the last process
     try:
-        board.run(items, stop, wait_for_reader=True)
+        for run_number in itertools.count():
+            test = TableTest(seed=options.seed, profile=options.profile, run=run_number)
+            _one_run(test, link, truths, (first + run_number) & 0xFF, options.seed, stop)
+            if options.once or stop.is_set():
+                return
     finally:
         link.close()
-    log.info("%d samples, %d frames built, %d dropped", board.samples, board.built, board.dropped)
+
+
+def _one_run(
+    test: TableTest, link: PtyLink | TcpLink, truths: TruthPublisher, epoch: int, seed: int, stop: threading.Event
+) -> None:
+    """One test: the board boots on the still table, and the estimators begin as the published test did."""
+    truths.begin(epoch)
+    board = VirtualBoard(link, SIMULATED, epoch=epoch, firmware="simulated table")
+    items = heapq.merge(_table(test, truths), _receiver(seed), key=lambda item: item.t_s)
+    started = time.monotonic()
+    board.run(itertools.takewhile(lambda item: item.t_s < test.profile.seconds, items), stop, wait_for_reader=True)
+    log.info("run ended: %d samples, %d frames built, %d dropped", board.samples, board.built, board.dropped)
+    stop.wait(max(0.0, started + test.profile.seconds - time.monotonic()) if board.samples else 0.0)

@@ -4,8 +4,6 @@ One demo serves all tests of this file, in the order they stand. Tests wait for 
 Screenshots are left in artefacts/.
 """
 
-import json
-import threading
 import time
 from collections import deque
 from pathlib import Path
@@ -42,7 +40,7 @@ POSE = """() => {
   return [pose('/world/estimate/products-ekf/body'), pose('/world/truth')];
 }"""
 PLOTS = """() => Object.values(window.__viserTestpoints?.uplots ?? {})
-  .map((plot) => (plot.data?.[0] ?? []).at?.(-1) ?? null)"""
+  .map((plot) => (plot.chart.data?.[0] ?? []).at?.(-1) ?? null)"""
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +69,10 @@ class Visitor:
         self.complaints = []
         self.page.on("console", lambda message: message.type == "error" and self.complaints.append(message.text))
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+
+    def leave(self):
+        """Stop drawing: a second scene on the same machine, in software, would starve the first."""
+        self.page.goto("about:blank")
 
     def sign_in(self, name):
         self.page.goto(f"{self.demo.url}/login")
@@ -167,8 +169,6 @@ def test_a_chart_has_moving_data(anna):
 def test_recording_is_started_stopped_downloaded_and_replayed(anna, tmp_path):
     page = anna.page
     button = page.locator("#record")
-    if "on" in (button.get_attribute("class") or ""):
-        pass
     expect(button).to_be_enabled(timeout=PATIENCE)
     if anna.api("recording")[1]["recording"]:
         button.click()
@@ -199,7 +199,8 @@ def test_recording_is_started_stopped_downloaded_and_replayed(anna, tmp_path):
     page.goto(anna.demo.url)
 
 
-def test_a_viewer_sees_but_cannot_operate(browser, demo, people):
+def test_a_viewer_sees_but_cannot_operate(browser, demo, people, anna):
+    anna.leave()
     victor = Visitor(browser, demo, DESKTOP)
     victor.sign_in("victor")
     assert victor.scene.evaluate(POSE)[0]
@@ -211,7 +212,8 @@ def test_a_viewer_sees_but_cannot_operate(browser, demo, people):
     victor.context.close()
 
 
-def test_desktop_page_for_the_eye(anna):
+def test_desktop_page_for_the_eye(anna, demo):
+    anna.page.goto(demo.url)
     scene = anna.scene
     until(lambda: [t for t in scene.evaluate(PLOTS) if t is not None], "no plot has data")
     time.sleep(3)  # a full window of curves; nothing is asserted on it
@@ -220,7 +222,8 @@ def test_desktop_page_for_the_eye(anna):
     assert not unexpected
 
 
-def test_phone_page_for_the_eye(browser, demo, people):
+def test_phone_page_for_the_eye(browser, demo, people, anna):
+    anna.leave()
     visitor = Visitor(browser, demo, PHONE)
     visitor.sign_in("anna")
     assert visitor.scene.evaluate(POSE)[0]
@@ -233,21 +236,20 @@ def test_phone_page_for_the_eye(browser, demo, people):
 
 
 def test_a_killed_service_comes_back_and_the_page_goes_on(anna, demo):
+    anna.page.goto(demo.url)
     victim = demo.children()["estimator"]
     victim.kill()
     demo.wait_for(r"estimator ended by signal SIGKILL: starting it again", 30)
     scene = anna.scene
-    newest = max(t for t in scene.evaluate(PLOTS) if t is not None)
+    newest = max(until(lambda: [t for t in scene.evaluate(PLOTS) if t is not None], "no plot has data"))
     until(lambda: max(t for t in scene.evaluate(PLOTS) if t is not None) > newest + 3.0, "the plots stand still")
-    assert json.loads(json.dumps(anna.api("health")[1]))
+    anna.leave()
 
 
 def test_ctrl_c_ends_everything(demo):
     children = list(demo.children().values())
     assert len(children) >= 6
-    ended = threading.Event()
     demo.__exit__()
-    ended.set()
     assert demo.process.returncode == 0
     assert "stopped cleanly" in demo.text()
     assert not any(child.is_running() and child.status() != "zombie" for child in children)
