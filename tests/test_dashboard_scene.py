@@ -270,7 +270,7 @@ def test_every_page_is_made_from_every_kind_of_device(store, page, kind):
 
 def test_colours_and_numbers():
     assert estimator_colour("a", ["a", "b"]) != estimator_colour("b", ["a", "b"])
-    assert number(None, 1, "m") == "– m" and number(float("nan")) == "–"
+    assert number(-0.01) == "0.0" and number(None, 1, "m") == "– m" and number(float("nan")) == "–"
     assert number(-1234.5, 1, "m") == "−1\u202f234.5 m"
 
 

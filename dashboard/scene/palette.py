@@ -58,6 +58,7 @@ def number(value: float | None, digits: int = 1, unit: str = "", sign: bool = Fa
     """A value with its unit, a dash for what is not known."""
     if value is None or not math.isfinite(value):
         return f"– {unit}".rstrip()
+    value = round(value, digits) + 0.0  # + 0.0: no minus before a zero
     text = f"{value:{'+' if sign else ''},.{digits}f}".replace(",", "\u202f").replace("-", "\u2212")
     return f"{text} {unit}".rstrip()
 

@@ -21,16 +21,15 @@ from dataclasses import dataclass, field
 import numpy as np
 import viser
 
+from dashboard.scene import bodies
 from dashboard.scene import geometry as geo
-from dashboard.scene.palette import FIX, GREY, ORANGE, estimator_colour, estimator_title, number, rgb, truth_colour
+from dashboard.scene.palette import FIX, estimator_colour, number, rgb, truth_colour
 from dashboard.scene.store import Device
 
 ARROW_PER_RADPS = 0.55  # half sides per rad/s; 180 deg/s gives 1.7
 ARROW_LONGEST = 2.2
 CUBE_CAMERA = (4.3, -3.6, 2.6)
 VEHICLE_CAMERA = (-17.0, -14.0, 9.0)
-
-LABEL_CORNERS = ((1, 1, 1.1), (-1, -1, 1.1), (1, -1, 1.6), (-1, 1, 1.6))  # apart, so that names do not hide another
 
 LAYERS = ("truth", "estimates", "sensors", "rate", "trajectory", "fixes", "ellipsoid", "grid")
 
@@ -120,21 +119,21 @@ class SceneView:
     def _build(self, vehicle: bool, estimators: list[str], truth: bool) -> None:
         scene, dark = self._scene, self._choice.dark
         self._nodes["/world"] = scene.add_frame("/world", show_axes=False, wxyz=geo.Q_DISPLAY_N)
-        self._grid(vehicle)
+        bodies.ground(scene, self._nodes, vehicle, dark)
         for index, name in enumerate(estimators):
             colour = estimator_colour(name, estimators)
             body = f"/world/estimate/{name}/body"
             self._nodes[body] = scene.add_frame(body, show_axes=False)
             if vehicle:
-                self._vehicle_body(body, colour)
+                bodies.vehicle(scene, self._nodes, body, colour)
                 path = f"/world/estimate/{name}/ellipsoid"
                 self._nodes[path] = scene.add_icosphere(
                     path, radius=1.0, color=rgb(colour), opacity=0.22, cast_shadow=False, visible=False
                 )
             else:
-                self._cube_body(body, colour, name, index)
+                bodies.cube(scene, self._nodes, body, colour, name, index)
         if not vehicle:
-            self._table()
+            bodies.table(scene, self._nodes, dark)
         if truth:
             self._nodes["/world/truth"] = scene.add_frame("/world/truth", show_axes=False)
             scene.add_line_segments(
@@ -144,125 +143,6 @@ class SceneView:
                 thickness=2.0,
                 thickness_units="screen",
             )
-
-    def _grid(self, vehicle: bool) -> None:
-        dark, size = self._choice.dark, 10.0 if vehicle else 1.0
-        self._nodes["/world/ground"] = self._scene.add_grid(
-            "/world/ground",
-            infinite_grid=True,
-            cell_size=size,
-            section_size=5 * size,
-            cell_color=(48, 50, 54) if dark else (222, 222, 222),
-            section_color=(74, 78, 84) if dark else (196, 196, 196),
-            fade_distance=250.0 if vehicle else 26.0,
-            fade_strength=1.5,
-            shadow_opacity=0.0,
-            position=(0.0, 0.0, 0.3 if vehicle else 1.42),
-        )
-
-    def _table(self) -> None:
-        dark = self._choice.dark
-        self._nodes["/world/table"] = self._scene.add_frame("/world/table", show_axes=False)
-        vertices, faces = geo.disc(2.3, 0.14, 96)
-        self._scene.add_mesh_simple(
-            "/world/table/disc",
-            vertices,
-            faces,
-            color=(52, 60, 70) if dark else (205, 210, 216),
-            flat_shading=True,
-            side="double",
-            cast_shadow=False,
-            receive_shadow=False,
-            position=(0.0, 0.0, -1.12),
-        )
-        angle = np.radians(np.arange(0, 360, 15))
-        inner = np.where(np.arange(len(angle)) % 6 == 0, 1.85, 2.1)
-        rim = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))])
-        marks = np.stack([rim * inner[:, None], rim * 2.26], axis=1) + [0, 0, -1.11]
-        self._scene.add_line_segments(
-            "/world/table/marks", marks.astype(np.float32), rgb(GREY), thickness=2.0, thickness_units="screen"
-        )
-
-    def _cube_body(self, body: str, colour: str, name: str, index: int) -> None:
-        scene, main = self._scene, index == 0
-        scene.add_line_segments(
-            f"{body}/edges", geo.box_edges((1, 1, 1)), rgb(colour), thickness=3.0, thickness_units="screen"
-        )
-        scene.add_box(
-            f"{body}/faces",
-            color=rgb(colour),
-            dimensions=(2.0, 2.0, 2.0),
-            opacity=0.22 if main else 0.07,
-            side="double",
-            cast_shadow=False,
-            receive_shadow=False,
-        )
-        scene.add_label(
-            f"{body}/label",
-            estimator_title(name),
-            position=LABEL_CORNERS[index % len(LABEL_CORNERS)],
-            anchor="bottom-center",
-            font_screen_scale=0.8,
-        )
-        if main:
-            self._sensors(body)
-            self._rate_arrow(body)
-
-    def _sensors(self, body: str) -> None:
-        """Twelve arrows at their corners, drawn along each sensor's direction, with the axis' name at the tip."""
-        start, direction = geo.SENSORS_B, geo.DIRECTIONS_B
-        group = f"{body}/axes"
-        self._nodes[group] = self._scene.add_frame(group, show_axes=False)
-        colours = np.tile(np.array([rgb(c) for c in _SENSOR_COLOURS], dtype=np.uint8), (4, 1))
-        self._scene.add_arrows(
-            f"{group}/arrows",
-            np.stack([start, start + 0.42 * direction], axis=1).astype(np.float32),
-            colours,
-            shaft_radius=0.022,
-            head_radius=0.055,
-            head_length=0.13,
-        )
-        for i in range(12):
-            self._scene.add_label(
-                f"{group}/a{i // 3 + 1}{i % 3 + 1}",
-                f"a{i // 3 + 1}{i % 3 + 1}",
-                position=tuple(start[i] + 0.5 * direction[i]),
-                anchor="center-center",
-                font_screen_scale=0.62,
-            )
-
-    def _rate_arrow(self, body: str) -> None:
-        path = f"{body}/rate"
-        points = np.array([[[0, 0, 0], [0, 0, 0.01]]], dtype=np.float32)
-        self._nodes[path] = self._scene.add_arrows(
-            path, points, rgb(ORANGE), shaft_radius=0.045, head_radius=0.11, head_length=0.24
-        )
-        self._nodes[f"{path}_label"] = self._scene.add_label(
-            f"{path}_label", "", anchor="center-left", font_screen_scale=0.9
-        )
-
-    def _vehicle_body(self, body: str, colour: str) -> None:
-        scene = self._scene
-        scene.add_line_segments(
-            f"{body}/edges", geo.vehicle_edges(), rgb(colour), thickness=3.0, thickness_units="screen"
-        )
-        scene.add_box(
-            f"{body}/faces",
-            color=rgb(colour),
-            dimensions=(4.4, 1.8, 0.6),
-            position=(0.0, 0.0, -0.6),
-            opacity=0.45,
-            cast_shadow=False,
-            receive_shadow=False,
-        )
-        self._nodes[f"{body}/heading"] = scene.add_arrows(
-            f"{body}/heading",
-            np.array([[[2.2, 0, -0.6], [5.5, 0, -0.6]]], dtype=np.float32),
-            rgb(ORANGE),
-            shaft_radius=0.12,
-            head_radius=0.35,
-            head_length=0.8,
-        )
 
     # --- updating -------------------------------------------------------------------------------------------------
 
@@ -369,5 +249,4 @@ class SceneView:
                 )
 
 
-_SENSOR_COLOURS = ("#D55E00", "#009E73", "#56B4E9")
 _TAILS = {"body": "estimates", "axes": "sensors", "ellipsoid": "ellipsoid", "ground": "grid"}
