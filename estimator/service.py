@@ -23,8 +23,8 @@ from estimator.settings import EstimatorSettings, LayoutSettings
 from estimator.stream import Stream, every, worth_a_line
 from estimator.warm import warm
 from messages import gyrofree_pb2 as pb
-from messages.bus import BusSettings, BusUnavailable, Publishers, open_client, subscribe
-from messages.topics import ACCEL, ESTIMATOR, GNSS, IMU, INNOVATION, NAV, POSE, RATE, Topic
+from messages.bus import BusSettings, BusUnavailable, Publishers, decode, open_client
+from messages.topics import ACCEL, ESTIMATOR, GNSS, IMU, INNOVATION, NAV, POSE, RATE, Topic, TopicError, parse
 
 log = logging.getLogger(__name__)
 
@@ -285,16 +285,26 @@ def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) ->
         service = Service(pipeline, lambda o: publishers.put(o.topic, o.device, o.message, o.estimator))
         worker = threading.Thread(target=service.work, args=(stop,), name="estimator", daemon=True)
         worker.start()
-        subscribers = [subscribe(session, topic, bus.prefix, _on(service, topic)) for topic in INPUTS]
+        # One subscriber for all topics: each has a thread of its own, and a fix must not overtake its samples.
+        subscriber = session.declare_subscriber(f"{bus.prefix}/*/*", _on(service))
         log.info("estimating: rate %s; navigation %s", ", ".join(settings.rate), ", ".join(settings.navigators))
         stop.wait()
-        for subscriber in subscribers:
-            subscriber.undeclare()
+        subscriber.undeclare()
         service.finish()
         worker.join(timeout=3.0)
     if service.failure is not None:
         raise service.failure
 
 
-def _on(service: Service, topic: Topic) -> Callable[[str, Message], None]:
-    return lambda _key, message: service.offer(topic, message)
+def _on(service: Service) -> Callable[[Any], None]:
+    def on_sample(sample: Any) -> None:
+        try:
+            topic = parse(str(sample.key_expr)).topic
+        except TopicError:
+            return
+        if topic in INPUTS:
+            message = decode(topic, sample.payload.to_bytes())
+            if message is not None:
+                service.offer(topic, message)
+
+    return on_sample
