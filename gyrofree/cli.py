@@ -2,6 +2,7 @@
 
 import importlib.metadata
 import json
+import logging
 import sys
 import threading
 from pathlib import Path
@@ -14,6 +15,8 @@ from rich.table import Table
 from gyrofree.config import ConfigError, Settings, load_or_default
 from gyrofree.process import EXIT_CONFIG as CONFIG
 from gyrofree.process import EXIT_FAILED, fail, run_service
+
+log = logging.getLogger(__name__)
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -106,9 +109,7 @@ def router(config: Config = None, verbose: Verbose = False) -> None:
         from messages.bus import open_router
 
         with open_router(settings.bus):
-            import logging
-
-            logging.getLogger(__name__).info("router listens on %s", ", ".join(settings.bus.listen))
+            log.info("router listens on %s", ", ".join(settings.bus.listen))
             stop.wait()
 
     run_service(body, verbose)
@@ -135,7 +136,10 @@ def estimator(config: Config = None, verbose: Verbose = False) -> None:
     def body(stop: threading.Event) -> None:
         from estimator import service
 
-        service.run(settings.estimator, settings.bus, stop)
+        try:
+            service.run(settings.estimator, settings.bus, stop)
+        except service.UnknownEstimator as error:
+            raise ConfigError(str(error)) from None
 
     run_service(body, verbose)
 
@@ -182,6 +186,10 @@ def simulate(
     Attach a gateway to the printed port. The true motion goes to the bus as its own topic, marked simulated.
     """
     settings = _settings(config)
+    from estimator.profiles import PROFILES
+
+    if profile not in PROFILES:
+        raise fail(f"--profile {profile!r}: want one of {', '.join(PROFILES)}", CONFIG)
 
     def body(stop: threading.Event) -> None:
         from gyrofree import simulate as simulator
