@@ -204,7 +204,7 @@ class VirtualBoard:
         self.pulses += len(pulses)
 
     def _t_us(self, t_s: float) -> int:
-        return int((t_s - (self._start_s or 0.0)) * 1e6)
+        return int((t_s - (self._start_s or 0.0)) * 1e6 + 1e-3)  # floor, but not below by the rounding of floats
 
     def _send(self, payload: Payload, t_s: float) -> None:
         flags = self._flags | (FLAG_DROPPED if self._dropped_before else 0)
