@@ -3,7 +3,7 @@
 FROM python:3.11-slim-bookworm AS build
 RUN python3 -m venv /opt/gyrofree/venv
 ENV PATH=/opt/gyrofree/venv/bin:$PATH PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1
-WORKDIR /src
+WORKDIR /opt/gyrofree/src
 COPY requirements/build.txt requirements/runtime.txt requirements/
 RUN pip install --require-hashes -r requirements/build.txt -r requirements/runtime.txt
 COPY pyproject.toml README.md LICENSE NOTICE ./
@@ -14,10 +14,9 @@ COPY estimator estimator
 COPY sessions sessions
 COPY dashboard dashboard
 COPY gyrofree gyrofree
-RUN pip install --no-deps --no-build-isolation .
-# The filters are compiled here, so that a start takes no half minute. The cache knows the path of the source: run it
-# from where the image will, not from /src.
-WORKDIR /
+# Editable, as `make setup` does it: what runs is the folders above, with their templates and sub-packages.
+RUN pip install --no-deps --no-build-isolation --editable .
+# The filters are compiled here, so that a start takes no half minute; the cache knows the path of its source.
 RUN NUMBA_CACHE_DIR=/opt/gyrofree/numba python -m estimator.warm
 
 FROM python:3.11-slim-bookworm
