@@ -2,8 +2,9 @@
 
 A real router and publisher run in this process, the recorder in its own, whose CPU time (user and system, all
 threads) is read before and after. Twelve axes at 1000 samples/s, first as a gateway sends them, ten to a message,
-which is what the limit is for; then, for comparison, one to a message. A bare Zenoh subscriber that does nothing took 1.6
-to 2.0 % and 5 % of a core on a busy two-core machine: most of both figures is the bus. Usage: python tests/bench/bench_recorder.py [seconds]
+which is what the limit is for; then, for comparison, one to a message. A bare Zenoh subscriber
+that does nothing took 1.6 to 2.0 % and 5 % of a core on a busy two-core machine: most of both figures is the bus.
+Usage: python tests/bench/bench_recorder.py [seconds]
 """
 
 import json
