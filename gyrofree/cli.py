@@ -12,7 +12,9 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from gyrofree.config import ConfigError, Settings, load_or_default
+from gyrofree import cli_users
+from gyrofree.cli_options import AsJson, Config, Speed, Verbose, settings_of
+from gyrofree.config import ConfigError
 from gyrofree.process import EXIT_CONFIG as CONFIG
 from gyrofree.process import EXIT_FAILED, fail, run_service
 
@@ -27,12 +29,7 @@ app = typer.Typer(
     "`gyrofree demo` shows everything on one page; the other commands are its parts.",
 )
 
-Config = Annotated[
-    Path | None, typer.Option("--config", "-c", help="Configuration file; default ./gyrofree.toml if it is there.")
-]
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Log details too.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON on standard output.")]
-Speed = Annotated[float, typer.Option(min=0.1, max=100.0, help="Seconds of the log per second.")]
+app.add_typer(cli_users.app, name="users")
 
 
 def _show_version(wanted: bool) -> None:
@@ -48,13 +45,6 @@ def _root(
     ] = False,
 ) -> None:
     pass
-
-
-def _settings(path: Path | None) -> Settings:
-    try:
-        return load_or_default(path)
-    except ConfigError as error:
-        raise fail(str(error), CONFIG) from None
 
 
 @app.command()
@@ -103,7 +93,7 @@ def _check_log(path: Path, gnss: Path | None = None) -> str:
 @app.command()
 def router(config: Config = None, verbose: Verbose = False) -> None:
     """Route the bus: the Zenoh session that all others connect to."""
-    settings = _settings(config)
+    settings = settings_of(config)
 
     def body(stop: threading.Event) -> None:
         from messages.bus import open_router
@@ -118,7 +108,7 @@ def router(config: Config = None, verbose: Verbose = False) -> None:
 @app.command()
 def gateway(config: Config = None, verbose: Verbose = False) -> None:
     """Read the boards of [[gateway.devices]], journal every byte, publish samples."""
-    settings = _settings(config)
+    settings = settings_of(config)
 
     def body(stop: threading.Event) -> None:
         from gateway import service
@@ -131,7 +121,7 @@ def gateway(config: Config = None, verbose: Verbose = False) -> None:
 @app.command()
 def estimator(config: Config = None, verbose: Verbose = False) -> None:
     """Turn the samples on the bus into rate, attitude and navigation, several estimators side by side."""
-    settings = _settings(config)
+    settings = settings_of(config)
 
     def body(stop: threading.Event) -> None:
         from estimator import service
@@ -147,7 +137,7 @@ def estimator(config: Config = None, verbose: Verbose = False) -> None:
 @app.command()
 def record(config: Config = None, verbose: Verbose = False) -> None:
     """Write everything on the bus to MCAP files, when told to from the dashboard or from the start."""
-    settings = _settings(config)
+    settings = settings_of(config)
 
     def body(stop: threading.Event) -> None:
         from sessions import recorder
@@ -160,12 +150,14 @@ def record(config: Config = None, verbose: Verbose = False) -> None:
 @app.command()
 def dashboard(config: Config = None, verbose: Verbose = False) -> None:
     """Serve the web page with scene, charts, recordings and sign-in."""
-    settings = _settings(config)
+    settings = settings_of(config)
 
     def body(stop: threading.Event) -> None:
         from dashboard import service
+        from dashboard.control import ProcessReplay
 
-        service.run(settings.dashboard, settings.bus, stop)
+        replayer = [sys.executable, "-m", "gyrofree", "replay"] + (["--config", str(config)] if config else [])
+        service.run(settings.dashboard, settings.bus, stop, replay=ProcessReplay(replayer))
 
     run_service(body, verbose)
 
@@ -185,7 +177,7 @@ def simulate(
 
     Attach a gateway to the printed port. The true motion goes to the bus as its own topic, marked simulated.
     """
-    settings = _settings(config)
+    settings = settings_of(config)
     from estimator.profiles import PROFILES
 
     if profile not in PROFILES:
@@ -254,7 +246,7 @@ def replay(
     verbose: Verbose = False,
 ) -> None:
     """Send a recording through the bus again, or prove that it reproduces its estimates."""
-    settings = _settings(config)
+    settings = settings_of(config)
     from gyrofree import replay as player
 
     if listing or not session:
@@ -279,7 +271,7 @@ def doctor(
     """Check ports, permissions, clock, disk and versions, and say what to do."""
     from gyrofree import doctor as examination
 
-    settings = _settings(config)
+    settings = settings_of(config)
     services = ("router", *examination.SIGN_OF_LIFE, "dashboard")
     if health and health not in services:
         raise fail(f"--health {health!r}: want one of {', '.join(services)}", CONFIG)
@@ -295,56 +287,6 @@ def doctor(
         Console(file=sys.stdout).print(table)
     if any(finding.state == "fail" for finding in findings):
         raise typer.Exit(EXIT_FAILED)
-
-
-users = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Who may sign in to the dashboard.")
-app.add_typer(users, name="users")
-
-
-@users.command("add")
-def users_add(
-    name: Annotated[str, typer.Argument(help="User name.")],
-    role: Annotated[str, typer.Option(help="viewer looks, operator also records and drives, admin manages users.")],
-    config: Config = None,
-) -> None:
-    """Add a user or change password and role; the password is asked for, or read from standard input."""
-    from dashboard.users import UsersError, add_user
-
-    settings = _settings(config)
-    interactive = sys.stdin.isatty()
-    password = typer.prompt("Password", hide_input=True, confirmation_prompt=True) if interactive else input()
-    try:
-        add_user(settings.dashboard.users, name, password, role)
-    except UsersError as error:
-        raise fail(str(error), CONFIG) from None
-    print(f"{name} may sign in as {role}")
-
-
-@users.command("list")
-def users_list(as_json: AsJson = False, config: Config = None) -> None:
-    """Users and their roles."""
-    from dashboard.users import UsersError, load_users
-
-    try:
-        found = load_users(_settings(config).dashboard.users)
-    except UsersError as error:
-        raise fail(str(error)) from None
-    if as_json:
-        print(json.dumps([{"name": user.name, "role": user.role.name} for user in found.values()], indent=2))
-        return
-    for user in found.values():
-        print(f"{user.name}\t{user.role.name}")
-
-
-@users.command("remove")
-def users_remove(name: str, config: Config = None) -> None:
-    """Take a user's right to sign in."""
-    from dashboard.users import UsersError, remove_user
-
-    try:
-        remove_user(_settings(config).dashboard.users, name)
-    except UsersError as error:
-        raise fail(str(error)) from None
 
 
 def main() -> None:

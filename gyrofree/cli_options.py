@@ -1,0 +1,24 @@
+"""Options that several commands share."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gyrofree.config import ConfigError, Settings, load_or_default
+from gyrofree.process import EXIT_CONFIG, fail
+
+Config = Annotated[
+    Path | None, typer.Option("--config", "-c", help="Configuration file; default ./gyrofree.toml if it is there.")
+]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Log details too.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON on standard output.")]
+Speed = Annotated[float, typer.Option(min=0.1, max=100.0, help="Seconds of the log per second.")]
+
+
+def settings_of(path: Path | None) -> Settings:
+    """The configuration a command was given; ends the command with one line per fault."""
+    try:
+        return load_or_default(path)
+    except ConfigError as error:
+        raise fail(str(error), EXIT_CONFIG) from None
