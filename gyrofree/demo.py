@@ -112,7 +112,7 @@ def _supervise(plan: Plan, config: Path) -> Supervisor:
 def _sign_in_link(settings: Settings) -> str:
     """A fresh demo user with a password nobody knows, and the one-time link that signs in as it."""
     users = Path(settings.dashboard.users)
-    add_user(users, USER, secrets.token_urlsafe(24), "admin")
+    add_user(users, USER, secrets.token_urlsafe(24), "operator")
     token = issue_link_token(users, USER)
     return f"http://{settings.dashboard.host}:{settings.dashboard.port}/login/link?token={token}"
 
