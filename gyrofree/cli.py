@@ -142,7 +142,7 @@ def record(config: Config = None, verbose: Verbose = False) -> None:
     def body(stop: threading.Event) -> None:
         from sessions import recorder
 
-        recorder.run(settings.recorder, settings.bus, stop)
+        recorder.run(settings.recorder, settings.bus, stop, settings.model_dump(mode="json"))
 
     run_service(body, verbose)
 

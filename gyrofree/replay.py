@@ -44,9 +44,10 @@ def show_list(settings: Settings, as_json: bool) -> None:
 
 def check(settings: Settings, path: Path, as_json: bool) -> int:
     """Run the estimators over the recorded samples; exit code 0 when every estimate is the recorded one."""
+    from estimator.service import Pipeline
     from sessions.reproduce import reproduce
 
-    result = reproduce(path, settings.estimator)
+    result = reproduce(path, Pipeline(settings.estimator))
     if as_json:
         print(json.dumps(result.as_dict(), indent=2))
     else:

@@ -47,7 +47,7 @@ class BusSettings(BaseModel):
 
 def _config(settings: BusSettings, mode: str) -> zenoh.Config:
     config = zenoh.Config()
-    patience_us = 20_000 if mode == "router" else 100_000
+    patience_us = 100_000
     values = {
         "mode": mode,
         "scouting/multicast/enabled": False,
@@ -55,7 +55,7 @@ def _config(settings: BusSettings, mode: str) -> zenoh.Config:
         "timestamping/enabled": True,
         "transport/link/tx/lease": settings.lease_ms,
         # A process that gets no processor for a while must not lose messages at once: room for 16 batches (each
-        # express message takes one), and some patience before DROP drops; less in the router, which serves all.
+        # express message takes one), and some patience before DROP drops.
         "transport/link/tx/queue/size/data": 16,
         "transport/link/tx/queue/congestion_control/drop/wait_before_drop": patience_us,
     }

@@ -51,9 +51,7 @@ def test_no_service_shell_imports_another():
     for room in MAY_IMPORT.keys() - {"gyrofree"}:
         for path in (ROOT / room).rglob("*.py"):
             shells = {name for name in imported(path) if name.endswith(".service") and name.split(".")[0] != room}
-            # Re-running a recording is running the estimator's pipeline, which lives in its shell.
-            allowed = {"estimator.service"} if (room, path.name) == ("sessions", "reproduce.py") else set()
-            assert shells <= allowed, path
+            assert not shells, path
 
 
 def test_no_file_grows_beyond_what_a_reader_can_hold():
