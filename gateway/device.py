@@ -1,4 +1,8 @@
-"""One board: chunks in, bus messages out. Everything after the reader happens on one thread, `DeviceLink.run`."""
+"""One board: chunks in, bus messages out. Everything after the reader happens on one thread, `DeviceLink.run`.
+
+Reading and journalling need no bus. What is decoded before `go_live` only moves the counters, the clock and the state
+(sample index, HELLO, tachometer); its samples are in the journal and are never published later as if they were live.
+"""
 
 import logging
 import queue
@@ -38,13 +42,14 @@ Put = Callable[[Topic, str, Message], None]
 class DeviceLink:
     """A board from its port to the bus.
 
-    put(topic, device, message) publishes; it must not block. `run` returns when `stop` is set, at once after `wake`.
+    `run` returns when `stop` is set, at once after `wake`. Raises JournalBusy when another gateway has the journal.
     """
 
-    def __init__(self, device: DeviceSettings, settings: GatewaySettings, put: Put) -> None:
+    def __init__(self, device: DeviceSettings, settings: GatewaySettings) -> None:
         self.device = device
         self.name = device.name
-        self.put = put
+        self._put: Put | None = None  # None: there is no bus yet
+        self._next_put: Put | None = None
         self.journal = Journal(
             settings.journal / device.name, settings.journal_bytes, settings.segment_bytes, settings.sync_s
         )
@@ -67,7 +72,7 @@ class DeviceLink:
         self._joiner: dict[type, Joiner] = {Acc12: Joiner(), Imu6: Joiner()}
 
     def run(self, stop: threading.Event) -> None:
-        """Open the ports and publish until `stop` is set."""
+        """Open the ports, journal, count, and publish once live, until `stop` is set."""
         device = self.device
         self.readers = [Reader(device.port, device.baud, BOARD, self.journal, self.queue)]
         if device.gnss_port:
@@ -85,7 +90,8 @@ class DeviceLink:
             left = due - time.monotonic()
             if left <= 0:
                 self._follow_wall_clock()
-                self._publish(LINK, self.report.message(), int(time.time_ns()))
+                if self._put is not None:
+                    self._publish(LINK, self.report.message(), int(time.time_ns()))
                 due = max(due + STATUS_EVERY_S, time.monotonic())
                 continue
             held = any(joiner.waiting for joiner in self._joiner.values())
@@ -97,6 +103,14 @@ class DeviceLink:
                 continue
             if chunk is not None:
                 self.take(chunk)
+            elif self._put is not self._next_put:
+                self._put = self._next_put
+                due = time.monotonic()  # the first status at once: it says that samples follow
+
+    def go_live(self, put: Put) -> None:
+        """Publish from now on what is read from now on: put(topic, device, message), which must not block."""
+        self._next_put = put
+        self.queue.put(None)  # behind the chunks that were read without a bus
 
     def wake(self) -> None:
         """Let `run` look at its stop event now."""
@@ -144,6 +158,7 @@ class DeviceLink:
         if self._epoch is not None:
             log.warning("%s: the board restarted (boot %d -> %d)", self.name, self._epoch, epoch)
         self._send_held()
+        self.hello = self.status = None  # until the next HELLO only the frames' own flags say what they come from
         self._epoch, self._reboots = epoch, self.ledger.reboots
         self.clock.reset()
         self.tacho.reset()
@@ -153,7 +168,10 @@ class DeviceLink:
 
     def _take_samples(self, frame: Frame, payload: Acc12 | Imu6, received_ns: int) -> None:
         n = len(payload.counts)
+        self.report.samples += n
         first, lost = self._index[type(payload)].take(payload.first_index, n)
+        if self._put is None:
+            return  # nor held back for joining with live ones
         batch = Batch(first, frame.t_us, payload.period_ns, n, lost, frame.seq, received_ns, frame.flags)
         if isinstance(payload, Acc12):
             batch.stale_mask = payload.stale_mask
@@ -161,7 +179,6 @@ class DeviceLink:
             batch.columns = (counts, convert.specific_force(counts, convert.axis_scales(self.hello)))
         else:
             batch.columns = convert.imu_si(payload)
-        self.report.samples += n
         self._send(type(payload), self._joiner[type(payload)].add(batch))
 
     def _send(self, kind: type, batches: list[Batch]) -> None:
@@ -209,7 +226,7 @@ class DeviceLink:
             utc_ns = None if arrival.monotonic_ns is None else arrival.monotonic_ns + self.wall_offset_ns
             self._publish(GNSS_TOPIC, message, utc_ns, arrival.device_us)
             if message.quality:
-                self.put(LOCATION, self.name, convert.location_fix(message, self.name))
+                self._send_out(LOCATION, convert.location_fix(message, self.name))
 
     def _publish(self, topic: Topic, message: Message, utc_ns: int | None, device_us: int = 0) -> None:
         """Fill the header and put; utc_ns None: from device time."""
@@ -221,7 +238,11 @@ class DeviceLink:
         header.utc_sigma_s = self.clock.sigma_s
         header.source = convert.source(self.hello, self._flags)
         header.run = self.journal.run
-        self.put(topic, self.name, message)
+        self._send_out(topic, message)
+
+    def _send_out(self, topic: Topic, message: Message) -> None:
+        if self._put is not None:
+            self._put(topic, self.name, message)
 
     def _follow_wall_clock(self) -> None:
         """The host's UTC clock may be slewed or stepped under us; monotonic time is not."""

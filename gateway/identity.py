@@ -8,6 +8,7 @@ serves, the others wait. A killed gateway's token goes with its connection, so t
 import logging
 import threading
 import time
+from collections.abc import Callable
 
 import zenoh
 
@@ -19,8 +20,13 @@ QUERY_S = 1.0  # how long to wait for other tokens; a router answers in millisec
 RETRY_S = 2.0
 
 
-def claim(session: zenoh.Session, prefix: str, device: str, stop: threading.Event) -> zenoh.LivelinessToken | None:
-    """Wait until this gateway may serve the device; the token to undeclare at the end, None when `stop` came first."""
+def claim(
+    session: zenoh.Session, prefix: str, device: str, stop: threading.Event, on_refused: Callable[[], None]
+) -> zenoh.LivelinessToken | None:
+    """Wait until this gateway may serve the device; the token to undeclare at the end, None when `stop` came first.
+
+    on_refused() is called once, before waiting, when another gateway has the name.
+    """
     base = f"{check_name(prefix)}/{check_name(device)}/gateway"
     said = False
     while not stop.is_set():
@@ -35,11 +41,12 @@ def claim(session: zenoh.Session, prefix: str, device: str, stop: threading.Even
         if not said:
             log.error(
                 "%s: another gateway serves this device name (%s); refused. Stop the other one, or give this board "
-                "another `name` in [[gateway.devices]]; waiting until the name is free",
+                "another `name` in [[gateway.devices]]; here it is neither read nor journalled until the name is free",
                 device,
                 older[0].rsplit("-", 1)[1],
             )
             said = True
+            on_refused()
         stop.wait(RETRY_S)
     return None
 

@@ -3,9 +3,12 @@
 A journal is a folder of segment files of one device (journal_file.py says what stands in them). One write per read; a
 thread calls fdatasync, which may take half a second and must never hold up the reader. `durable_seq` is what has
 reached the disk. Sequence numbers go on over restarts; `run` is new at every start. A tail that a crash has torn is
-cut at the next start.
+cut at the next start. A lock on the file `lock` in the folder keeps a second gateway out; the system frees it when the
+process ends, however that happens.
 """
 
+import errno
+import fcntl
 import logging
 import os
 import threading
@@ -20,10 +23,21 @@ log = logging.getLogger(__name__)
 RETRY_S = 2.0  # after a failed write the next attempt waits this long
 
 
+REMEDIES = {errno.ENOSPC: "free some space", errno.EAGAIN: "stop the other one, or set another `journal` folder"}
+
+
+class JournalBusy(OSError):
+    """Another gateway writes this journal; str() is one line with the remedy."""
+
+    def __str__(self) -> str:
+        return f"journal {self.filename}: {self.strerror}; {REMEDIES[errno.EAGAIN]}"
+
+
 class Journal:
     """Journal of one device. `append` may be called from several threads; it never raises.
 
     While the disk refuses, `message` says why and what to do, `unkept_bytes` counts, and data go on without being kept.
+    Raises JournalBusy when another Journal, of this or another process, has the folder.
     """
 
     def __init__(
@@ -33,22 +47,34 @@ class Journal:
         self.max_bytes = max_bytes
         self.segment_bytes = segment_bytes
         self.run = time.time_ns()
-        self.message = ""
         self.unkept_bytes = 0
         self.cut_bytes = 0
         self.durable_seq = 0
         self.last_seq = 0
         self.max_sync_s = 0.0
+        self._write_message = ""
+        self._sync_message = ""
         self._lock = threading.Lock()
+        self._folder_lock: int | None = None  # descriptor of the locked file; None: the folder could not be used yet
         self._fd: int | None = None
         self._size = 0
         self._full: list[int] = []  # descriptors of finished segments that still want their fdatasync
         self._retry_at = 0.0
         self._sync_s = sync_s
         self._stop = threading.Event()
-        self._recover()
+        try:
+            self._recover()
+        except JournalBusy:
+            raise
+        except OSError as error:
+            self._refuse(error)
         self._thread = threading.Thread(target=self._sync_loop, name=f"journal-{folder.name}", daemon=True)
         self._thread.start()
+
+    @property
+    def message(self) -> str:
+        """What is wrong with the disk, with the remedy; "" when nothing is."""
+        return "; ".join(filter(None, (self._write_message, self._sync_message)))
 
     def append(self, channel: int, data: bytes, monotonic_ns: int, utc_ns: int) -> int:
         """Append one read; its sequence, or 0 when the disk refused it."""
@@ -60,7 +86,7 @@ class Journal:
             try:
                 written = os.write(self._fd, raw)
                 if written < len(raw):  # what a full disk does first
-                    raise OSError(28, "No space left on device")
+                    raise OSError(errno.ENOSPC, "No space left on device")
             except OSError as error:
                 self._refuse(error)
                 self.unkept_bytes += len(data)
@@ -72,12 +98,15 @@ class Journal:
             return self.last_seq
 
     def close(self) -> None:
-        """Sync and close."""
+        """Sync, close and let the folder go."""
         self._stop.set()
         self._thread.join()
         with self._lock:
             self._finish_segment()
         self._sync()
+        if self._folder_lock is not None:
+            os.close(self._folder_lock)
+            self._folder_lock = None
 
     def first_kept(self) -> int:
         """Sequence of the oldest record that is still there; last_seq + 1 when there is none."""
@@ -110,9 +139,13 @@ class Journal:
         return sorted(self.folder.glob("*.gfj"))
 
     def _recover(self) -> None:
-        """Cut torn tails and find the last sequence. A finished segment may wait for its fdatasync: look at two."""
+        """Lock the folder, cut torn tails and find the last sequence. Raises OSError, JournalBusy among them.
+
+        A finished segment may wait for its fdatasync: look at two.
+        """
+        self.folder.mkdir(parents=True, exist_ok=True)
+        lock = _lock(self.folder)
         try:
-            self.folder.mkdir(parents=True, exist_ok=True)
             for name in self._segments()[-2:]:
                 data = name.read_bytes()
                 found = scan(data)
@@ -125,12 +158,20 @@ class Journal:
                 self.last_seq = max(self.last_seq, last)
                 if not found.records:
                     name.unlink()
-            self.durable_seq = self.last_seq
-        except OSError as error:
-            self._refuse(error)
+        except OSError:
+            os.close(lock)
+            raise
+        self.durable_seq = self.last_seq
+        self._folder_lock = lock
 
     def _open_segment(self) -> bool:
         if time.monotonic() < self._retry_at:
+            return False
+        try:
+            if self._folder_lock is None:  # the start found no usable folder: what does it hold now?
+                self._recover()
+        except OSError as error:
+            self._refuse(error)
             return False
         first = self.last_seq + 1
         name = self.folder / f"{first:020d}.gfj"
@@ -139,14 +180,14 @@ class Journal:
             self.folder.mkdir(parents=True, exist_ok=True)
             self._fd = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND | os.O_CLOEXEC, 0o640)
             if os.write(self._fd, head) < len(head):
-                raise OSError(28, "No space left on device")
+                raise OSError(errno.ENOSPC, "No space left on device")
         except OSError as error:
             self._refuse(error)
             return False
         self._size = len(head)
-        if self.message:
+        if self._write_message:
             log.warning("journal %s: writable again; %d bytes were not kept", self.folder, self.unkept_bytes)
-            self.message = ""
+            self._write_message = ""
         return True
 
     def _refuse(self, error: OSError) -> None:
@@ -159,10 +200,10 @@ class Journal:
             self._full.append(self._fd)
             self._fd = None
         self._retry_at = time.monotonic() + RETRY_S
-        if not self.message:
-            remedy = "free some space" if error.errno == 28 else "make the folder writable for this user"
-            self.message = f"journal {self.folder}: {error.strerror}; data are shown but NOT KEPT; {remedy}"
-            log.error("%s", self.message)
+        if not self._write_message:
+            remedy = REMEDIES.get(error.errno or 0, "make the folder writable for this user")
+            self._write_message = f"journal {self.folder}: {error.strerror}; data are shown but NOT KEPT; {remedy}"
+            log.error("%s", self._write_message)
 
     def _finish_segment(self) -> None:
         if self._fd is not None:
@@ -181,21 +222,40 @@ class Journal:
                 return
             last, full = self.last_seq, self._full
             self._full = []
-            current = None if self._fd is None else os.dup(self._fd)
+            files = [*full, *([] if self._fd is None else [os.dup(self._fd)])]
+        if not files:
+            return  # the files of a failed sync are closed: only a sync of later data can succeed
         start = time.monotonic()
-        try:
-            for fd in [*full, *([] if current is None else [current])]:
+        failure = None
+        for fd in files:
+            try:
                 os.fdatasync(fd)
-            self.durable_seq = last
-        except OSError as error:
-            self.message = f"journal {self.folder}: fdatasync: {error.strerror}; data are NOT SAFE; check the disk"
-            log.error("%s", self.message)
-        finally:
-            for fd in [*full, *([] if current is None else [current])]:
+            except OSError as error:
+                failure = error
+            finally:
                 os.close(fd)
+        self._say_synced(last, failure)
         self.max_sync_s = max(self.max_sync_s, time.monotonic() - start)
         if full:
             self._retain()
+
+    def _say_synced(self, last: int, failure: OSError | None) -> None:
+        if failure is not None:
+            message = f"journal {self.folder}: fdatasync: {failure.strerror}; data are NOT SAFE; check the disk"
+            if message != self._sync_message:
+                log.error("%s", message)
+            self._sync_message = message
+            return
+        if self._sync_message:
+            # The kernel reports a failed write-back once and drops the pages: these may be gone after a power cut.
+            log.warning(
+                "journal %s: the disk takes data again; records %d to %d may have holes after a power cut",
+                self.folder,
+                self.durable_seq + 1,
+                last,
+            )
+            self._sync_message = ""
+        self.durable_seq = last
 
     def _retain(self) -> None:
         names = self._segments()
@@ -207,6 +267,19 @@ class Journal:
             name.unlink(missing_ok=True)
             total -= size
             log.info("%s: removed, the journal keeps %d bytes", name, self.max_bytes)
+
+
+def _lock(folder: Path) -> int:
+    """Descriptor of the folder's locked lock file; raises JournalBusy when another has it, OSError without access."""
+    lock = os.open(folder / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o640)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(lock)
+        raise JournalBusy(errno.EAGAIN, "another gateway writes it", str(folder)) from None
+    except OSError as error:  # a file system without locks, as some network ones: better a journal than none
+        log.warning("journal %s: cannot be locked (%s): let only one gateway write it", folder, error.strerror)
+    return lock
 
 
 def _first_of(name: Path) -> int:

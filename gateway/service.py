@@ -1,14 +1,19 @@
-"""The gateway process: one thread per board, one Zenoh session for all."""
+"""The gateway process: one Zenoh session for all boards, per board a thread that serves it and one that decodes.
+
+Journal first: boards are read and journalled from the start, also with no router there. Publishing begins when the
+router comes and the name on the bus is ours (gateway/identity.py).
+"""
 
 import json
 import logging
 import threading
+from concurrent.futures import Future
 
 import zenoh
 
 from gateway.device import DeviceLink
 from gateway.identity import claim
-from gateway.journal import Journal
+from gateway.journal import Journal, JournalBusy
 from gateway.settings import DeviceSettings, GatewaySettings
 from messages.bus import BusSettings, BusUnavailable, Publishers, open_client
 from messages.topics import history_key
@@ -16,57 +21,133 @@ from messages.topics import history_key
 log = logging.getLogger(__name__)
 
 HISTORY_BYTES = 4 << 20  # of records in one reply; who wants more asks on from where it ended
+BUSY_RETRY_S = 2.0  # a journal that another gateway has is asked for again after so long
 
 
 def run(settings: GatewaySettings, bus: BusSettings, stop: threading.Event) -> None:
-    """Serve all boards of the settings until `stop` is set. Waits for the router when there is none yet."""
+    """Serve all boards of the settings until `stop` is set; without a router they are read and journalled."""
     if not settings.devices:
         log.warning("[gateway] has no [[gateway.devices]]: nothing to read; name a board and its port")
+    opened: Future[zenoh.Session | None] = Future()
+    threads = [
+        threading.Thread(target=_serve, args=(device, settings, bus.prefix, opened, stop), name=device.name)
+        for device in settings.devices
+    ]
+    for thread in threads:
+        thread.start()
+    session = None
     try:
-        session = open_client(bus, stop)
-    except BusUnavailable:
-        return  # stopped before a router came
-    try:
-        links: list[DeviceLink] = []
-        threads = [
-            threading.Thread(target=_serve, args=(device, settings, bus, session, stop, links), name=device.name)
-            for device in settings.devices
-        ]
-        for thread in threads:
-            thread.start()
+        session = open_client(bus, stop)  # for ever, while the other threads read
+        opened.set_result(session)
         stop.wait()
-        for link in links:
-            link.wake()
+    except BusUnavailable:
+        pass  # stopped before a router came
+    finally:
+        stop.set()
+        if session is None:
+            opened.set_result(None)
         for thread in threads:
             thread.join()
-    finally:
-        session.close()
+        if session is not None:
+            session.close()
+
+
+class _Line:
+    """A board's link on a thread of its own. Raises JournalBusy when another gateway has the journal."""
+
+    def __init__(self, device: DeviceSettings, settings: GatewaySettings, stop: threading.Event) -> None:
+        self.link = DeviceLink(device, settings)
+        self._stop = stop
+        self._halt = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=f"link-{device.name}")
+        self._thread.start()
+        journal = self.link.journal
+        log.info("%s: %s, journal %s, run %d", device.name, device.port, journal.folder, journal.run)
+
+    def _run(self) -> None:
+        try:
+            self.link.run(self._halt)
+        except Exception:  # a bug of ours: end the process, so that its supervisor starts a sound one
+            log.exception("%s: the gateway failed and stops", self.link.name)
+            self._stop.set()
+            raise
+
+    def close(self) -> None:
+        """Stop reading and close the journal; may be called again."""
+        self._halt.set()
+        self.link.wake()
+        self._thread.join()
 
 
 def _serve(
     device: DeviceSettings,
     settings: GatewaySettings,
-    bus: BusSettings,
-    session: zenoh.Session,
+    prefix: str,
+    opened: "Future[zenoh.Session | None]",
     stop: threading.Event,
-    links: list[DeviceLink],
 ) -> None:
-    token = claim(session, bus.prefix, device.name, stop)
-    if token is None:
-        return
-    link = DeviceLink(device, settings, Publishers(session, bus.prefix).put)
-    key = history_key(bus.prefix, device.name)
-    history = session.declare_queryable(key, lambda query: answer_history(query, key, link.journal))
-    log.info("%s: %s, journal %s, run %d", device.name, device.port, link.journal.folder, link.journal.run)
-    links.append(link)
+    """One board until `stop`: read it at once, publish when the session is there and the name is ours."""
+    line = None
     try:
-        link.run(stop)
-    except Exception:  # a bug of ours: end the process, so that its supervisor starts a sound one
+        line = _open_line(device, settings, stop)
+        session = opened.result()
+        if line is not None and session is not None:
+            _publish(line, device, settings, prefix, session, stop)
+    except Exception:
         log.exception("%s: the gateway failed and stops", device.name)
         stop.set()
         raise
     finally:
-        history.undeclare()
+        if line is not None:
+            line.close()
+
+
+def _open_line(device: DeviceSettings, settings: GatewaySettings, stop: threading.Event) -> _Line | None:
+    """Wait until no other gateway has the journal; None when `stop` came first."""
+    said = False
+    while not stop.is_set():
+        try:
+            return _Line(device, settings, stop)
+        except JournalBusy as busy:
+            if not said:
+                log.error("%s: refused: %s; the board is not read until the journal is free", device.name, busy)
+            said = True
+        stop.wait(BUSY_RETRY_S)
+    return None
+
+
+def _publish(
+    line: _Line,
+    device: DeviceSettings,
+    settings: GatewaySettings,
+    prefix: str,
+    session: zenoh.Session,
+    stop: threading.Event,
+) -> None:
+    """Serve the name on the bus until `stop`. Refused, the line is closed, and opened again when the name is free."""
+    refused = threading.Event()
+
+    def give_up() -> None:
+        refused.set()
+        line.close()
+
+    token = claim(session, prefix, device.name, stop, give_up)
+    if token is None:
+        return
+    history = None
+    mine = _open_line(device, settings, stop) if refused.is_set() else line
+    try:
+        if mine is not None:
+            link = mine.link
+            key = history_key(prefix, device.name)
+            history = session.declare_queryable(key, lambda query: answer_history(query, key, link.journal))
+            link.go_live(Publishers(session, prefix).put)
+        stop.wait()
+    finally:
+        if mine is not None:
+            mine.close()
+        if history is not None:
+            history.undeclare()
         token.undeclare()
 
 

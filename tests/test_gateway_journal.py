@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from gateway.journal import Journal
+from gateway.journal import Journal, JournalBusy
 from gateway.journal_file import SEGMENT_HEAD, records, scan
 
 
@@ -92,6 +92,56 @@ def test_oldest_segments_go_first_and_history_says_what_is_left(tmp_path):
     assert [r.sequence for r in records(b"".join(journal.history(480, 490)))] == list(range(480, 491))
     capped = [r.sequence for r in records(b"".join(journal.history(kept, 10**9, max_bytes=1000)))]
     assert capped == list(range(kept, kept + len(capped))) and 5 < len(capped) < 12
+
+
+def test_second_journal_of_one_folder_is_refused_until_the_first_is_closed(tmp_path):
+    first = Journal(tmp_path)
+    fill(first, 3)
+    with pytest.raises(JournalBusy, match="another gateway writes it; stop the other one") as refused:
+        Journal(tmp_path)
+    assert str(tmp_path) in str(refused.value)
+    fill(first, 3)
+    first.close()
+    second = Journal(tmp_path)
+    assert second.last_seq == 6
+    second.close()
+    assert [r.sequence for r in all_records(tmp_path)] == [1, 2, 3, 4, 5, 6]
+
+
+def test_a_folder_that_can_be_used_late_is_continued_not_overwritten(tmp_path):
+    folder = tmp_path / "journal"
+    before = Journal(folder)
+    fill(before, 10)
+    before.close()
+    folder.rename(tmp_path / "elsewhere")
+    folder.write_text("a file where a folder is wanted")
+    journal = Journal(folder)
+    assert journal.append(0, b"lost", 1, 1) == 0 and "NOT KEPT" in journal.message
+    folder.unlink()
+    (tmp_path / "elsewhere").rename(folder)
+    wait_for(lambda: journal.append(0, b"kept", 1, 1))
+    assert not journal.message
+    journal.close()
+    assert [r.sequence for r in all_records(folder)] == list(range(1, 12))
+
+
+def test_message_of_a_failed_sync_clears_with_the_next_good_one(tmp_path, caplog):
+    """The first segment is /dev/null: it takes writes, and fdatasync on it fails."""
+    journal = Journal(tmp_path, segment_bytes=2_000, sync_s=0.01)
+    (tmp_path / f"{1:020d}.gfj").symlink_to("/dev/null")
+    fill(journal, 3)
+    wait_for(lambda: "fdatasync" in journal.message and "NOT SAFE" in journal.message)
+    assert journal.durable_seq == 0
+    fill(journal, 20)  # on into the next segment, a real one
+
+    def cleared():
+        fill(journal, 1)  # a good sync needs something to sync
+        return not journal.message
+
+    wait_for(cleared)
+    wait_for(lambda: journal.durable_seq == journal.last_seq)
+    journal.close()
+    assert "records 1 to" in caplog.text and "may have holes" in caplog.text
 
 
 FULL = """

@@ -1,5 +1,6 @@
 """The whole gateway: virtual board -> pty -> gateway -> real Zenoh -> subscriber."""
 
+import fcntl
 import os
 import threading
 import time
@@ -8,13 +9,15 @@ from pathlib import Path
 
 import pytest
 
+from firmware_protocol.codec import FLAG_SIMULATED, Deframer, Frame, encode
+from firmware_protocol.frames import Acc12
 from gateway import service
 from gateway.board_link import PtyLink, TcpLink
 from gateway.journal_file import records, scan
 from gateway.player import LOG_EPOCH_S
 from gateway.settings import DeviceSettings, GatewaySettings
 from gateway.ubx import Epoch, ubx_bytes
-from gateway.virtual_board import SIMULATED, BoardAccel, BoardBytes, BoardPulse, VirtualBoard
+from gateway.virtual_board import PLAYED, SIMULATED, BoardAccel, BoardBytes, BoardPulse, VirtualBoard
 from messages import gyrofree_pb2 as pb
 from messages.bus import BusSettings, open_client, open_router, subscribe
 from messages.topics import ACCEL, BOARD, GNSS, LINK, LOCATION, TACHO, history_key
@@ -41,13 +44,17 @@ def samples(n: int, first: int = 0, period_s: float = PERIOD_S) -> list[BoardAcc
 
 
 class Bench:
-    """Router, gateway and a subscriber to everything."""
+    """Router, gateway and a subscriber to everything; without a router until `start_router` where wanted so."""
 
     def __init__(self, folder: Path, router_port: int) -> None:
         endpoint = f"tcp/127.0.0.1:{router_port}"
         self.bus = BusSettings(router=endpoint, listen=[endpoint])
-        self.router = open_router(self.bus)
         self.folder = folder
+        self.running: list[tuple[threading.Thread, threading.Event]] = []
+        self.router = self.session = None
+
+    def start_router(self) -> None:
+        self.router = open_router(self.bus)
         self.session = open_client(self.bus, timeout_s=20)
         self.seen: dict[str, list] = defaultdict(list)
         self.subscribers = [
@@ -59,9 +66,9 @@ class Bench:
             )
             for topic in (ACCEL, TACHO, LINK, BOARD, GNSS, LOCATION)
         ]
-        self.running: list[tuple[threading.Thread, threading.Event]] = []
 
-    def gateway(self, port: str, journal: str = "journal", **device) -> threading.Event:
+    def gateway(self, port: str, journal: str = "journal", live: bool = True, **device) -> threading.Event:
+        """Start one and, when live, wait until it publishes: what it reads before is not sent."""
         settings = GatewaySettings(
             devices=[DeviceSettings(name="cube", port=port, **device)], journal=self.folder / journal, sync_s=0.1
         )
@@ -69,6 +76,8 @@ class Bench:
         thread = threading.Thread(target=service.run, args=(settings, self.bus, stop))
         thread.start()
         self.running.append((thread, stop))
+        if live:
+            self.status(lambda s: s.port == port)
         return stop
 
     def status(self, condition) -> pb.LinkStatus:
@@ -81,15 +90,44 @@ class Bench:
         for thread, _ in self.running:
             thread.join(10)
         assert not any(thread.is_alive() for thread, _ in self.running)
-        self.session.close()
-        self.router.close()
+        if self.session is not None:
+            self.session.close()
+        if self.router is not None:
+            self.router.close()
 
 
 @pytest.fixture
-def bench(tmp_path, free_port):
+def dark_bench(tmp_path, free_port):
+    """A bench with no router yet."""
     bench = Bench(tmp_path, free_port)
     yield bench
     bench.close()
+
+
+@pytest.fixture
+def bench(dark_bench):
+    dark_bench.start_router()
+    return dark_bench
+
+
+def journalled(folder: Path) -> bytes:
+    """What the board said, as the journal on the disk has it."""
+    files = sorted(folder.glob("*.gfj"))
+    return b"".join(record.data for file in files for _, _, record in scan(file.read_bytes()).records)
+
+
+def frames(data: bytes) -> int:
+    return sum(isinstance(event, Frame) for event in Deframer().feed(data))
+
+
+def locked(folder: Path) -> bool:
+    """True while somebody has the journal of this folder open."""
+    with open(folder / "lock") as handle:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False
 
 
 def test_every_sample_arrives_in_order_and_the_ledger_balances(bench):
@@ -217,13 +255,88 @@ def test_second_gateway_with_the_same_name_is_refused_and_takes_over(bench, capl
     first, second = PtyLink(), PtyLink()
     stop = bench.gateway(first.path)
     wait_for(lambda: first.connected)
-    bench.gateway(second.path, journal="other")
+    bench.gateway(second.path, journal="other", live=False)
     wait_for(lambda: "another gateway serves this device name" in caplog.text)
+    wait_for(lambda: not second.connected and not locked(bench.folder / "other" / "cube"))
+    stop.set()
+    wait_for(lambda: second.connected)
+    bench.status(lambda s: s.port == second.path)
+    assert locked(bench.folder / "other" / "cube")
+    first.close()
+    second.close()
+
+
+def test_second_gateway_with_the_same_journal_is_refused_also_without_a_bus(dark_bench, caplog):
+    bench, first, second = dark_bench, TcpLink(), TcpLink()
+    stop = bench.gateway(first.path, live=False)
+    wait_for(lambda: first.connected)
+    bench.gateway(second.path, live=False)
+    wait_for(lambda: "another gateway writes it; stop the other one" in caplog.text)
     assert not second.connected
     stop.set()
     wait_for(lambda: second.connected)
     first.close()
     second.close()
+
+
+def test_without_a_router_all_is_journalled_and_counted_and_not_published_later(dark_bench):
+    bench, link = dark_bench, TcpLink()
+    bench.gateway(link.path, live=False)
+    board = VirtualBoard(link, SIMULATED, epoch=3, sample_period_s=PERIOD_S)
+    board.run(samples(100), threading.Event(), wait_for_reader=True)
+    wait_for(lambda: frames(journalled(bench.folder / "journal" / "cube")) == board.built)
+    early = board.built
+
+    bench.start_router()
+    status = bench.status(lambda s: s.good_frames == early)
+    assert status.journal_sequence and status.lost_frames == 0 and not bench.seen["accel"]
+    board.run(samples(100, first=100), threading.Event())
+    got = wait_for(lambda: (m := list(bench.seen["accel"])) and sum(len(b.counts) for b in m) >= 1200 and m)
+    assert got[0].first_index == 100 and got[0].header.sequence == 1 and got[0].header.epoch == 3
+    assert [c for b in got for c in b.counts] == [c for s in samples(100, first=100) for c in s.counts12]
+    assert sum(b.lost_samples for b in got) == 0
+    status = bench.status(lambda s: s.good_frames == board.built)
+    assert status.lost_samples == 0 and status.bytes_in == status.good_bytes + status.bad_bytes + status.pending_bytes
+    link.close()
+
+
+@pytest.mark.parametrize("flags, source", [(FLAG_SIMULATED, pb.SOURCE_SIMULATED), (0, pb.SOURCE_UNKNOWN)])
+def test_before_hello_the_source_is_what_the_flag_says(bench, flags, source):
+    link = TcpLink()
+    bench.gateway(link.path)
+    wait_for(lambda: link.connected)
+    for seq in range(5):
+        counts = tuple(tuple(range(12)) for _ in range(10))
+        frame = Acc12(seq * 10, 2_000_000, 0xF, 0, counts)
+        link.write(encode(frame, epoch=1, seq=seq, t_us=seq * 20_000, flags=flags))
+    got = wait_for(lambda: len(bench.seen["accel"]) >= 5 and list(bench.seen["accel"]))
+    assert {m.header.source for m in got} == {source} and not bench.seen["board"]
+    # the board says what it is; the next boot, which has not said so yet, is not taken for the same one
+    board = VirtualBoard(link, PLAYED, epoch=2, sample_period_s=PERIOD_S)
+    board.run(samples(10), threading.Event())
+    wait_for(lambda: any(m.header.epoch == 2 and m.header.source == pb.SOURCE_PLAYED for m in bench.seen["accel"]))
+    link.write(encode(Acc12(0, 2_000_000, 0xF, 0, counts), epoch=3, seq=0, t_us=0, flags=flags))
+    again = wait_for(lambda: [m for m in list(bench.seen["accel"]) if m.header.epoch == 3])
+    assert again[0].header.source == source
+    link.close()
+
+
+def test_message_of_a_failed_sync_leaves_the_status_once_a_sync_succeeds(bench):
+    """The first segment is /dev/null: it takes writes, and fdatasync on it fails."""
+    link = TcpLink()
+    bench.gateway(link.path)
+    wait_for(lambda: link.connected)  # the journal is open, its first segment comes with the first read
+    (bench.folder / "journal" / "cube" / f"{1:020d}.gfj").symlink_to("/dev/null")
+    link.write(bytes(range(1, 256)))
+    failed = bench.status(lambda s: "NOT SAFE" in s.message)
+    assert failed.durable_sequence == 0
+
+    def cleared():
+        link.write(bytes(range(1, 256)) * 16)  # on into the next segment, a real one
+        return next((s for s in reversed(bench.seen["link"]) if s.durable_sequence), None)
+
+    assert "NOT SAFE" not in wait_for(cleared).message
+    link.close()
 
 
 def test_unwritable_journal_is_said_and_data_go_on(bench):
