@@ -70,7 +70,10 @@ class Bench:
     def gateway(self, port: str, journal: str = "journal", live: bool = True, **device) -> threading.Event:
         """Start one and, when live, wait until it publishes: what it reads before is not sent."""
         settings = GatewaySettings(
-            devices=[DeviceSettings(name="cube", port=port, **device)], journal=self.folder / journal, sync_s=0.1
+            devices=[DeviceSettings(name="cube", port=port, **device)],
+            journal=self.folder / journal,
+            segment_bytes=1 << 16,
+            sync_s=0.1,
         )
         stop = threading.Event()
         thread = threading.Thread(target=service.run, args=(settings, self.bus, stop))
