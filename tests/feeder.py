@@ -136,6 +136,9 @@ class Feeder:
             status = pb.EstimatorStatus(
                 header=header, estimator=name, samples=self._k, us_per_sample=41, state="running"
             )
+            if name == "ekf":
+                status.state = "navigating"
+                status.message = f"fixes used {self._k // 5}, fixes rejected {self._k // 100}"
             self._put(tp.ESTIMATOR, device, status, name)
 
     def recorder(self, t: float) -> None:
@@ -171,11 +174,12 @@ class Feeder:
         nav.fix_age_s = (self._k % 5) * 0.05
         self._put(tp.NAV, device, nav, "ekf")
         if self._k % 5 == 0:
-            self._fix(device, header, p + noise(0, [0.4, 0.4, 0.8]), v)
+            wild = self._k % 100 == 50  # a fix far off, which the filter rejects
+            self._fix(device, header, p + noise(0, [0.4, 0.4, 0.8]) + (12.0 if wild else 0.0), v, not wild)
         if self._k % 20 == 1:
             self._health(device, header, ("ekf",), 100.0)
 
-    def _fix(self, device: str, header: pb.Header, p: np.ndarray, v: np.ndarray) -> None:
+    def _fix(self, device: str, header: pb.Header, p: np.ndarray, v: np.ndarray, good: bool) -> None:
         latitude, longitude = _geodetic(p)
         fix = pb.GnssFix(header=header, fix_utc_ns=header.utc_ns, latitude_deg=latitude, longitude_deg=longitude)
         fix.height_m, fix.quality, fix.satellites, fix.talker = (
@@ -185,8 +189,10 @@ class Feeder:
             "UBX",
         )
         fix.v_n_mps.extend(v)
+        fix.header.sequence = self._k
         self._put(tp.GNSS, device, fix)
-        correction = pb.Innovation(header=header, estimator="ekf", nis=self._random.chisquare(6), dof=6, accepted=True)
+        nis = self._random.chisquare(6) * (1 if good else 30)
+        correction = pb.Innovation(header=header, estimator="ekf", nis=nis, dof=6, accepted=good, for_sequence=self._k)
         correction.name.extend([f"position {a}" for a in "NED"] + [f"velocity {a}" for a in "NED"])
         correction.value.extend(self._random.normal(0, 0.4, 6))
         correction.sigma.extend([0.4] * 6)

@@ -7,10 +7,11 @@ import numpy as np
 from viser import SceneApi
 
 from dashboard.scene import geometry as geo
-from dashboard.scene.palette import AXES, GREY, ORANGE, estimator_title, rgb
+from dashboard.scene.palette import AXES, GREY, ORANGE, YELLOW, estimator_title, rgb
 
 Nodes = dict[str, object]  # handles by name
 
+GROUND_BELOW = 1.0  # m below a vehicle, so that fixes scattered in height are not cut by the grid's lines
 LABEL_CORNERS = ((1, 1, 1.1), (-1, -1, 1.35), (1, -1, 1.6), (-1, 1, 1.85))  # apart, so that names do not hide another
 
 
@@ -24,10 +25,10 @@ def ground(scene: SceneApi, nodes: Nodes, vehicle: bool, dark: bool) -> None:
         section_size=5 * size,
         cell_color=(48, 50, 54) if dark else (222, 222, 222),
         section_color=(74, 78, 84) if dark else (196, 196, 196),
-        fade_distance=250.0 if vehicle else 26.0,
+        fade_distance=600.0 if vehicle else 26.0,
         fade_strength=1.5,
         shadow_opacity=0.0,
-        position=(0.0, 0.0, 0.3 if vehicle else 1.42),
+        position=(0.0, 0.0, GROUND_BELOW if vehicle else 1.42),
     )
 
 
@@ -114,23 +115,30 @@ def _rate_arrow(scene: SceneApi, nodes: Nodes, body: str) -> None:
     nodes[f"{path}_label"] = scene.add_label(f"{path}_label", "", anchor="center-left", font_screen_scale=0.9)
 
 
-def vehicle(scene: SceneApi, nodes: Nodes, body: str, colour: str) -> None:
-    """A car and its heading below the frame `body`, forward-right-down, m."""
+def vehicle(scene: SceneApi, nodes: Nodes, body: str, colour: str, name: str) -> None:
+    """A car, its heading and its estimator's name below the frame `body`, forward-right-down, m."""
     scene.add_line_segments(f"{body}/edges", geo.vehicle_edges(), rgb(colour), thickness=3.0, thickness_units="screen")
     scene.add_box(
         f"{body}/faces",
         color=rgb(colour),
         dimensions=(4.4, 1.8, 0.6),
         position=(0.0, 0.0, -0.6),
-        opacity=0.45,
+        opacity=0.9,
         cast_shadow=False,
         receive_shadow=False,
     )
     nodes[f"{body}/heading"] = scene.add_arrows(
         f"{body}/heading",
-        np.array([[[2.2, 0, -0.6], [5.5, 0, -0.6]]], dtype=np.float32),
-        rgb(ORANGE),
-        shaft_radius=0.12,
-        head_radius=0.35,
-        head_length=0.8,
+        np.array([[[2.2, 0, -0.6], [12.0, 0, -0.6]]], dtype=np.float32),
+        rgb(YELLOW),  # not the fixes' colour
+        shaft_radius=0.35,
+        head_radius=1.1,
+        head_length=3.0,
+    )
+    scene.add_label(
+        f"{body}/label",
+        estimator_title(name),
+        position=(0.0, 0.0, -5.0),
+        anchor="bottom-center",
+        font_screen_scale=0.8,
     )

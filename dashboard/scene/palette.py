@@ -12,6 +12,7 @@ BLUE, VERMILLION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#8C8C8C"
 AXES = (VERMILLION, GREEN, SKY)  # x, y, z
 REFERENCE = GREEN  # tachometer
 FIX = ORANGE  # GNSS
+REJECTED = VERMILLION  # a fix the filter did not believe
 _ESTIMATORS = {"products-ekf": SKY, "least-squares": VERMILLION, "ekf": SKY}
 _FURTHER = (PURPLE, YELLOW, ORANGE, BLUE, VERMILLION, SKY)
 # Names for people; anything else is shown as it is called on the bus.

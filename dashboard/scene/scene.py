@@ -13,6 +13,7 @@ a node's quaternion (w, x, y, z) is the q_nb of the message and its position is 
     /world/estimate/<estimator>/ellipsoid                          3-sigma position, at the body
     /world/table                        the table below the cube, turning with the truth, else with the main estimate
     /world/fixes/<piece>                GNSS fixes
+    /world/fixes/rejected/<piece>       those of them that the main estimator did not believe
     /world/ground                       grid
 """
 
@@ -21,15 +22,14 @@ from dataclasses import dataclass, field
 import numpy as np
 import viser
 
-from dashboard.scene import bodies
+from dashboard.scene import bodies, camera
 from dashboard.scene import geometry as geo
-from dashboard.scene.palette import FIX, estimator_colour, number, rgb, truth_colour
+from dashboard.scene.palette import FIX, REJECTED, estimator_colour, number, rgb, truth_colour
 from dashboard.scene.store import Device
 
 ARROW_PER_RADPS = 0.55  # half sides per rad/s; 180 deg/s gives 1.7
 ARROW_LONGEST = 2.2
-CUBE_CAMERA = (4.3, -3.6, 2.6)
-VEHICLE_CAMERA = (-17.0, -14.0, 9.0)
+FIX_SIZE, REJECTED_SIZE = 0.8, 1.4  # m; a rejected fix lies over the same fix in its usual colour
 
 LAYERS = ("truth", "estimates", "sensors", "rate", "trajectory", "fixes", "ellipsoid", "grid")
 
@@ -59,11 +59,11 @@ class SceneView:
 
     def reset_camera(self, vehicle: bool) -> None:
         """Look at the body from the usual side."""
-        camera = self._client.camera
+        seen = self._client.camera
+        position, look_at = camera.aim(camera.VEHICLE if vehicle else camera.CUBE, seen.fov, seen.aspect)
         with self._client.atomic():
-            camera.up_direction = (0.0, 0.0, 1.0)
-            camera.position = VEHICLE_CAMERA if vehicle else CUBE_CAMERA
-            camera.look_at = (0.0, 0.0, 0.0) if vehicle else (0.0, 0.0, 0.25)
+            seen.up_direction = (0.0, 0.0, 1.0)
+            seen.position, seen.look_at = position, look_at
 
     def forget(self) -> None:
         """Take everything away; the next update builds it again."""
@@ -101,11 +101,13 @@ class SceneView:
         """Trajectories and fixes; only pieces that grew are sent. Call under the store's lock."""
         for name, track in device.tracks.items():
             if name == "fixes":
-                self._track("/world/fixes", track, rgb(FIX), points=True)
+                self._track("/world/fixes", track, rgb(FIX), FIX_SIZE)
+            elif name == "rejected":
+                self._track("/world/fixes/rejected", track, rgb(REJECTED), REJECTED_SIZE)
             else:
                 estimator = name.split("/", 1)[1]
                 colour = rgb(estimator_colour(estimator, device.estimators("nav")))
-                self._track(f"/world/estimate/{estimator}/trajectory", track, colour, points=False)
+                self._track(f"/world/estimate/{estimator}/trajectory", track, colour)
 
     # --- building -------------------------------------------------------------------------------------------------
 
@@ -125,7 +127,7 @@ class SceneView:
             body = f"/world/estimate/{name}/body"
             self._nodes[body] = scene.add_frame(body, show_axes=False)
             if vehicle:
-                bodies.vehicle(scene, self._nodes, body, colour)
+                bodies.vehicle(scene, self._nodes, body, colour, name)
                 path = f"/world/estimate/{name}/ellipsoid"
                 self._nodes[path] = scene.add_icosphere(
                     path, radius=1.0, color=rgb(colour), opacity=0.22, cast_shadow=False, visible=False
@@ -207,7 +209,7 @@ class SceneView:
                     self._sent[f"{path}#s"] = scale
                     self._nodes[path].scale = scale
             if index == 0 and p is not None:
-                self._set("/world/ground", p=(0.0, 0.0, round(p[2], 1) + 0.3))
+                self._set("/world/ground", p=(0.0, 0.0, round(p[2], 1) + bodies.GROUND_BELOW))
                 if self._choice.follow:
                     shift = -geo.rotate(np.array(geo.Q_DISPLAY_N), np.array(p))
                     self._set("/world", p=tuple(float(v) for v in shift))
@@ -226,7 +228,8 @@ class SceneView:
             elif tail in _TAILS:
                 yield node, _TAILS[tail]
 
-    def _track(self, base: str, track: geo.Track, colour: tuple[int, int, int], points: bool) -> None:
+    def _track(self, base: str, track: geo.Track, colour: tuple[int, int, int], point_size: float = 0.0) -> None:
+        """Bring a track to the browser, as points of that size in m, or as a line when there is no size."""
         if self._thinned.get(base, track.thinned) != track.thinned:
             for path in [path for path in self._nodes if path.startswith(f"{base}/")]:
                 self._nodes.pop(path).remove()
@@ -234,18 +237,18 @@ class SceneView:
         self._thinned[base] = track.thinned
         for index, piece in enumerate(track.pieces):
             path = f"{base}/{index}"
-            if len(piece) < 2 or self._pieces.get(path) == len(piece):
+            if len(piece) < (1 if point_size else 2) or self._pieces.get(path) == len(piece):
                 continue
             self._pieces[path] = len(piece)
             line = np.asarray(piece, dtype=np.float32)
-            if points:
+            if point_size:
                 self._nodes[path] = self._scene.add_point_cloud(
-                    path, line, colour, point_size=0.4, point_shape="circle", precision="float32"
+                    path, line, colour, point_size=point_size, point_shape="circle", precision="float32"
                 )
             else:
                 segments = np.stack([line[:-1], line[1:]], axis=1)
                 self._nodes[path] = self._scene.add_line_segments(
-                    path, segments, colour, thickness=3.0, thickness_units="screen"
+                    path, segments, colour, thickness=5.0, thickness_units="screen"
                 )
 
 

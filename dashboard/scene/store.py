@@ -17,6 +17,7 @@ from messages import topics as tp
 
 HISTORY_S = 320.0  # kept in the rings; the longest window a view offers is 300 s
 STALE_S = 1.0  # a value older than this is greyed
+FIXES_REMEMBERED = 100  # until the filter has said whether it believes them
 SLOW_STALE_S = {"link": 3.0, "status": 3.0, "estimator": 3.0, "board": 30.0, "gnss": 2.5, "innovation": 10.0}
 
 
@@ -81,6 +82,7 @@ class Device:
     latest: dict[tuple[str, str], Latest] = field(default_factory=dict)
     rings: dict[tuple[str, str], Ring] = field(default_factory=dict)
     tracks: dict[str, Track] = field(default_factory=dict)
+    fixes: dict[int, tuple[float, ...]] = field(default_factory=dict)  # p_n of the newest, by sequence
     t_newest: float = 0.0
     origin: tuple[float, float, float] | None = None  # latitude deg, longitude deg, height m of n's origin
     run: int = 0
@@ -233,11 +235,19 @@ def _gnss(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.GnssF
     _ring(device, topic, estimator, 9, rate=10.0).append(t, list(p_n))
     if device.origin is not None:  # without an origin the fix would land in another frame than the trajectory
         device.tracks.setdefault("fixes", Track(spacing=0.5)).add(p_n)
+        device.fixes[m.header.sequence] = tuple(p_n)
+        if len(device.fixes) > FIXES_REMEMBERED:
+            device.fixes.pop(next(iter(device.fixes)))
 
 
 def _innovation(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.Innovation) -> None:
     row = _six(m.value) + _six(m.sigma) + [m.nis] + _three(m.error_to_reference)
     _ring(device, topic, estimator, 16, rate=10.0).append(t, row)
+    # A fix withheld on purpose is not accepted either, but it comes with its error.
+    if not m.accepted and not m.error_to_reference and estimator == device.estimators("innovation")[0]:
+        p_n = device.fixes.get(m.for_sequence)
+        if p_n is not None:
+            device.tracks.setdefault("rejected", Track(spacing=0.5)).add(p_n)
 
 
 _ROWS = {

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import viser
 
 from dashboard.scene.feed import Feed
-from dashboard.scene.panels import PAGES, Devices, Record, Snapshot
+from dashboard.scene.panels import PAGES, Devices, Position, Record, Snapshot
 from dashboard.scene.scene import LAYERS, Choice, SceneView
 from dashboard.scene.store import Device, Store
 from messages import gyrofree_pb2 as pb
@@ -35,6 +35,7 @@ class View:
         self._tracks_at = 0.0
         self._lock = threading.RLock()  # callbacks of the browser against the loops
         self._page = 0
+        self._page_chosen = False  # by the person; until then the device's kind says which is of interest
         self._theme()
         self.scene = SceneView(client, self._choice)
         with client.atomic():
@@ -78,6 +79,8 @@ class View:
             t1 = device.t_newest if self._paused_at is None else self._paused_at
             t0 = max(t1 - self._window_s, 0.0)
             snapshot = Snapshot(self._store, device, t0, max(t1, t0 + 1.0), now, self._choice.dark)
+            if not self._page_chosen:
+                self._open(PAGES.index(Position) if device.is_vehicle else 0)
             if self._paused_at is None:
                 self._devices.update(snapshot)
             self._pages[self._page].update(snapshot)
@@ -118,7 +121,7 @@ class View:
         with panel.add_tab("Charts", viser.Icon.CHART_LINE):
             self._marker = gui.add_html("")
             tabs = gui.add_button_group("Page", tuple(page.title for page in PAGES))
-            tabs.on_click(lambda _: self._open([page.title for page in PAGES].index(tabs.value)))
+            tabs.on_click(lambda _: self._choose_page([page.title for page in PAGES].index(tabs.value)))
             self._folders = [gui.add_folder(None, visible=False) for _ in PAGES]
         self._pages = [page(self._client, folder) for page, folder in zip(PAGES, self._folders, strict=True)]
         panel.dock_right()
@@ -136,7 +139,8 @@ class View:
         )
         add("Reset camera", hotkey="R").on_trigger(lambda _: self._reset_camera())
         for index, page in enumerate(PAGES):
-            add(f"Page: {page.title}", hotkey=str(index + 1)).on_trigger(lambda _, index=index: self._open(index))
+            turn = add(f"Page: {page.title}", hotkey=str(index + 1))
+            turn.on_trigger(lambda _, index=index: self._choose_page(index))
 
     # --- what the person does -------------------------------------------------------------------------------------
 
@@ -169,6 +173,11 @@ class View:
             if name != self._device_name and self._store.device(name) is not None:
                 self._device_name = name
                 self._paused_at and self._pause(False)
+
+    def _choose_page(self, index: int) -> None:
+        with self._lock:
+            self._page_chosen = True
+            self._open(index)
 
     def _open(self, index: int) -> None:
         with self._lock:

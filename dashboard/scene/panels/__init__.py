@@ -14,4 +14,4 @@ from dashboard.scene.panels.record import Record
 
 PAGES: tuple[type[Panel], ...] = (Rates, Axes, Acceleration, Angle, Position, Errors, Innovations, Link)
 
-__all__ = ["PAGES", "Devices", "Panel", "Record", "Snapshot"]
+__all__ = ["PAGES", "Devices", "Panel", "Position", "Record", "Snapshot"]

@@ -1,5 +1,7 @@
 """The summary on the left: which device, where its data come from, is it well, and the numbers one looks for first."""
 
+import re
+
 import numpy as np
 
 from dashboard.scene.geometry import MODES
@@ -16,6 +18,14 @@ from dashboard.scene.palette import (
 )
 from dashboard.scene.panels.base import DEG, Panel, Snapshot
 from messages import gyrofree_pb2 as pb
+
+_COUNTS = re.compile(r"fixes (\w+) (\d+)")
+
+
+def counts(message: str) -> dict[str, int] | None:
+    """What an estimator counted, of a message such as 'fixes used 1315, fixes late 2'; None for any other message."""
+    found = [_COUNTS.fullmatch(part) for part in message.split(", ")]
+    return {match[1]: int(match[2]) for match in found} if all(found) else None
 
 
 class Devices(Panel):
@@ -44,7 +54,7 @@ class Devices(Panel):
             f'<span class="gf-name">{escape(device.name)}</span>{state}</div>'
         )
         body = self._vehicle(s) if device.is_vehicle else self._cube(s)
-        return head + self._alerts(s) + body + rows(self._health(s), s.stale("link")) + self._logs(s)
+        return head + self._alerts(s) + self._advice(s) + body + rows(self._health(s), s.stale("link")) + self._logs(s)
 
     @staticmethod
     def _source(s: Snapshot) -> int:
@@ -90,7 +100,8 @@ class Devices(Panel):
     @staticmethod
     def _alerts(s: Snapshot) -> str:
         found = [s.device.get("link")] + [s.device.get("estimator", n) for n in s.device.estimators("estimator")]
-        texts = [latest.message.message for latest in found if latest is not None and latest.message.message]
+        said = [latest.message.message for latest in found if latest is not None and latest.message.message]
+        texts = [text for text in said if counts(text) is None]
         if s.store.dropped:
             texts.append(f"the dashboard could not keep up: {s.store.dropped} messages not shown")
         return "".join(f'<p class="gf-alert">{escape(text)}</p>' for text in texts)
@@ -105,7 +116,7 @@ class Devices(Panel):
             items += [
                 ("link", "connected" if m.connected else '<b class="gf-bad">not connected</b>'),
                 ("sample rate", number(m.sample_rate_hz, 1, "Hz")),
-                ("lost samples · bad bytes", f"{lost} · {m.bad_bytes}"),
+                ("lost · bad bytes", f"{lost} · {m.bad_bytes}"),
                 ("latency p99", number(m.latency_p99_s * 1e3, 2, "ms")),
                 ("clock skew", number(m.clock_skew_ppm, 1, "ppm", sign=True)),
             ]
@@ -114,13 +125,21 @@ class Devices(Panel):
             items.append(("axes fresh", f"{axes - bin(accel.message.stale_mask).count('1')} of {axes}"))
         for name in s.device.estimators("estimator"):
             m = s.device.get("estimator", name).message
-            if not s.stale("estimator", name):
-                items.append((estimator_title(name), f"{escape(m.state)} · {number(m.us_per_sample, 0, 'µs')}/sample"))
-            else:
+            if s.stale("estimator", name):
                 items.append((estimator_title(name), '<b class="gf-bad">silent</b>'))
+                continue
+            state = m.state.partition(":")[0]  # what a person should do stands after the colon, see _advice
+            items.append((estimator_title(name), f"{escape(state)} · {number(m.us_per_sample, 0, 'µs')}"))
+            items += [(f"fixes {what}", number(count, 0)) for what, count in (counts(m.message) or {}).items()]
         if board is not None:
             items.append(("firmware", escape(board.message.firmware)))
         return items
+
+    @staticmethod
+    def _advice(s: Snapshot) -> str:
+        """What an estimator waits for the person to do, such as 'levelling: stand still for 10 s'."""
+        states = [s.device.get("estimator", n).message.state for n in s.device.estimators("estimator")]
+        return "".join(f'<p class="gf-note">{escape(text)}</p>' for text in dict.fromkeys(states) if ":" in text)
 
     @staticmethod
     def _logs(s: Snapshot) -> str:
