@@ -143,8 +143,10 @@ async def login(request: Request) -> Response:
 
 
 @routes.get("/login/link")
-def link_page(request: Request, token: Annotated[str, Query(max_length=200)] = "") -> HTMLResponse:
+def link_page(request: Request, token: Annotated[str, Query(max_length=200)] = "") -> Response:
     """A page with a button that posts: what only looks at a link (mail scanners, prefetch) does not use it up."""
+    if front_of(request).gate.session_of(request) is not None:
+        return RedirectResponse("/", 303)
     return render(request, "link.html", None, token=token)
 
 
