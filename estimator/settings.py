@@ -29,7 +29,7 @@ class EstimatorSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    rate: list[str] = Field(default_factory=lambda: ["least-squares", "products-ekf"])  # gyro-free rate estimators
+    rate: list[str] = Field(default_factory=lambda: ["products-ekf", "least-squares"])  # gyro-free rate estimators
     navigators: list[str] = Field(default_factory=lambda: ["ekf"])  # INS/GNSS filters
     layout: LayoutSettings = LayoutSettings()  # of a device that layouts does not name
     layouts: dict[str, LayoutSettings] = Field(default_factory=dict)  # by device name

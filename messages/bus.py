@@ -16,13 +16,11 @@ import zenoh
 from google.protobuf.message import DecodeError, Message
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from messages.topics import ACCEL, IMU, NAME, NAV, RATE, Topic
+from messages.topics import NAME, Topic
 
 log = logging.getLogger(__name__)
 
 M = TypeVar("M", bound=Message)
-
-EXPRESS = (ACCEL, IMU, RATE, NAV)  # on the way from sensor to solution: sent at once, not batched with others
 
 
 class BusSettings(BaseModel):
@@ -54,8 +52,9 @@ def _config(settings: BusSettings, mode: str) -> zenoh.Config:
         "scouting/gossip/enabled": False,
         "timestamping/enabled": True,
         "transport/link/tx/lease": settings.lease_ms,
-        # A process that gets no processor for a while must not lose messages at once: room for 16 batches (each
-        # express message takes one), and some patience before DROP drops.
+        # A process that gets no processor for a while must not lose messages: room for 16 batches of 64 KiB, and some
+        # patience before DROP drops. Express publishing would be no faster at these rates (measured), but takes a
+        # batch for each message: bursts of 17 were cut off.
         "transport/link/tx/queue/size/data": 16,
         "transport/link/tx/queue/congestion_control/drop/wait_before_drop": patience_us,
     }
@@ -131,9 +130,7 @@ class Publishers:
         """Publish; a message with a header gets this key's next sequence unless the caller set one."""
         key = topic.key(self._prefix, device, estimator)
         if key not in self._by_key:
-            self._by_key[key] = self._session.declare_publisher(
-                key, congestion_control=zenoh.CongestionControl.DROP, express=topic in EXPRESS
-            )
+            self._by_key[key] = self._session.declare_publisher(key, congestion_control=zenoh.CongestionControl.DROP)
         if "header" in message.DESCRIPTOR.fields_by_name and not message.header.sequence:
             self._sequence[key] = self._sequence.get(key, 0) + 1
             message.header.sequence = self._sequence[key]
