@@ -4,6 +4,7 @@ One demo serves all tests of this file, in the order they stand. Tests wait for 
 Screenshots are left in artefacts/.
 """
 
+import threading
 import time
 from collections import deque
 from pathlib import Path
@@ -128,6 +129,18 @@ def until(condition, what, seconds=90):
     return value
 
 
+def wait_for_second_turn(demo):
+    """Until the table turns back in its run, when least squares has drifted already."""
+    settings = load(demo.config)
+    turning = threading.Event()
+    with open_client(settings.bus, timeout_s=30) as session:
+        subscription = subscribe(
+            session, TRUTH, settings.bus.prefix, lambda _, m: 22 < m.profile_time_s < 24 and turning.set(), "cube"
+        )
+        assert turning.wait(90)
+        subscription.undeclare()
+
+
 def test_the_printed_link_signs_in_once(browser, demo):
     first = Visitor(browser, demo, SMALL)
     first.page.goto(demo.link)
@@ -185,7 +198,9 @@ def test_recording_is_started_stopped_downloaded_and_replayed(anna, tmp_path):
     expect(button).to_have_text("Record", timeout=PATIENCE)
 
     page.goto(f"{anna.demo.url}/sessions")
+    page.set_viewport_size(DESKTOP)
     page.screenshot(path=ARTEFACTS / "sessions-1440x900.png")
+    page.set_viewport_size(SMALL)
     row = page.locator("tr", has_text=session)
     with page.expect_download() as download:
         row.get_by_text("Download").click()
@@ -221,7 +236,7 @@ def test_desktop_page_for_the_eye(anna, demo):
     anna.page.goto(demo.url)
     scene = anna.scene
     until(lambda: [t for t in scene.evaluate(PLOTS) if t is not None], "no plot has data")
-    time.sleep(3)  # a full window of curves; nothing is asserted on it
+    wait_for_second_turn(demo)
     anna.page.screenshot(path=ARTEFACTS / "dashboard-1440x900.png")
     anna.page.set_viewport_size(SMALL)
     unexpected = [text for text in anna.complaints if "GPU stall" not in text]
