@@ -47,14 +47,17 @@ def check(settings: Settings, path: Path, as_json: bool) -> int:
     from estimator.service import Pipeline
     from sessions.reproduce import reproduce
 
-    result = reproduce(path, Pipeline(settings.estimator))
+    with Console(stderr=True).status(f"running the estimators over {path.stat().st_size / 1e6:.1f} MB of recording"):
+        result = reproduce(path, Pipeline(settings.estimator))
     if as_json:
         print(json.dumps(result.as_dict(), indent=2))
     else:
-        table = Table("key", "equal", "different", "missing")
+        table = Table("key", "equal", "different", "missing", "first difference")
         for key, row in result.as_dict()["keys"].items():
-            table.add_row(key, *(str(row[name]) for name in ("equal", "different", "missing")))
+            table.add_row(key, *(str(row[name]) for name in ("equal", "different", "missing", "first_difference")))
         Console(file=sys.stdout).print(table)
+        if not result.identical:
+            print("Estimates differ where an estimator began before the recording or missed an input: docs/recordings.md")
     return 0 if result.identical else 1
 
 
