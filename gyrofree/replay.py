@@ -57,7 +57,8 @@ def check(settings: Settings, path: Path, as_json: bool) -> int:
             table.add_row(key, *(str(row[name]) for name in ("equal", "different", "missing", "first_difference")))
         Console(file=sys.stdout).print(table)
         if not result.identical:
-            print("Estimates differ where an estimator began before the recording or missed an input: docs/recordings.md")
+            reason = "an estimator began before the recording, or an input is missing"
+            print(f"Estimates differ where {reason}: docs/recordings.md")
     return 0 if result.identical else 1
 
 
