@@ -13,9 +13,8 @@ COMMANDS = (
 
 
 def gyrofree(*arguments, cwd, stdin=""):
-    return subprocess.run(
-        [sys.executable, "-m", "gyrofree", *arguments], cwd=cwd, input=stdin, capture_output=True, text=True, timeout=120
-    )
+    command = [sys.executable, "-m", "gyrofree", *arguments]
+    return subprocess.run(command, cwd=cwd, input=stdin, capture_output=True, text=True, timeout=120)
 
 
 def refused(result, code, *wanted):
@@ -94,7 +93,8 @@ def test_doctor_finds_no_life_where_there_is_none(tmp_path, free_port):
 
 
 def test_users_are_added_listed_and_removed(tmp_path):
-    assert gyrofree("users", "add", "anna", "--role", "viewer", cwd=tmp_path, stdin="a long pass phrase\n").returncode == 0
+    added = gyrofree("users", "add", "anna", "--role", "viewer", cwd=tmp_path, stdin="a long pass phrase\n")
+    assert added.returncode == 0
     assert json.loads(gyrofree("users", "list", "--json", cwd=tmp_path).stdout) == [{"name": "anna", "role": "viewer"}]
     refused(gyrofree("users", "add", "bob", "--role", "king", cwd=tmp_path, stdin="a long pass phrase\n"), 2, "king")
     refused(gyrofree("users", "add", "bob", "--role", "viewer", cwd=tmp_path, stdin="short\n"), 2, "password")

@@ -21,7 +21,8 @@ def write(tmp_path, text):
         ("[dashboard]\nport = 'http'\n", [":2", "[dashboard] port = 'http'", "valid integer"]),
         ("[bus\n", ["not TOML"]),
         (
-            "[[gateway.devices]]\nname = 'cube'\nport = '/dev/x'\n[[gateway.devices]]\nname = 'b'\nport = '/y'\nbaudd = 1\n",
+            "[[gateway.devices]]\nname = 'cube'\nport = '/dev/x'\n"
+            "[[gateway.devices]]\nname = 'b'\nport = '/y'\nbaudd = 1\n",
             [":7", "gateway.devices", "'baudd'", "did you mean 'baud'"],
         ),
     ],
