@@ -73,6 +73,7 @@ def reproduce(path: Path, pipeline: Pipeline) -> Report:
     recorded: dict[str, dict[tuple, bytes]] = defaultdict(dict)
     computed: dict[str, dict[tuple, bytes]] = defaultdict(dict)
     damage = Damage()
+    first = _first_used(path)
     inputs = refused = 0
     for row in read(path, damage):
         try:
@@ -87,6 +88,8 @@ def reproduce(path: Path, pipeline: Pipeline) -> Report:
             _keep(recorded[row.key], message)
             continue
         inputs += 1
+        if address.topic is ACCEL and message.header.sequence < first.get((row.key, message.header.run), 0):
+            continue  # the estimator was not there yet
         try:
             outputs = list(pipeline.on(address.topic, message))
         except ValueError:
@@ -98,6 +101,22 @@ def reproduce(path: Path, pipeline: Pipeline) -> Report:
     keys = sorted(recorded.keys() | computed.keys())
     compared = {key: _compare(parse(key).topic, recorded[key], computed[key]) for key in keys}
     return Report(compared, inputs, refused, str(damage))
+
+
+def _first_used(path: Path) -> dict[tuple[str, int], int]:
+    """Sequence of the first accelerometer batch that has a recorded rate estimate, by input key and gateway run."""
+    first: dict[tuple[str, int], int] = {}
+    for row in read(path, Damage()):
+        try:
+            address = parse(row.key)
+            if address.topic is not RATE:
+                continue
+            message = RATE.type.FromString(row.payload)
+        except (TopicError, DecodeError):
+            continue
+        name = (ACCEL.key(address.prefix, address.device), message.header.run)
+        first[name] = min(first.get(name, message.for_sequence), message.for_sequence)
+    return first
 
 
 def _keep(table: dict[tuple, bytes], message: Message) -> None:
