@@ -6,6 +6,7 @@ any source of this folder is thrown away first.
 
 import itertools
 import logging
+import logging
 import time
 from pathlib import Path
 
@@ -36,8 +37,12 @@ def drop_stale(folder: Path = HERE) -> int:
 
 def warm() -> None:
     """Compile, or load from the cache, every function of the live path by running it on made-up motion."""
-    _warm_navigators()
-    _warm_rates()
+    logging.disable(logging.INFO)  # the made-up motion is no news
+    try:
+        _warm_navigators()
+        _warm_rates()
+    finally:
+        logging.disable(logging.NOTSET)
 
 
 def _warm_rates() -> None:
