@@ -6,7 +6,6 @@ any source of this folder is thrown away first.
 
 import itertools
 import logging
-import logging
 import time
 from pathlib import Path
 
