@@ -6,14 +6,12 @@ started by hand.
 
 import secrets
 import time
-import urllib.error
-import urllib.request
 from dataclasses import dataclass
 from pathlib import Path
 
 from dashboard.users import add_user, issue_link_token
 from gyrofree.config import Settings, load
-from gyrofree.doctor import port_taken
+from gyrofree.doctor import health, port_taken
 from gyrofree.process import EXIT_FAILED, EXIT_TAKEN, fail, start_logging, stop_on_signals
 from gyrofree.supervisor import Supervisor
 
@@ -88,7 +86,7 @@ def run(plan: Plan) -> None:
     try:
         while not stop.wait(TICK) and supervisor.fatal is None:
             supervisor.step()
-            if not said and _answers(settings):
+            if not said and health("dashboard", settings).state == "ok":
                 said = True
                 supervisor.say(f"open  {url}", "bold green")
             elif not said and time.monotonic() > deadline:
@@ -114,14 +112,4 @@ def _sign_in_link(settings: Settings) -> str:
     users = Path(settings.dashboard.users)
     add_user(users, USER, secrets.token_urlsafe(24), "operator")
     token = issue_link_token(users, USER)
-    return f"http://{settings.dashboard.host}:{settings.dashboard.port}/login/link?token={token}"
-
-
-def _answers(settings: Settings) -> bool:
-    try:
-        url = f"http://{settings.dashboard.host}:{settings.dashboard.port}/api/health"
-        with urllib.request.urlopen(url, timeout=1.0) as answer:
-            return answer.status == 200
-    except (urllib.error.URLError, OSError):
-        return False
-
+    return f"{settings.dashboard.url}/login/link?token={token}"
