@@ -29,7 +29,7 @@ setup: .make/warm
 	$(PIP) install --quiet --no-deps --no-build-isolation --editable .
 	@touch $@
 
-.make/warm: .make/runtime $(wildcard estimator/*.py)
+.make/warm: .make/runtime $(wildcard estimator/*.py estimator/*/*.py)
 	@echo "Compiling the filters once, for the cache ..."
 	@$(BIN)/python -m estimator.warm
 	@touch $@
@@ -43,6 +43,11 @@ system-packages:
 	@missing=""; \
 	command -v chromium >/dev/null || missing="$$missing chromium fonts-dejavu-core"; \
 	command -v gcc >/dev/null || missing="$$missing gcc libc6-dev"; \
+	command -v arm-none-eabi-gcc >/dev/null || missing="$$missing gcc-arm-none-eabi"; \
+	command -v qemu-system-arm >/dev/null || missing="$$missing qemu-system-arm"; \
+	command -v clang >/dev/null || missing="$$missing clang libclang-rt-14-dev"; \
+	command -v clang-tidy >/dev/null || missing="$$missing clang-tidy"; \
+	command -v cppcheck >/dev/null || missing="$$missing cppcheck"; \
 	[ -z "$$missing" ] || if [ "$$(id -u)" = 0 ]; then apt-get update -q && apt-get install -y -q --no-install-recommends $$missing; \
 	else echo "The tests need Debian packages; run: sudo apt-get install$$missing"; exit 1; fi
 

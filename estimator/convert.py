@@ -9,8 +9,8 @@ import numpy as np
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from numpy.typing import NDArray
 
-from estimator.fix import Fix, typical_sigma
-from estimator.navigation import INNOVATIONS, Correction, Solution
+from estimator.ins.fix import Fix, typical_sigma
+from estimator.ins.navigation import INNOVATIONS, Correction, Solution
 from messages import gyrofree_pb2 as pb
 
 Array = NDArray[np.float64]

@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 from google.protobuf.message import Message
 
 from estimator import convert
-from estimator.nav_board import NavBoard
-from estimator.navigation import NAVIGATORS, Correction, Mode, NavigatorConfig
-from estimator.rate_board import RateBoard, WrongAxes
+from estimator.ins.board import NavBoard
+from estimator.ins.navigation import NAVIGATORS, Correction, Mode, NavigatorConfig
+from estimator.rate.board import RateBoard, WrongAxes
 from estimator.settings import EstimatorSettings, LayoutSettings
 from estimator.stream import Stream, every, worth_a_line
 from estimator.warm import warm
@@ -206,7 +206,7 @@ class UnknownEstimator(ValueError):
 
 def rate_estimators() -> dict[str, Any]:
     """The table of rate estimators."""
-    from estimator.rate import ESTIMATORS  # here: the tables of names need not load with the settings
+    from estimator.rate.estimators import ESTIMATORS  # here: the tables of names need not load with the settings
 
     return ESTIMATORS
 
@@ -220,7 +220,7 @@ def check_names(key: str, names: list[str], known: dict[str, Any]) -> None:
 
 def make_layout(settings: LayoutSettings) -> Any:
     """Accelerometer layout from its settings."""
-    from estimator.layout import CUBE
+    from estimator.layouts.layout import CUBE
 
     return CUBE(settings.half_side_m)
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator.fix import RTK_FIXED, Fix
-from estimator.navigation import NAVIGATORS, Mode
-from estimator.rate import ESTIMATORS
-from estimator.simulation import TableTest
+from estimator.ins.fix import RTK_FIXED, Fix
+from estimator.ins.navigation import NAVIGATORS, Mode
+from estimator.rate.estimators import ESTIMATORS
+from estimator.simulation.table import TableTest
 
 log = logging.getLogger(__name__)
 

@@ -178,7 +178,7 @@ def simulate(
     Attach a gateway to the printed port. The true motion goes to the bus as its own topic, marked simulated.
     """
     settings = settings_of(config)
-    from estimator.profiles import PROFILES
+    from estimator.simulation.profiles import PROFILES
 
     if profile not in PROFILES:
         raise fail(f"--profile {profile!r}: want one of {', '.join(PROFILES)}", CONFIG)

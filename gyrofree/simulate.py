@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from pynmeagps import GET, NMEAMessage
 
-from estimator.simulation import BLOCK, TableTest, Truth
+from estimator.simulation.table import BLOCK, TableTest, Truth
 from gateway.board_link import PtyLink, TcpLink
 from gateway.virtual_board import SIMULATED, BoardAccel, BoardBytes, BoardPulse, Item, VirtualBoard
 from messages import gyrofree_pb2 as pb

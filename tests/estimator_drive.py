@@ -5,10 +5,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.earth import radii
-from estimator.fix import RTK_FIXED, Fix
-from estimator.score import Drive
-from estimator.strapdown import BA, BG, LAT, LON, SIZE, C, H, V, euler_to_dcm, inverse_step
+from estimator.ins.earth import radii
+from estimator.ins.fix import RTK_FIXED, Fix
+from estimator.ins.strapdown import BA, BG, LAT, LON, SIZE, C, H, V, euler_to_dcm, inverse_step
+from estimator.offline.score import Drive
 
 Array = NDArray[np.float64]
 DT = 0.01

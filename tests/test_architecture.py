@@ -42,7 +42,7 @@ def test_imports_follow_the_data(room):
 
 
 def test_only_the_shell_of_the_estimator_knows_the_bus():
-    for path in (ROOT / "estimator").glob("*.py"):
+    for path in (ROOT / "estimator").rglob("*.py"):
         if path.name not in ESTIMATOR_SHELL:
             assert "messages" not in rooms(imported(path)), path
 

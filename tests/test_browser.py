@@ -91,7 +91,7 @@ class Visitor:
         return frame
 
     def api(self, path, body=None):
-        """Status and answer of a call with this visitor's cookies; not through the page, which may be on its way elsewhere."""
+        """Status and answer of a call with this visitor's cookies, beside the page: that may be navigating."""
         request, url = self.context.request, f"{self.demo.url}/api"
         if body is None:
             answer = request.get(f"{url}/{path}")

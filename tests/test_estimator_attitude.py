@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from estimator.attitude import from_dcm, from_rotation_vector, level, multiply, skew, tilt_correction, to_dcm
+from estimator.attitude.rotation import from_dcm, from_rotation_vector, level, multiply, skew, tilt_correction, to_dcm
 
 law = settings(deadline=None, max_examples=50)  # the first call may compile
 numbers = st.floats(-3.0, 3.0)

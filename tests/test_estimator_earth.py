@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from estimator.earth import E2, OMEGA, A, earth_rate, gravity, ned_between, radii, transport_rate
+from estimator.ins.earth import E2, OMEGA, A, earth_rate, gravity, ned_between, radii, transport_rate
 
 
 def test_radii_at_equator_and_pole() -> None:

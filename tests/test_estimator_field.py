@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimator.field import cube_angular_acceleration, cube_specific_force, field_from_triads, solve
-from estimator.layout import CORNERS, CUBE, LAYOUTS, WIRING, products
+from estimator.layouts.layout import CORNERS, CUBE, LAYOUTS, WIRING, products
+from estimator.rate.field import cube_angular_acceleration, cube_specific_force, field_from_triads, solve
 
 law = settings(deadline=None, max_examples=50)  # the first call may compile
 numbers = st.floats(-20.0, 20.0)

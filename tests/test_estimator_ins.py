@@ -7,10 +7,10 @@ import pytest
 from estimator_drive import DT, exact
 from numpy.typing import NDArray
 
-from estimator import ins_ekf
-from estimator.earth import ned_between
-from estimator.ins_error import STATES, ImuNoise, fix_residual
-from estimator.strapdown import LAT, LON, C, H, V, rotation_vector
+from estimator.ins import ekf as ins_ekf
+from estimator.ins.earth import ned_between
+from estimator.ins.error_model import STATES, ImuNoise, fix_residual
+from estimator.ins.strapdown import LAT, LON, C, H, V, rotation_vector
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimator.layout import CUBE, LAYOUTS, GeometryError, Layout, products, products_matrix
+from estimator.layouts.layout import CUBE, LAYOUTS, GeometryError, Layout, products, products_matrix
 
 law = settings(deadline=None, max_examples=50)  # the first call may compile
 numbers = st.floats(-20.0, 20.0)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from estimator import least_squares
-from estimator.layout import CUBE, LAYOUTS, GeometryError, Layout
-from estimator.rate import ESTIMATORS, LeastSquaresRate
-from estimator.simulation import IDEAL, TableTest
+from estimator.layouts.layout import CUBE, LAYOUTS, GeometryError, Layout
+from estimator.rate import least_squares
+from estimator.rate.estimators import ESTIMATORS, LeastSquaresRate
+from estimator.simulation.table import IDEAL, TableTest
 
 
 def run(table, seconds=30.0, estimator=None, skip=()):

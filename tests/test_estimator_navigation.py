@@ -8,12 +8,12 @@ import pytest
 from estimator_drive import DT, drive, exact, fix_at
 from numpy.typing import NDArray
 
-from estimator.earth import ned_between
-from estimator.ins_ekf import current_covariance
-from estimator.ins_error import ImuNoise
-from estimator.navigation import EkfNavigator, Mode
-from estimator.score import score_drive
-from estimator.strapdown import LAT, LON, C, H, V, dcm_to_euler, rotation_vector
+from estimator.ins.earth import ned_between
+from estimator.ins.ekf import current_covariance
+from estimator.ins.error_model import ImuNoise
+from estimator.ins.navigation import EkfNavigator, Mode
+from estimator.ins.strapdown import LAT, LON, C, H, V, dcm_to_euler, rotation_vector
+from estimator.offline.score import score_drive
 
 Array = NDArray[np.float64]
 STILL = 12.0  # s

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimator import products_model as model
-from estimator.layout import CUBE, LAYOUTS, GeometryError, Layout
-from estimator.rate import LeastSquaresRate, ProductsRate
-from estimator.simulation import IDEAL, TableTest
+from estimator.layouts.layout import CUBE, LAYOUTS, GeometryError, Layout
+from estimator.rate import products_model as model
+from estimator.rate.estimators import LeastSquaresRate, ProductsRate
+from estimator.simulation.table import IDEAL, TableTest
 
 law = settings(deadline=None, max_examples=40)  # the first call compiles
 numbers = st.floats(-5.0, 5.0)

@@ -13,7 +13,7 @@ from estimator import service
 from estimator.convert import BadMessage
 from estimator.service import Output, Pipeline, UnknownEstimator
 from estimator.settings import EstimatorSettings, LayoutSettings
-from estimator.simulation import TableTest
+from estimator.simulation.table import TableTest
 from estimator.stream import Stream, every, worth_a_line
 from messages import gyrofree_pb2 as pb
 from messages.bus import BusSettings, Publishers, open_client, open_router, subscribe

@@ -5,9 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
-from estimator.attitude import to_dcm
-from estimator.profiles import PROFILES
-from estimator.simulation import BLOCK, COUNTS, GRAVITY, IDEAL, SensorModel, TableTest
+from estimator.attitude.rotation import to_dcm
+from estimator.simulation.profiles import PROFILES
+from estimator.simulation.table import BLOCK, COUNTS, GRAVITY, IDEAL, SensorModel, TableTest
 
 
 @pytest.mark.parametrize("name", PROFILES)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from estimator.layout import CUBE, LAYOUTS
-from estimator.simulation import TableTest
-from estimator.still import Config, Standstill, StillDetector, quiet_map
+from estimator.layouts.layout import CUBE, LAYOUTS
+from estimator.rate.still import Config, Standstill, StillDetector, quiet_map
+from estimator.simulation.table import TableTest
 
 SURE = 0.02**2 * np.eye(3)
 

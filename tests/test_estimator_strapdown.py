@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from estimator.earth import ned_between
-from estimator.strapdown import (
+from estimator.ins.earth import ned_between
+from estimator.ins.strapdown import (
     LAT,
     LON,
     C,

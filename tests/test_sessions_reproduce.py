@@ -8,9 +8,9 @@ import pytest
 from test_sessions_bus import PATIENCE, bus, client, order, recording, until
 
 from estimator import service
-from estimator.rate import ESTIMATORS
+from estimator.rate.estimators import ESTIMATORS
 from estimator.settings import EstimatorSettings
-from estimator.simulation import TableTest
+from estimator.simulation.table import TableTest
 from messages import gyrofree_pb2 as pb
 from messages.bus import subscribe
 from messages.topics import ACCEL, RATE

@@ -6,7 +6,7 @@ up), so every node below it carries its quaternion and position as they stand in
 
 import numpy as np
 
-from estimator.layout import CUBE
+from estimator.layouts.layout import CUBE
 from messages import gyrofree_pb2 as pb
 
 # Rotation n (north, east, down) -> display (east, north, up): half a turn about (1, 1, 0), w x y z.

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator import ins_ekf
-from estimator.ins_error import ImuNoise
-from estimator.score import read_drive, score_drive
+from estimator.ins import ekf as ins_ekf
+from estimator.ins.error_model import ImuNoise
+from estimator.offline.score import read_drive, score_drive
 from estimator.warm import warm
 
 ROOT = Path(__file__).resolve().parents[2]

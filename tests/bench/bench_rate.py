@@ -14,8 +14,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
 
-from estimator.rate import ESTIMATORS  # noqa: E402
-from estimator.simulation import TableTest  # noqa: E402
+from estimator.rate.estimators import ESTIMATORS  # noqa: E402
+from estimator.simulation.table import TableTest  # noqa: E402
 
 
 def errors(name: str, seed: int, profile: str) -> tuple[np.ndarray, float, float]:

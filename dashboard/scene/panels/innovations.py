@@ -16,7 +16,7 @@ from dashboard.scene.store import (
     RATE_NIS,
     RATE_NIS_DOF,
 )
-from estimator.layout import PRODUCTS
+from estimator.layouts.layout import PRODUCTS
 
 INSIDE = 0.95  # share of NIS values that an honest filter has between the two bounds
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator import ins_ekf
+from estimator.ins import ekf as ins_ekf
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.fix import RTK_FIXED, Fix
-from estimator.navigation import NAVIGATORS, Mode, NavigatorConfig
+from estimator.ins.fix import RTK_FIXED, Fix
+from estimator.ins.navigation import NAVIGATORS, Mode, NavigatorConfig
 
 Array = NDArray[np.float64]
 

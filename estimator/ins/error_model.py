@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from estimator.earth import OMEGA, earth_rate, gravity, ned_between, radii, transport_rate
+from estimator.ins.earth import OMEGA, earth_rate, gravity, ned_between, radii, transport_rate
 
 Array = NDArray[np.float64]
 

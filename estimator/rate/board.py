@@ -33,7 +33,7 @@ class RateBoard:
 
     def __init__(self, device: str, layout: Any, names: list[str], rate_limit_hz: float) -> None:
         """Names are keys of estimator.rate.ESTIMATORS."""
-        from estimator.rate import ESTIMATORS  # here: loads only where accelerometers are
+        from estimator.rate.estimators import ESTIMATORS  # here: loads only where accelerometers are
 
         self.device = device
         self.layout = layout

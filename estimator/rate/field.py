@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.layout import PRODUCTS, Layout
+from estimator.layouts.layout import PRODUCTS, Layout
 
 Array = NDArray[np.float64]
 

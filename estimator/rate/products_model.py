@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from estimator.attitude import from_rotation_vector, skew, to_dcm
+from estimator.attitude.rotation import from_rotation_vector, skew, to_dcm
 
 Array = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from estimator import still as stillness
-from estimator.attitude import level, to_dcm
-from estimator.field import checked
-from estimator.layout import Layout, products
+from estimator.attitude.rotation import level, to_dcm
+from estimator.layouts.layout import Layout, products
+from estimator.rate import still as stillness
+from estimator.rate.field import checked
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.fix import Fix
-from estimator.navigation import NAVIGATORS, Correction, NavigatorConfig, Solution
+from estimator.ins.fix import Fix
+from estimator.ins.navigation import NAVIGATORS, Correction, NavigatorConfig, Solution
 from estimator.stream import Stream, every, worth_a_line
 
 log = logging.getLogger(__name__)

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.layout import CUBE, Layout
-from estimator.profiles import DEGREE, PROFILES, Profile
+from estimator.layouts.layout import CUBE, Layout
+from estimator.simulation.profiles import DEGREE, PROFILES, Profile
 
 Array = NDArray[np.float64]
 

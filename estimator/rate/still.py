@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from estimator.layout import Layout
+from estimator.layouts.layout import Layout
 
 Array = NDArray[np.float64]
 

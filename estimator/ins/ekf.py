@@ -12,9 +12,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from estimator.earth import radii
-from estimator.ins_error import STATES, ImuNoise, accumulate, fill_error_matrix
-from estimator.strapdown import SIZE, orthonormalise, rotation, step, turn
+from estimator.ins.earth import radii
+from estimator.ins.error_model import STATES, ImuNoise, accumulate, fill_error_matrix
+from estimator.ins.strapdown import SIZE, orthonormalise, rotation, step, turn
 
 Array = NDArray[np.float64]
 

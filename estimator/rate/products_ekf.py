@@ -11,10 +11,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from estimator import products_model as model
-from estimator import still as stillness
-from estimator.attitude import from_rotation_vector, level, multiply, tilt_correction, to_dcm
-from estimator.layout import Layout
+from estimator.attitude.rotation import from_rotation_vector, level, multiply, tilt_correction, to_dcm
+from estimator.layouts.layout import Layout
+from estimator.rate import products_model as model
+from estimator.rate import still as stillness
 
 Array = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator import least_squares, products_ekf
-from estimator import products_model as model
-from estimator.field import checked
-from estimator.layout import Layout
+from estimator.layouts.layout import Layout
+from estimator.rate import least_squares, products_ekf
+from estimator.rate import products_model as model
+from estimator.rate.field import checked
 
 Array = NDArray[np.float64]
 

@@ -14,13 +14,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator import ins_ekf
-from estimator.alignment import Alignment, AlignmentSettings
-from estimator.earth import ned_between
-from estimator.fix import Fix, FixSettings, fix_noise
-from estimator.history import History
-from estimator.ins_error import DP, STATES, ImuNoise, fix_residual
-from estimator.strapdown import BA, BG, LAT, LON, C, H, V, dcm_to_quaternion, exp
+from estimator.ins import ekf as ins_ekf
+from estimator.ins.alignment import Alignment, AlignmentSettings
+from estimator.ins.earth import ned_between
+from estimator.ins.error_model import DP, STATES, ImuNoise, fix_residual
+from estimator.ins.fix import Fix, FixSettings, fix_noise
+from estimator.ins.history import History
+from estimator.ins.strapdown import BA, BG, LAT, LON, C, H, V, dcm_to_quaternion, exp
 
 log = logging.getLogger(__name__)
 

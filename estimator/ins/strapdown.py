@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from estimator.earth import earth_rate, gravity, radii, transport_rate
+from estimator.ins.earth import earth_rate, gravity, radii, transport_rate
 
 Array = NDArray[np.float64]
 

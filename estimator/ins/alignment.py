@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.strapdown import dcm_to_euler, euler_to_dcm, exp
+from estimator.ins.strapdown import dcm_to_euler, euler_to_dcm, exp
 
 Array = NDArray[np.float64]
 

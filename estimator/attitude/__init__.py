@@ -1,0 +1,1 @@
+"""Rotations, and attitude from accelerometers and gyroscopes."""

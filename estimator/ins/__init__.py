@@ -1,0 +1,1 @@
+"""Inertial navigation: Earth, mechanisation, error model, filters, alignment."""

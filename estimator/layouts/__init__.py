@@ -1,0 +1,1 @@
+"""Where the accelerometer axes sit and point, and what a layout can see."""

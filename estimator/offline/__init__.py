@@ -1,0 +1,1 @@
+"""Logs on disk instead of the bus: run, score, draw."""

@@ -1,0 +1,1 @@
+"""Analytic motions and sensor models: the truth that estimators are judged by."""
