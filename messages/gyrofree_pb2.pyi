@@ -21,7 +21,7 @@ SOURCE_EMULATED: Source
 SOURCE_PLAYED: Source
 
 class Header(_message.Message):
-    __slots__ = ("device", "sequence", "epoch", "device_us", "utc_ns", "utc_sigma_s", "source", "run")
+    __slots__ = ("device", "sequence", "epoch", "device_us", "utc_ns", "utc_sigma_s", "source", "run", "late")
     DEVICE_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     EPOCH_FIELD_NUMBER: _ClassVar[int]
@@ -30,6 +30,7 @@ class Header(_message.Message):
     UTC_SIGMA_S_FIELD_NUMBER: _ClassVar[int]
     SOURCE_FIELD_NUMBER: _ClassVar[int]
     RUN_FIELD_NUMBER: _ClassVar[int]
+    LATE_FIELD_NUMBER: _ClassVar[int]
     device: str
     sequence: int
     epoch: int
@@ -38,7 +39,8 @@ class Header(_message.Message):
     utc_sigma_s: float
     source: Source
     run: int
-    def __init__(self, device: _Optional[str] = ..., sequence: _Optional[int] = ..., epoch: _Optional[int] = ..., device_us: _Optional[int] = ..., utc_ns: _Optional[int] = ..., utc_sigma_s: _Optional[float] = ..., source: _Optional[_Union[Source, str]] = ..., run: _Optional[int] = ...) -> None: ...
+    late: bool
+    def __init__(self, device: _Optional[str] = ..., sequence: _Optional[int] = ..., epoch: _Optional[int] = ..., device_us: _Optional[int] = ..., utc_ns: _Optional[int] = ..., utc_sigma_s: _Optional[float] = ..., source: _Optional[_Union[Source, str]] = ..., run: _Optional[int] = ..., late: _Optional[bool] = ...) -> None: ...
 
 class AccelBatch(_message.Message):
     __slots__ = ("header", "first_index", "period_s", "axes", "counts", "f_mps2", "stale_mask", "lost_samples", "frame_sequence", "received_ns")
@@ -212,7 +214,7 @@ class LinkStatus(_message.Message):
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., connected: _Optional[bool] = ..., port: _Optional[str] = ..., message: _Optional[str] = ..., bytes_in: _Optional[int] = ..., good_frames: _Optional[int] = ..., good_bytes: _Optional[int] = ..., bad_chunks: _Optional[int] = ..., bad_bytes: _Optional[int] = ..., pending_bytes: _Optional[int] = ..., lost_frames: _Optional[int] = ..., device_dropped: _Optional[int] = ..., lost_samples: _Optional[int] = ..., reboots: _Optional[int] = ..., unknown_frames: _Optional[int] = ..., reconnects: _Optional[int] = ..., sample_rate_hz: _Optional[float] = ..., frame_rate_hz: _Optional[float] = ..., latency_p50_s: _Optional[float] = ..., latency_p99_s: _Optional[float] = ..., clock_skew_ppm: _Optional[float] = ..., clock_residual_s: _Optional[float] = ..., clock_window_s: _Optional[float] = ..., journal_sequence: _Optional[int] = ..., durable_sequence: _Optional[int] = ..., gnss_good: _Optional[int] = ..., gnss_bad: _Optional[int] = ..., damage: _Optional[_Mapping[str, int]] = ...) -> None: ...
 
 class BoardInfo(_message.Message):
-    __slots__ = ("header", "board_id", "uid", "firmware", "axes", "sample_period_s", "status")
+    __slots__ = ("header", "board_id", "uid", "firmware", "axes", "sample_period_s", "status", "faults")
     class StatusEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -227,6 +229,7 @@ class BoardInfo(_message.Message):
     AXES_FIELD_NUMBER: _ClassVar[int]
     SAMPLE_PERIOD_S_FIELD_NUMBER: _ClassVar[int]
     STATUS_FIELD_NUMBER: _ClassVar[int]
+    FAULTS_FIELD_NUMBER: _ClassVar[int]
     header: Header
     board_id: int
     uid: str
@@ -234,10 +237,53 @@ class BoardInfo(_message.Message):
     axes: int
     sample_period_s: float
     status: _containers.ScalarMap[str, int]
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., board_id: _Optional[int] = ..., uid: _Optional[str] = ..., firmware: _Optional[str] = ..., axes: _Optional[int] = ..., sample_period_s: _Optional[float] = ..., status: _Optional[_Mapping[str, int]] = ...) -> None: ...
+    faults: _containers.RepeatedCompositeFieldContainer[Fault]
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., board_id: _Optional[int] = ..., uid: _Optional[str] = ..., firmware: _Optional[str] = ..., axes: _Optional[int] = ..., sample_period_s: _Optional[float] = ..., status: _Optional[_Mapping[str, int]] = ..., faults: _Optional[_Iterable[_Union[Fault, _Mapping]]] = ...) -> None: ...
+
+class Fault(_message.Message):
+    __slots__ = ("name", "text", "since_utc_ns", "active")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    SINCE_UTC_NS_FIELD_NUMBER: _ClassVar[int]
+    ACTIVE_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    text: str
+    since_utc_ns: int
+    active: bool
+    def __init__(self, name: _Optional[str] = ..., text: _Optional[str] = ..., since_utc_ns: _Optional[int] = ..., active: _Optional[bool] = ...) -> None: ...
+
+class AdcBatch(_message.Message):
+    __slots__ = ("header", "first_index", "period_s", "channels", "counts", "volt_per_count", "lost_samples", "frame_sequence", "received_ns")
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    FIRST_INDEX_FIELD_NUMBER: _ClassVar[int]
+    PERIOD_S_FIELD_NUMBER: _ClassVar[int]
+    CHANNELS_FIELD_NUMBER: _ClassVar[int]
+    COUNTS_FIELD_NUMBER: _ClassVar[int]
+    VOLT_PER_COUNT_FIELD_NUMBER: _ClassVar[int]
+    LOST_SAMPLES_FIELD_NUMBER: _ClassVar[int]
+    FRAME_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    RECEIVED_NS_FIELD_NUMBER: _ClassVar[int]
+    header: Header
+    first_index: int
+    period_s: float
+    channels: int
+    counts: _containers.RepeatedScalarFieldContainer[int]
+    volt_per_count: float
+    lost_samples: int
+    frame_sequence: int
+    received_ns: int
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., first_index: _Optional[int] = ..., period_s: _Optional[float] = ..., channels: _Optional[int] = ..., counts: _Optional[_Iterable[int]] = ..., volt_per_count: _Optional[float] = ..., lost_samples: _Optional[int] = ..., frame_sequence: _Optional[int] = ..., received_ns: _Optional[int] = ...) -> None: ...
 
 class RateEstimate(_message.Message):
-    __slots__ = ("header", "estimator", "for_sequence", "for_index", "omega_ib_b_radps", "omega_covariance", "alpha_b_radps2", "f_b_mps2", "q_nb", "angle_z_rad", "innovation", "innovation_sigma", "nis", "nis_dof", "still", "p_n_m", "v_n_mps", "bias", "innovation_unit")
+    __slots__ = ("header", "estimator", "for_sequence", "for_index", "omega_ib_b_radps", "omega_covariance", "alpha_b_radps2", "f_b_mps2", "q_nb", "angle_z_rad", "innovation", "innovation_sigma", "nis", "nis_dof", "still", "p_n_m", "v_n_mps", "bias", "innovation_unit", "sight", "sight_reason", "bound_sigma_radps", "calibration", "excluded_mask")
+    class Sight(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        SIGHT_VALID: _ClassVar[RateEstimate.Sight]
+        SIGHT_AMBIGUOUS: _ClassVar[RateEstimate.Sight]
+        SIGHT_BLIND: _ClassVar[RateEstimate.Sight]
+    SIGHT_VALID: RateEstimate.Sight
+    SIGHT_AMBIGUOUS: RateEstimate.Sight
+    SIGHT_BLIND: RateEstimate.Sight
     HEADER_FIELD_NUMBER: _ClassVar[int]
     ESTIMATOR_FIELD_NUMBER: _ClassVar[int]
     FOR_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
@@ -257,6 +303,11 @@ class RateEstimate(_message.Message):
     V_N_MPS_FIELD_NUMBER: _ClassVar[int]
     BIAS_FIELD_NUMBER: _ClassVar[int]
     INNOVATION_UNIT_FIELD_NUMBER: _ClassVar[int]
+    SIGHT_FIELD_NUMBER: _ClassVar[int]
+    SIGHT_REASON_FIELD_NUMBER: _ClassVar[int]
+    BOUND_SIGMA_RADPS_FIELD_NUMBER: _ClassVar[int]
+    CALIBRATION_FIELD_NUMBER: _ClassVar[int]
+    EXCLUDED_MASK_FIELD_NUMBER: _ClassVar[int]
     header: Header
     estimator: str
     for_sequence: int
@@ -276,10 +327,15 @@ class RateEstimate(_message.Message):
     v_n_mps: _containers.RepeatedScalarFieldContainer[float]
     bias: _containers.RepeatedScalarFieldContainer[float]
     innovation_unit: str
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., for_sequence: _Optional[int] = ..., for_index: _Optional[int] = ..., omega_ib_b_radps: _Optional[_Iterable[float]] = ..., omega_covariance: _Optional[_Iterable[float]] = ..., alpha_b_radps2: _Optional[_Iterable[float]] = ..., f_b_mps2: _Optional[_Iterable[float]] = ..., q_nb: _Optional[_Iterable[float]] = ..., angle_z_rad: _Optional[float] = ..., innovation: _Optional[_Iterable[float]] = ..., innovation_sigma: _Optional[_Iterable[float]] = ..., nis: _Optional[float] = ..., nis_dof: _Optional[int] = ..., still: _Optional[bool] = ..., p_n_m: _Optional[_Iterable[float]] = ..., v_n_mps: _Optional[_Iterable[float]] = ..., bias: _Optional[_Iterable[float]] = ..., innovation_unit: _Optional[str] = ...) -> None: ...
+    sight: _containers.RepeatedScalarFieldContainer[RateEstimate.Sight]
+    sight_reason: str
+    bound_sigma_radps: _containers.RepeatedScalarFieldContainer[float]
+    calibration: str
+    excluded_mask: int
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., for_sequence: _Optional[int] = ..., for_index: _Optional[int] = ..., omega_ib_b_radps: _Optional[_Iterable[float]] = ..., omega_covariance: _Optional[_Iterable[float]] = ..., alpha_b_radps2: _Optional[_Iterable[float]] = ..., f_b_mps2: _Optional[_Iterable[float]] = ..., q_nb: _Optional[_Iterable[float]] = ..., angle_z_rad: _Optional[float] = ..., innovation: _Optional[_Iterable[float]] = ..., innovation_sigma: _Optional[_Iterable[float]] = ..., nis: _Optional[float] = ..., nis_dof: _Optional[int] = ..., still: _Optional[bool] = ..., p_n_m: _Optional[_Iterable[float]] = ..., v_n_mps: _Optional[_Iterable[float]] = ..., bias: _Optional[_Iterable[float]] = ..., innovation_unit: _Optional[str] = ..., sight: _Optional[_Iterable[_Union[RateEstimate.Sight, str]]] = ..., sight_reason: _Optional[str] = ..., bound_sigma_radps: _Optional[_Iterable[float]] = ..., calibration: _Optional[str] = ..., excluded_mask: _Optional[int] = ...) -> None: ...
 
 class NavSolution(_message.Message):
-    __slots__ = ("header", "estimator", "for_sequence", "for_index", "mode", "latitude_deg", "longitude_deg", "height_m", "p_ned_m", "v_n_mps", "q_nb", "bias_f_b_mps2", "bias_omega_b_radps", "sigma", "position_covariance", "origin_latitude_deg", "origin_longitude_deg", "origin_height_m", "fix_age_s")
+    __slots__ = ("header", "estimator", "for_sequence", "for_index", "mode", "latitude_deg", "longitude_deg", "height_m", "p_ned_m", "v_n_mps", "q_nb", "bias_f_b_mps2", "bias_omega_b_radps", "sigma", "position_covariance", "origin_latitude_deg", "origin_longitude_deg", "origin_height_m", "fix_age_s", "horizon", "alignment", "gnss_muted", "calibration")
     class Mode(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         MODE_WAITING: _ClassVar[NavSolution.Mode]
@@ -309,6 +365,10 @@ class NavSolution(_message.Message):
     ORIGIN_LONGITUDE_DEG_FIELD_NUMBER: _ClassVar[int]
     ORIGIN_HEIGHT_M_FIELD_NUMBER: _ClassVar[int]
     FIX_AGE_S_FIELD_NUMBER: _ClassVar[int]
+    HORIZON_FIELD_NUMBER: _ClassVar[int]
+    ALIGNMENT_FIELD_NUMBER: _ClassVar[int]
+    GNSS_MUTED_FIELD_NUMBER: _ClassVar[int]
+    CALIBRATION_FIELD_NUMBER: _ClassVar[int]
     header: Header
     estimator: str
     for_sequence: int
@@ -328,10 +388,14 @@ class NavSolution(_message.Message):
     origin_longitude_deg: float
     origin_height_m: float
     fix_age_s: float
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., for_sequence: _Optional[int] = ..., for_index: _Optional[int] = ..., mode: _Optional[_Union[NavSolution.Mode, str]] = ..., latitude_deg: _Optional[float] = ..., longitude_deg: _Optional[float] = ..., height_m: _Optional[float] = ..., p_ned_m: _Optional[_Iterable[float]] = ..., v_n_mps: _Optional[_Iterable[float]] = ..., q_nb: _Optional[_Iterable[float]] = ..., bias_f_b_mps2: _Optional[_Iterable[float]] = ..., bias_omega_b_radps: _Optional[_Iterable[float]] = ..., sigma: _Optional[_Iterable[float]] = ..., position_covariance: _Optional[_Iterable[float]] = ..., origin_latitude_deg: _Optional[float] = ..., origin_longitude_deg: _Optional[float] = ..., origin_height_m: _Optional[float] = ..., fix_age_s: _Optional[float] = ...) -> None: ...
+    horizon: Horizon
+    alignment: str
+    gnss_muted: bool
+    calibration: str
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., for_sequence: _Optional[int] = ..., for_index: _Optional[int] = ..., mode: _Optional[_Union[NavSolution.Mode, str]] = ..., latitude_deg: _Optional[float] = ..., longitude_deg: _Optional[float] = ..., height_m: _Optional[float] = ..., p_ned_m: _Optional[_Iterable[float]] = ..., v_n_mps: _Optional[_Iterable[float]] = ..., q_nb: _Optional[_Iterable[float]] = ..., bias_f_b_mps2: _Optional[_Iterable[float]] = ..., bias_omega_b_radps: _Optional[_Iterable[float]] = ..., sigma: _Optional[_Iterable[float]] = ..., position_covariance: _Optional[_Iterable[float]] = ..., origin_latitude_deg: _Optional[float] = ..., origin_longitude_deg: _Optional[float] = ..., origin_height_m: _Optional[float] = ..., fix_age_s: _Optional[float] = ..., horizon: _Optional[_Union[Horizon, _Mapping]] = ..., alignment: _Optional[str] = ..., gnss_muted: _Optional[bool] = ..., calibration: _Optional[str] = ...) -> None: ...
 
 class Innovation(_message.Message):
-    __slots__ = ("header", "estimator", "for_sequence", "name", "value", "sigma", "nis", "dof", "accepted", "error_to_reference")
+    __slots__ = ("header", "estimator", "for_sequence", "name", "value", "sigma", "nis", "dof", "accepted", "error_to_reference", "reason", "weight", "prediction_error")
     HEADER_FIELD_NUMBER: _ClassVar[int]
     ESTIMATOR_FIELD_NUMBER: _ClassVar[int]
     FOR_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
@@ -342,6 +406,9 @@ class Innovation(_message.Message):
     DOF_FIELD_NUMBER: _ClassVar[int]
     ACCEPTED_FIELD_NUMBER: _ClassVar[int]
     ERROR_TO_REFERENCE_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    WEIGHT_FIELD_NUMBER: _ClassVar[int]
+    PREDICTION_ERROR_FIELD_NUMBER: _ClassVar[int]
     header: Header
     estimator: str
     for_sequence: int
@@ -352,7 +419,10 @@ class Innovation(_message.Message):
     dof: int
     accepted: bool
     error_to_reference: _containers.RepeatedScalarFieldContainer[float]
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., for_sequence: _Optional[int] = ..., name: _Optional[_Iterable[str]] = ..., value: _Optional[_Iterable[float]] = ..., sigma: _Optional[_Iterable[float]] = ..., nis: _Optional[float] = ..., dof: _Optional[int] = ..., accepted: _Optional[bool] = ..., error_to_reference: _Optional[_Iterable[float]] = ...) -> None: ...
+    reason: str
+    weight: float
+    prediction_error: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., for_sequence: _Optional[int] = ..., name: _Optional[_Iterable[str]] = ..., value: _Optional[_Iterable[float]] = ..., sigma: _Optional[_Iterable[float]] = ..., nis: _Optional[float] = ..., dof: _Optional[int] = ..., accepted: _Optional[bool] = ..., error_to_reference: _Optional[_Iterable[float]] = ..., reason: _Optional[str] = ..., weight: _Optional[float] = ..., prediction_error: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class Truth(_message.Message):
     __slots__ = ("header", "for_index", "q_nb", "omega_ib_b_radps", "alpha_b_radps2", "f_b_mps2", "angle_z_rad", "profile_time_s")
@@ -403,6 +473,272 @@ class EstimatorStatus(_message.Message):
     version: str
     restart: bytes
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., samples: _Optional[int] = ..., gaps: _Optional[int] = ..., missing_samples: _Optional[int] = ..., us_per_sample: _Optional[float] = ..., state: _Optional[str] = ..., message: _Optional[str] = ..., bias_f_b_mps2: _Optional[_Iterable[float]] = ..., bias_alpha_radps2: _Optional[_Iterable[float]] = ..., layout: _Optional[str] = ..., version: _Optional[str] = ..., restart: _Optional[bytes] = ...) -> None: ...
+
+class Horizon(_message.Message):
+    __slots__ = ("n", "inputs", "membership_name", "membership", "crisp")
+    N_FIELD_NUMBER: _ClassVar[int]
+    INPUTS_FIELD_NUMBER: _ClassVar[int]
+    MEMBERSHIP_NAME_FIELD_NUMBER: _ClassVar[int]
+    MEMBERSHIP_FIELD_NUMBER: _ClassVar[int]
+    CRISP_FIELD_NUMBER: _ClassVar[int]
+    n: int
+    inputs: _containers.RepeatedScalarFieldContainer[float]
+    membership_name: _containers.RepeatedScalarFieldContainer[str]
+    membership: _containers.RepeatedScalarFieldContainer[float]
+    crisp: float
+    def __init__(self, n: _Optional[int] = ..., inputs: _Optional[_Iterable[float]] = ..., membership_name: _Optional[_Iterable[str]] = ..., membership: _Optional[_Iterable[float]] = ..., crisp: _Optional[float] = ...) -> None: ...
+
+class AttitudeEstimate(_message.Message):
+    __slots__ = ("header", "estimator", "for_sequence", "for_index", "q_nb", "inclination_sigma_rad", "bias_omega_b_radps", "resting", "heading_known")
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    ESTIMATOR_FIELD_NUMBER: _ClassVar[int]
+    FOR_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    FOR_INDEX_FIELD_NUMBER: _ClassVar[int]
+    Q_NB_FIELD_NUMBER: _ClassVar[int]
+    INCLINATION_SIGMA_RAD_FIELD_NUMBER: _ClassVar[int]
+    BIAS_OMEGA_B_RADPS_FIELD_NUMBER: _ClassVar[int]
+    RESTING_FIELD_NUMBER: _ClassVar[int]
+    HEADING_KNOWN_FIELD_NUMBER: _ClassVar[int]
+    header: Header
+    estimator: str
+    for_sequence: int
+    for_index: int
+    q_nb: _containers.RepeatedScalarFieldContainer[float]
+    inclination_sigma_rad: float
+    bias_omega_b_radps: _containers.RepeatedScalarFieldContainer[float]
+    resting: bool
+    heading_known: bool
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., for_sequence: _Optional[int] = ..., for_index: _Optional[int] = ..., q_nb: _Optional[_Iterable[float]] = ..., inclination_sigma_rad: _Optional[float] = ..., bias_omega_b_radps: _Optional[_Iterable[float]] = ..., resting: _Optional[bool] = ..., heading_known: _Optional[bool] = ...) -> None: ...
+
+class AxisHealth(_message.Message):
+    __slots__ = ("header", "layout", "axes", "chi2", "dof", "message")
+    class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        STATE_GOOD: _ClassVar[AxisHealth.State]
+        STATE_STUCK: _ClassVar[AxisHealth.State]
+        STATE_SATURATED: _ClassVar[AxisHealth.State]
+        STATE_SWAPPED: _ClassVar[AxisHealth.State]
+        STATE_FLIPPED: _ClassVar[AxisHealth.State]
+        STATE_SPIKING: _ClassVar[AxisHealth.State]
+        STATE_BIASED: _ClassVar[AxisHealth.State]
+        STATE_STALE: _ClassVar[AxisHealth.State]
+        STATE_SUSPECT: _ClassVar[AxisHealth.State]
+    STATE_GOOD: AxisHealth.State
+    STATE_STUCK: AxisHealth.State
+    STATE_SATURATED: AxisHealth.State
+    STATE_SWAPPED: AxisHealth.State
+    STATE_FLIPPED: AxisHealth.State
+    STATE_SPIKING: AxisHealth.State
+    STATE_BIASED: AxisHealth.State
+    STATE_STALE: AxisHealth.State
+    STATE_SUSPECT: AxisHealth.State
+    class Axis(_message.Message):
+        __slots__ = ("name", "state", "excluded", "residual_mps2", "residual_sigma_mps2", "since_utc_ns", "text")
+        NAME_FIELD_NUMBER: _ClassVar[int]
+        STATE_FIELD_NUMBER: _ClassVar[int]
+        EXCLUDED_FIELD_NUMBER: _ClassVar[int]
+        RESIDUAL_MPS2_FIELD_NUMBER: _ClassVar[int]
+        RESIDUAL_SIGMA_MPS2_FIELD_NUMBER: _ClassVar[int]
+        SINCE_UTC_NS_FIELD_NUMBER: _ClassVar[int]
+        TEXT_FIELD_NUMBER: _ClassVar[int]
+        name: str
+        state: AxisHealth.State
+        excluded: bool
+        residual_mps2: float
+        residual_sigma_mps2: float
+        since_utc_ns: int
+        text: str
+        def __init__(self, name: _Optional[str] = ..., state: _Optional[_Union[AxisHealth.State, str]] = ..., excluded: _Optional[bool] = ..., residual_mps2: _Optional[float] = ..., residual_sigma_mps2: _Optional[float] = ..., since_utc_ns: _Optional[int] = ..., text: _Optional[str] = ...) -> None: ...
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    LAYOUT_FIELD_NUMBER: _ClassVar[int]
+    AXES_FIELD_NUMBER: _ClassVar[int]
+    CHI2_FIELD_NUMBER: _ClassVar[int]
+    DOF_FIELD_NUMBER: _ClassVar[int]
+    MESSAGE_FIELD_NUMBER: _ClassVar[int]
+    header: Header
+    layout: str
+    axes: _containers.RepeatedCompositeFieldContainer[AxisHealth.Axis]
+    chi2: float
+    dof: int
+    message: str
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., layout: _Optional[str] = ..., axes: _Optional[_Iterable[_Union[AxisHealth.Axis, _Mapping]]] = ..., chi2: _Optional[float] = ..., dof: _Optional[int] = ..., message: _Optional[str] = ...) -> None: ...
+
+class CalibrationStatus(_message.Message):
+    __slots__ = ("header", "state", "instruction", "progress", "poses", "bias_sigma_mps2", "scale_sigma", "good_enough", "residual_mps2", "card", "message", "next_up_b")
+    class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        STATE_IDLE: _ClassVar[CalibrationStatus.State]
+        STATE_WAITING: _ClassVar[CalibrationStatus.State]
+        STATE_TAKING: _ClassVar[CalibrationStatus.State]
+        STATE_TURNING: _ClassVar[CalibrationStatus.State]
+        STATE_FITTED: _ClassVar[CalibrationStatus.State]
+        STATE_SAVED: _ClassVar[CalibrationStatus.State]
+        STATE_FAILED: _ClassVar[CalibrationStatus.State]
+    STATE_IDLE: CalibrationStatus.State
+    STATE_WAITING: CalibrationStatus.State
+    STATE_TAKING: CalibrationStatus.State
+    STATE_TURNING: CalibrationStatus.State
+    STATE_FITTED: CalibrationStatus.State
+    STATE_SAVED: CalibrationStatus.State
+    STATE_FAILED: CalibrationStatus.State
+    class Pose(_message.Message):
+        __slots__ = ("up_b", "samples", "scatter_mps2")
+        UP_B_FIELD_NUMBER: _ClassVar[int]
+        SAMPLES_FIELD_NUMBER: _ClassVar[int]
+        SCATTER_MPS2_FIELD_NUMBER: _ClassVar[int]
+        up_b: _containers.RepeatedScalarFieldContainer[float]
+        samples: int
+        scatter_mps2: float
+        def __init__(self, up_b: _Optional[_Iterable[float]] = ..., samples: _Optional[int] = ..., scatter_mps2: _Optional[float] = ...) -> None: ...
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    STATE_FIELD_NUMBER: _ClassVar[int]
+    INSTRUCTION_FIELD_NUMBER: _ClassVar[int]
+    PROGRESS_FIELD_NUMBER: _ClassVar[int]
+    POSES_FIELD_NUMBER: _ClassVar[int]
+    BIAS_SIGMA_MPS2_FIELD_NUMBER: _ClassVar[int]
+    SCALE_SIGMA_FIELD_NUMBER: _ClassVar[int]
+    GOOD_ENOUGH_FIELD_NUMBER: _ClassVar[int]
+    RESIDUAL_MPS2_FIELD_NUMBER: _ClassVar[int]
+    CARD_FIELD_NUMBER: _ClassVar[int]
+    MESSAGE_FIELD_NUMBER: _ClassVar[int]
+    NEXT_UP_B_FIELD_NUMBER: _ClassVar[int]
+    header: Header
+    state: CalibrationStatus.State
+    instruction: str
+    progress: float
+    poses: _containers.RepeatedCompositeFieldContainer[CalibrationStatus.Pose]
+    bias_sigma_mps2: _containers.RepeatedScalarFieldContainer[float]
+    scale_sigma: _containers.RepeatedScalarFieldContainer[float]
+    good_enough: bool
+    residual_mps2: float
+    card: str
+    message: str
+    next_up_b: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., state: _Optional[_Union[CalibrationStatus.State, str]] = ..., instruction: _Optional[str] = ..., progress: _Optional[float] = ..., poses: _Optional[_Iterable[_Union[CalibrationStatus.Pose, _Mapping]]] = ..., bias_sigma_mps2: _Optional[_Iterable[float]] = ..., scale_sigma: _Optional[_Iterable[float]] = ..., good_enough: _Optional[bool] = ..., residual_mps2: _Optional[float] = ..., card: _Optional[str] = ..., message: _Optional[str] = ..., next_up_b: _Optional[_Iterable[float]] = ...) -> None: ...
+
+class EstimatorCommand(_message.Message):
+    __slots__ = ("action", "device", "seconds", "card", "user")
+    class Action(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        ACTION_NONE: _ClassVar[EstimatorCommand.Action]
+        ACTION_MUTE_GNSS: _ClassVar[EstimatorCommand.Action]
+        ACTION_CALIBRATE_START: _ClassVar[EstimatorCommand.Action]
+        ACTION_CALIBRATE_FIT: _ClassVar[EstimatorCommand.Action]
+        ACTION_CALIBRATE_SAVE: _ClassVar[EstimatorCommand.Action]
+        ACTION_CALIBRATE_CANCEL: _ClassVar[EstimatorCommand.Action]
+        ACTION_USE_CARD: _ClassVar[EstimatorCommand.Action]
+    ACTION_NONE: EstimatorCommand.Action
+    ACTION_MUTE_GNSS: EstimatorCommand.Action
+    ACTION_CALIBRATE_START: EstimatorCommand.Action
+    ACTION_CALIBRATE_FIT: EstimatorCommand.Action
+    ACTION_CALIBRATE_SAVE: EstimatorCommand.Action
+    ACTION_CALIBRATE_CANCEL: EstimatorCommand.Action
+    ACTION_USE_CARD: EstimatorCommand.Action
+    ACTION_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    SECONDS_FIELD_NUMBER: _ClassVar[int]
+    CARD_FIELD_NUMBER: _ClassVar[int]
+    USER_FIELD_NUMBER: _ClassVar[int]
+    action: EstimatorCommand.Action
+    device: str
+    seconds: float
+    card: str
+    user: str
+    def __init__(self, action: _Optional[_Union[EstimatorCommand.Action, str]] = ..., device: _Optional[str] = ..., seconds: _Optional[float] = ..., card: _Optional[str] = ..., user: _Optional[str] = ...) -> None: ...
+
+class BoardCommand(_message.Message):
+    __slots__ = ("name", "value", "user")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    VALUE_FIELD_NUMBER: _ClassVar[int]
+    USER_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    value: int
+    user: str
+    def __init__(self, name: _Optional[str] = ..., value: _Optional[int] = ..., user: _Optional[str] = ...) -> None: ...
+
+class Reply(_message.Message):
+    __slots__ = ("ok", "message")
+    OK_FIELD_NUMBER: _ClassVar[int]
+    MESSAGE_FIELD_NUMBER: _ClassVar[int]
+    ok: bool
+    message: str
+    def __init__(self, ok: _Optional[bool] = ..., message: _Optional[str] = ...) -> None: ...
+
+class Note(_message.Message):
+    __slots__ = ("header", "text", "author", "kind", "at_utc_ns", "seconds")
+    class Kind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        KIND_NOTE: _ClassVar[Note.Kind]
+        KIND_MARK: _ClassVar[Note.Kind]
+        KIND_EVENT: _ClassVar[Note.Kind]
+    KIND_NOTE: Note.Kind
+    KIND_MARK: Note.Kind
+    KIND_EVENT: Note.Kind
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    AUTHOR_FIELD_NUMBER: _ClassVar[int]
+    KIND_FIELD_NUMBER: _ClassVar[int]
+    AT_UTC_NS_FIELD_NUMBER: _ClassVar[int]
+    SECONDS_FIELD_NUMBER: _ClassVar[int]
+    header: Header
+    text: str
+    author: str
+    kind: Note.Kind
+    at_utc_ns: int
+    seconds: float
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., text: _Optional[str] = ..., author: _Optional[str] = ..., kind: _Optional[_Union[Note.Kind, str]] = ..., at_utc_ns: _Optional[int] = ..., seconds: _Optional[float] = ...) -> None: ...
+
+class ReplayCommand(_message.Message):
+    __slots__ = ("action", "value", "until", "user")
+    class Action(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        ACTION_STATUS: _ClassVar[ReplayCommand.Action]
+        ACTION_PAUSE: _ClassVar[ReplayCommand.Action]
+        ACTION_RESUME: _ClassVar[ReplayCommand.Action]
+        ACTION_SEEK: _ClassVar[ReplayCommand.Action]
+        ACTION_SPEED: _ClassVar[ReplayCommand.Action]
+        ACTION_STEP: _ClassVar[ReplayCommand.Action]
+        ACTION_LOOP: _ClassVar[ReplayCommand.Action]
+        ACTION_END: _ClassVar[ReplayCommand.Action]
+    ACTION_STATUS: ReplayCommand.Action
+    ACTION_PAUSE: ReplayCommand.Action
+    ACTION_RESUME: ReplayCommand.Action
+    ACTION_SEEK: ReplayCommand.Action
+    ACTION_SPEED: ReplayCommand.Action
+    ACTION_STEP: ReplayCommand.Action
+    ACTION_LOOP: ReplayCommand.Action
+    ACTION_END: ReplayCommand.Action
+    ACTION_FIELD_NUMBER: _ClassVar[int]
+    VALUE_FIELD_NUMBER: _ClassVar[int]
+    UNTIL_FIELD_NUMBER: _ClassVar[int]
+    USER_FIELD_NUMBER: _ClassVar[int]
+    action: ReplayCommand.Action
+    value: float
+    until: float
+    user: str
+    def __init__(self, action: _Optional[_Union[ReplayCommand.Action, str]] = ..., value: _Optional[float] = ..., until: _Optional[float] = ..., user: _Optional[str] = ...) -> None: ...
+
+class ReplayStatus(_message.Message):
+    __slots__ = ("header", "session", "position_s", "length_s", "speed", "paused", "loop_from_s", "loop_until_s", "message")
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    SESSION_FIELD_NUMBER: _ClassVar[int]
+    POSITION_S_FIELD_NUMBER: _ClassVar[int]
+    LENGTH_S_FIELD_NUMBER: _ClassVar[int]
+    SPEED_FIELD_NUMBER: _ClassVar[int]
+    PAUSED_FIELD_NUMBER: _ClassVar[int]
+    LOOP_FROM_S_FIELD_NUMBER: _ClassVar[int]
+    LOOP_UNTIL_S_FIELD_NUMBER: _ClassVar[int]
+    MESSAGE_FIELD_NUMBER: _ClassVar[int]
+    header: Header
+    session: str
+    position_s: float
+    length_s: float
+    speed: float
+    paused: bool
+    loop_from_s: float
+    loop_until_s: float
+    message: str
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., session: _Optional[str] = ..., position_s: _Optional[float] = ..., length_s: _Optional[float] = ..., speed: _Optional[float] = ..., paused: _Optional[bool] = ..., loop_from_s: _Optional[float] = ..., loop_until_s: _Optional[float] = ..., message: _Optional[str] = ...) -> None: ...
 
 class RecorderCommand(_message.Message):
     __slots__ = ("action", "name", "note", "user")
