@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from gyrofree import cli_users
+from gyrofree import cli_run, cli_users
 from gyrofree.cli_options import AsJson, Config, Speed, Verbose, settings_of
 from gyrofree.config import ConfigError
 from gyrofree.process import EXIT_CONFIG as CONFIG
@@ -30,6 +30,8 @@ app = typer.Typer(
 )
 
 app.add_typer(cli_users.app, name="users")
+app.add_typer(cli_run.app, name="reproduce")
+app.command()(cli_run.run)
 
 
 def _show_version(wanted: bool) -> None:
