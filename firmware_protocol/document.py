@@ -60,7 +60,23 @@ def _page_lines() -> Iterator[str]:
     yield "## Boards"
     yield ""
     yield from _table(("board_id", "board"), ((entry["id"], entry["text"]) for entry in SPEC.raw["board"]))
+    yield from _commands()
     yield from _proofs()
+
+
+def _commands() -> Iterator[str]:
+    raw = SPEC.raw
+    yield "## Commands"
+    yield ""
+    yield "CMD with no arguments, unless the text says otherwise:"
+    yield ""
+    yield from _table(("command", "name", "meaning"),
+                      ((f"0x{x['id']:04x}", x["name"], x["text"]) for x in raw["command"]))
+    yield "Settings: no arguments to ask, one u32 to set; the ACK echoes the u32 in force. They live until the next boot."
+    yield ""
+    yield from _table(("command", "name", "unit", "default", "meaning"),
+                      ((f"0x{x['id']:04x}", x["name"], x.get("unit", ""), x["default"], x["text"]) for x in raw["setting"]))
+    yield from _table(("status of ACK", "name", "meaning"), ((x["id"], x["name"], x["text"]) for x in raw["result"]))
 
 
 def _proofs() -> Iterator[str]:
@@ -134,6 +150,11 @@ def _header_lines() -> Iterator[str]:
     yield from _enum(f"GF_TYPE_{x.name} = 0x{x.type:02X}" for x in SPEC.layouts.values())
     yield from _enum(f"GF_FLAG_{name.upper()} = {bit}" for name, bit in SPEC.flags.items())
     yield from _enum((f"GF_REASON_{word.upper()} = {i}" for i, word in enumerate(SPEC.reasons, 1)), "gf_reason_t")
+    raw = SPEC.raw
+    yield from _enum(f"GF_DO_{x['name'].upper()} = 0x{x['id']:04X}" for x in raw["command"])
+    yield from _enum(f"GF_SET_{x['name'].upper()} = 0x{x['id']:04X}" for x in raw["setting"])
+    yield from _enum(f"GF_DEFAULT_{x['name'].upper()} = {x['default']}" for x in raw["setting"])
+    yield from _enum((f"GF_RESULT_{x['name'].upper()} = {x['id']}" for x in raw["result"]), "gf_result_t")
     yield "/* Offsets in bytes; GF_..._SIZE is the smallest payload and where the rows or raw bytes begin. */"
     yield from _enum(_offsets("HEADER", SPEC.header))
     for layout in SPEC.layouts.values():

@@ -43,6 +43,45 @@ typedef enum {
   GF_REASON_UNFINISHED = 8
 } gf_reason_t;
 
+enum {
+  GF_DO_HELLO = 0x0001,
+  GF_DO_STATUS = 0x0002,
+  GF_DO_START = 0x0003,
+  GF_DO_STOP = 0x0004,
+  GF_DO_TIME = 0x0005,
+  GF_DO_SELF_TEST = 0x0006,
+  GF_DO_REBOOT = 0x0007
+};
+
+enum {
+  GF_SET_RATE_HZ = 0x0101,
+  GF_SET_BATCH = 0x0102,
+  GF_SET_RANGE_G = 0x0103,
+  GF_SET_FIFO = 0x0104,
+  GF_SET_ADC_MASK = 0x0105,
+  GF_SET_BAUD = 0x0106,
+  GF_SET_GNSS_BAUD = 0x0107
+};
+
+enum {
+  GF_DEFAULT_RATE_HZ = 100,
+  GF_DEFAULT_BATCH = 0,
+  GF_DEFAULT_RANGE_G = 16,
+  GF_DEFAULT_FIFO = 0,
+  GF_DEFAULT_ADC_MASK = 0,
+  GF_DEFAULT_BAUD = 921600,
+  GF_DEFAULT_GNSS_BAUD = 9600
+};
+
+typedef enum {
+  GF_RESULT_OK = 0,
+  GF_RESULT_UNKNOWN = -1,
+  GF_RESULT_LENGTH = -2,
+  GF_RESULT_VALUE = -3,
+  GF_RESULT_BUSY = -4,
+  GF_RESULT_DEVICE = -5
+} gf_result_t;
+
 /* Offsets in bytes; GF_..._SIZE is the smallest payload and where the rows or raw bytes begin. */
 enum {
   GF_HEADER_PROTO = 0,
