@@ -19,8 +19,8 @@ from gateway import convert
 from gateway.batch import Batch, Index, Joiner
 from gateway.clock import DeviceClock
 from gateway.gnss_link import GnssLink
-from gateway.journal import Journal
-from gateway.journal_file import BOARD, GNSS
+from messages.journal import Journal
+from messages.journal_file import BOARD, GNSS
 from gateway.link_report import LinkReport
 from gateway.reader import Chunk, Reader
 from gateway.settings import DeviceSettings, GatewaySettings

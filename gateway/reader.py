@@ -12,7 +12,7 @@ import threading
 import time
 from dataclasses import dataclass
 
-from gateway.journal import Journal
+from messages.journal import Journal
 from gateway.ports import Port, PortEnd, PortError, open_port
 
 log = logging.getLogger(__name__)

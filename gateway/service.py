@@ -13,7 +13,7 @@ import zenoh
 
 from gateway.device import DeviceLink
 from gateway.identity import claim
-from gateway.journal import Journal, JournalBusy
+from messages.journal import Journal, JournalBusy
 from gateway.settings import DeviceSettings, GatewaySettings
 from messages.bus import BusSettings, BusUnavailable, Publishers, open_client
 from messages.topics import history_key

@@ -8,8 +8,8 @@ import time
 
 import pytest
 
-from gateway.journal import Journal, JournalBusy
-from gateway.journal_file import SEGMENT_HEAD, records, scan
+from messages.journal import Journal, JournalBusy
+from messages.journal_file import SEGMENT_HEAD, records, scan
 
 
 def fill(journal: Journal, n: int, size: int = 100) -> None:
@@ -147,7 +147,7 @@ def test_message_of_a_failed_sync_clears_with_the_next_good_one(tmp_path, caplog
 FULL = """
 import resource, signal, sys
 from pathlib import Path
-from gateway.journal import Journal
+from messages.journal import Journal
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 journal = Journal(Path(sys.argv[1]))
 resource.setrlimit(resource.RLIMIT_FSIZE, (5000, resource.RLIM_INFINITY))
@@ -173,7 +173,7 @@ def test_short_write_of_a_full_disk_is_cut_back(tmp_path):
 def test_killed_while_writing(tmp_path):
     """kill -9: at the next start the sequence has no hole and nothing damaged stands in the files."""
     code = (
-        "import sys,time;from pathlib import Path;from gateway.journal import Journal;j=Journal(Path(sys.argv[1]))\n"
+        "import sys,time;from pathlib import Path;from messages.journal import Journal;j=Journal(Path(sys.argv[1]))\n"
         "print('go',flush=True)\nwhile True: j.append(0,bytes(777),1,2)"
     )
     child = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE)

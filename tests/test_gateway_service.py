@@ -13,7 +13,7 @@ from firmware_protocol.codec import FLAG_SIMULATED, Deframer, Frame, encode
 from firmware_protocol.frames import Acc12
 from gateway import service
 from gateway.board_link import PtyLink, TcpLink
-from gateway.journal_file import records, scan
+from messages.journal_file import records, scan
 from gateway.player import LOG_EPOCH_S
 from gateway.settings import DeviceSettings, GatewaySettings
 from gateway.ubx import Epoch, ubx_bytes

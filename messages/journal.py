@@ -1,7 +1,8 @@
-"""Every raw read goes to disk before anything else looks at it.
+"""An append-only folder of segment files: what is given to it is kept before anything else happens with it.
 
-A journal is a folder of segment files of one device (journal_file.py says what stands in them). One write per read; a
-thread calls fdatasync, which may take half a second and must never hold up the reader. `durable_seq` is what has
+The gateway journals every raw read of a board with it, and gateway and estimator what they publish (spool.py).
+journal_file.py says what stands in a segment. One write per record; a thread calls fdatasync, which may take half a
+second and must never hold up the writer. `durable_seq` is what has
 reached the disk. Sequence numbers go on over restarts; `run` is new at every start. A tail that a crash has torn is
 cut at the next start. A lock on the file `lock` in the folder keeps a second gateway out; the system frees it when the
 process ends, however that happens.
@@ -16,7 +17,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from gateway.journal_file import SEGMENT_HEAD, SEGMENT_MAGIC, Record, pack, scan
+from messages.journal_file import SEGMENT_HEAD, SEGMENT_MAGIC, Record, pack, scan
 
 log = logging.getLogger(__name__)
 
@@ -41,10 +42,17 @@ class Journal:
     """
 
     def __init__(
-        self, folder: Path, max_bytes: int = 2 << 30, segment_bytes: int = 4 << 20, sync_s: float = 0.5
+        self,
+        folder: Path,
+        max_bytes: int = 2 << 30,
+        segment_bytes: int = 4 << 20,
+        sync_s: float = 0.5,
+        max_age_s: float = 0.0,
     ) -> None:
+        """Finished segments are removed, oldest first, above max_bytes and when older than max_age_s (0: any age)."""
         self.folder = folder
         self.max_bytes = max_bytes
+        self.max_age_s = max_age_s
         self.segment_bytes = segment_bytes
         self.run = time.time_ns()
         self.unkept_bytes = 0
@@ -110,17 +118,17 @@ class Journal:
 
     def first_kept(self) -> int:
         """Sequence of the oldest record that is still there; last_seq + 1 when there is none."""
-        names = self._segments()
-        return _first_of(names[0]) if names else self.last_seq + 1
+        names = self.segments()
+        return first_of(names[0]) if names else self.last_seq + 1
 
     def history(self, first: int, last: int, max_bytes: int = 4 << 20) -> Iterator[bytes]:
         """Verbatim records first..last that are still kept, in order, until max_bytes are exceeded."""
-        names = self._segments()
+        names = self.segments()
         total = 0
         for name, following in zip(names, [*names[1:], None], strict=True):
-            if _first_of(name) > last:
+            if first_of(name) > last:
                 return
-            if following is not None and _first_of(following) <= first:
+            if following is not None and first_of(following) <= first:
                 continue
             try:
                 data = name.read_bytes()
@@ -135,7 +143,8 @@ class Journal:
 
     # --- segments
 
-    def _segments(self) -> list[Path]:
+    def segments(self) -> list[Path]:
+        """Segment files, oldest first."""
         return sorted(self.folder.glob("*.gfj"))
 
     def _recover(self) -> None:
@@ -146,7 +155,7 @@ class Journal:
         self.folder.mkdir(parents=True, exist_ok=True)
         lock = _lock(self.folder)
         try:
-            for name in self._segments()[-2:]:
+            for name in self.segments()[-2:]:
                 data = name.read_bytes()
                 found = scan(data)
                 end = min(found.good_end, len(data))
@@ -154,7 +163,7 @@ class Journal:
                     os.truncate(name, end)
                     self.cut_bytes += len(data) - end
                     log.warning("%s: cut a torn tail of %d bytes", name, len(data) - end)
-                last = found.records[-1][2].sequence if found.records else _first_of(name) - 1
+                last = found.records[-1][2].sequence if found.records else first_of(name) - 1
                 self.last_seq = max(self.last_seq, last)
                 if not found.records:
                     name.unlink()
@@ -258,14 +267,16 @@ class Journal:
         self.durable_seq = last
 
     def _retain(self) -> None:
-        names = self._segments()
-        sizes = [name.stat().st_size for name in names]
-        total = sum(sizes)
-        for name, size in zip(names[:-1], sizes, strict=False):  # never the newest
-            if total <= self.max_bytes:
+        names = self.segments()
+        states = [name.stat() for name in names]
+        total = sum(state.st_size for state in states)
+        now = time.time()
+        for name, state in zip(names[:-1], states, strict=False):  # never the newest
+            old = self.max_age_s and now - state.st_mtime > self.max_age_s
+            if total <= self.max_bytes and not old:
                 return
             name.unlink(missing_ok=True)
-            total -= size
+            total -= state.st_size
             log.info("%s: removed, the journal keeps %d bytes", name, self.max_bytes)
 
 
@@ -282,5 +293,6 @@ def _lock(folder: Path) -> int:
     return lock
 
 
-def _first_of(name: Path) -> int:
+def first_of(name: Path) -> int:
+    """Sequence of the first record of a segment file."""
     return int(name.stem)

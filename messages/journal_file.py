@@ -24,7 +24,7 @@ BOARD, GNSS = 0, 1  # channels
 
 @dataclass(frozen=True)
 class Record:
-    """One read of one port."""
+    """One read of one port, or one published message."""
 
     sequence: int
     monotonic_ns: int
