@@ -117,6 +117,19 @@ def history_key(prefix: str, device: str) -> str:
     return f"{check_name(prefix)}/{check_name(device)}/history"
 
 
+def published_key(prefix: str, device: str, source: str) -> str:
+    """Key of a queryable for published messages: HistoryQuery in, HistoryReply out; `*` asks for any device or source."""
+    for name in (prefix, device, source):
+        if name != "*":
+            check_name(name)
+    return f"{prefix}/{device}/published/{source}"
+
+
+def replay_control_key(prefix: str) -> str:
+    """Key of a replay's queryable: ReplayCommand in, ReplayStatus out."""
+    return f"{check_name(prefix)}/{REPLAY.name}/control"
+
+
 def markdown() -> str:
     """The table of docs/topics.md."""
     rows = ["| topic | type | Hz | published by | recorded | what |", "|---|---|---|---|---|---|"]
