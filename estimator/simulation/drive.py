@@ -37,7 +37,7 @@ class Sensors:
     tau: float = 300.0  # s, of both
     scale: float = 0.01  # of 1, scale and cross-axis errors of both sensors
     step_at: float = math.inf  # s, when both biases jump
-    accel_step: float = 0.0  # m/s^2, along a direction drawn once
+    accel_step: float = 0.0  # m/s^2 on every axis, the sign drawn once
     gyro_step: float = 0.0  # rad/s, likewise
     fix_white: tuple[float, float, float] = (1.0, 1.0, 2.0)  # m, north east up
     fix_wander: tuple[float, float, float] = (1.15, 1.15, 2.4)  # m, Gauss-Markov: ionosphere, multipath
@@ -154,9 +154,9 @@ def _imu(draw: np.random.Generator, truth: Truth, s: Sensors) -> tuple[Array, Ar
         (truth.f_b[1:], s.accel_noise, s.accel_still, s.accel_bias, s.accel_wander, s.accel_step),
         (truth.omega_ib_b[1:], s.gyro_noise, s.gyro_still, s.gyro_bias, s.gyro_wander, s.gyro_step),
     ):
-        direction = draw.normal(size=3)
+        side = draw.choice([-1.0, 1.0], size=3)
         offset = draw.normal(size=3) * bias + gauss_markov(draw, n, np.full(3, wander), s.tau * RATE)
-        offset[truth.t[1:] >= s.step_at] += step * direction / np.linalg.norm(direction)
+        offset[truth.t[1:] >= s.step_at] += step * side
         mix = np.eye(3) + draw.normal(size=(3, 3)) * s.scale
         read.append(ideal @ mix.T + offset + _shake(draw, speed, noise, still))
         biases.append(offset)
@@ -202,10 +202,10 @@ def _fixes(draw: np.random.Generator, truth: Truth, s: Sensors, lever: Array) ->
 
 
 def _gross(draw: np.random.Generator, n: int, s: Sensors) -> Array:
-    """(n, 6) gross errors: single fixes some 20 m and 1.2 m/s off, and bursts of one error for some seconds."""
+    """(n, 6) gross errors: single fixes some 30 m and 1 m/s off, and bursts of one error for some seconds."""
     error = np.zeros((n, 6))
     single = draw.random(n) < s.outliers
-    size = np.array([14.0, 14.0, 20.0, 0.7, 0.7, 0.7])
+    size = np.array([22.0, 22.0, 30.0, 0.65, 0.65, 0.65])
     error[single] = draw.normal(size=(int(single.sum()), 6)) * size
     for _ in range(s.bursts):
         begin = int(draw.integers(40, max(41, n - 10)))
