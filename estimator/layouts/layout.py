@@ -40,6 +40,26 @@ def products_matrix(r_b: Array, theta_b: Array) -> Array:
     return np.where(diagonal, along - np.sum(r_b * theta_b, axis=1)[:, None], along + across)
 
 
+@dataclass(frozen=True)
+class Sensor:
+    """What one accelerometer axis is expected to do; sigmas, m/s^2 where not said."""
+
+    name: str
+    noise: float  # of one sample at the board's usual rate, counts included
+    bias: float  # of one axis before calibration
+    scale_error: float  # of 1, before calibration
+    limit: float  # largest reading
+
+
+MILLI_G = 9.80665e-3  # m/s^2
+SENSORS = {
+    # 4 mg noise and 3.9 mg counts; offset and sensitivity as in the published test; 13 bit at +-16 g
+    "adxl345": Sensor("adxl345", 4.16 * MILLI_G, 20 * MILLI_G, 0.005, 4095 * 3.9 * MILLI_G),
+    # measured at rest in accelerometer_array, 62.5 Hz; offset and sensitivity from the data sheet
+    "mpu9150": Sensor("mpu9150", 0.045, 60 * MILLI_G, 0.015, 16.0 * 9.80665),
+}
+
+
 @dataclass(frozen=True, eq=False)
 class Layout:
     """N accelerometer axes on a rigid body; raises GeometryError for arrays that cannot be axes."""
@@ -48,6 +68,11 @@ class Layout:
     r_b: Array  # m, (N, 3), from the body's centre
     theta_b: Array  # unit vectors, (N, 3)
     scale_m: float = 1.0  # m, the length that counts as 1 in kappa and gdop; half the side for a cube
+    axis_names: tuple[str, ...] = ()  # empty: a11 a12 a13 a21 ... for 12 axes, else a1 a2 ...
+    channels: tuple[int, ...] = ()  # column of the board's samples that each axis is; empty: the same order
+    gain: tuple[float, ...] = ()  # true m/s^2 per m/s^2 of the board's nominal scale; empty: 1
+    sensors: tuple[Sensor, ...] = ()  # model of each axis; empty: ADXL345
+    text: str = ""  # for people
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "r_b", np.array(self.r_b, dtype=np.float64))
@@ -67,13 +92,48 @@ class Layout:
             )
         if not self.scale_m > 0.0:
             raise GeometryError(f"layout {self.name}: scale {self.scale_m} m, want more than 0")
+        self._fill(len(self.r_b))
         self.r_b.setflags(write=False)
         self.theta_b.setflags(write=False)
+
+    def _fill(self, n: int) -> None:
+        triads = tuple(f"a{i // 3 + 1}{i % 3 + 1}" for i in range(n))
+        default = {
+            "axis_names": triads if n == 12 else tuple(f"a{i + 1}" for i in range(n)),
+            "channels": tuple(range(n)),
+            "gain": (1.0,) * n,
+            "sensors": (SENSORS["adxl345"],) * n,
+        }
+        for name, value in default.items():
+            given = getattr(self, name)
+            if given and len(given) != n:
+                raise GeometryError(f"layout {self.name}: {len(given)} {name} for {n} axes")
+            object.__setattr__(self, name, tuple(given) or value)
 
     @property
     def axes(self) -> int:
         """Number of axes N."""
         return len(self.r_b)
+
+    @property
+    def columns(self) -> int:
+        """How many columns a board's samples must have at least."""
+        return max(self.channels) + 1
+
+    def read(self, board: Array) -> Array:
+        """Axis readings (n, N), m/s^2, of a board's samples (n, columns) at nominal scale: its channels, by gain."""
+        if self._straight:
+            return board
+        return board[:, list(self.channels)] * np.array(self.gain)
+
+    @cached_property
+    def _straight(self) -> bool:
+        return self.channels == tuple(range(self.axes)) and set(self.gain) == {1.0}
+
+    @property
+    def noise(self) -> Array:
+        """Noise of one sample of each axis, m/s^2, (N,), sigma."""
+        return np.array([sensor.noise for sensor in self.sensors])
 
     @cached_property
     def J(self) -> Array:
@@ -157,50 +217,19 @@ WIRING = np.array(  # triad, sensor axis -> body direction; recovered from the p
 )
 
 
-def CUBE(half_side: float) -> Layout:
-    """The paper's cube: four triads, axes a11 a12 a13 a21 ... a43; half_side = L/2 in m."""
-    return Layout("cube", half_side * np.repeat(CORNERS, 3, axis=0), WIRING.reshape(12, 3), half_side)
+def _built_in(name: str) -> Callable[[float], Layout]:
+    def make(half_side: float) -> Layout:
+        from estimator.layouts.catalogue import built_in  # here: it reads files into Layouts
+
+        return built_in(name, half_side)
+
+    make.__doc__ = f"estimator/layouts/{name}.toml with half_side = L/2 in m."
+    return make
 
 
-def CHEN(half_side: float) -> Layout:
-    """Six axes at the face centres along the face diagonals (Chen, Lee, DeBra 1994)."""
-    r = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=np.float64)
-    theta = np.array([[0, 1, -1], [0, 1, 1], [1, 0, -1], [1, 0, 1], [1, -1, 0], [1, 1, 0]]) / np.sqrt(2.0)
-    return Layout("chen-6", half_side * r, theta, half_side)
+CUBE = _built_in("cube")  # the paper's cube: four triads, axes a11 a12 a13 a21 ... a43
 
-
-def NINE(half_side: float) -> Layout:
-    """Nine axes: opposed pairs of x at z = +-1, y at x = +-1, z at y = +-1 (a1 to a6), a triad at the centre."""
-    x, y, z = np.eye(3)
-    r = np.array([z, -z, x, -x, y, -y, 0 * x, 0 * x, 0 * x])
-    return Layout("nine", half_side * r, np.array([x, -x, y, -y, z, -z, x, y, z]), half_side)
-
-
-def EDGES(half_side: float) -> Layout:
-    """Twelve axes: triads along the body axes at the middle of four edges."""
-    r = np.array([[1, 0, 1], [-1, 0, 1], [0, -1, 1], [0, 1, -1]], dtype=np.float64)
-    return Layout("edges-12", half_side * np.repeat(r, 3, axis=0), np.tile(np.eye(3), (4, 1)), half_side)
-
-
-def STARS(half_side: float) -> Layout:
-    """Twelve axes of smallest GDOP: three at each tetrahedron corner, across the radius and 120 degrees apart.
-
-    S q(omega) is not zero here and only 8 of the 12 unknowns of the field are seen: no products for a filter.
-    """
-    theta = []
-    for corner in CORNERS:
-        radius = corner / np.sqrt(3.0)
-        first = np.cross(radius, [0.0, 0.0, 1.0])
-        first /= np.linalg.norm(first)
-        second = np.cross(radius, first)
-        theta += [np.cos(turn) * first + np.sin(turn) * second for turn in np.deg2rad([0.0, 120.0, 240.0])]
-    return Layout("stars-12", half_side * np.repeat(CORNERS, 3, axis=0), np.array(theta), half_side)
-
-
+# Built-in layouts by name; array-24 has a size of its own, whatever half side is asked for.
 LAYOUTS: dict[str, Callable[[float], Layout]] = {
-    "cube": CUBE,
-    "chen-6": CHEN,
-    "nine": NINE,
-    "edges-12": EDGES,
-    "stars-12": STARS,
+    name: _built_in(name) for name in ("cube", "chen-6", "nine", "edges-12", "stars-12", "array-24")
 }
