@@ -1,0 +1,116 @@
+"""A recording becomes a report: HTML, PDF and JSON. The same recording and specification give the same bytes."""
+
+import hashlib
+import json
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sessions.manifest import Manifest, SessionError, read_manifest
+from sessions.report.analysis import Analysis, analyse
+from sessions.report.data import load_run
+from sessions.report.document import compose
+from sessions.report.figures import pictures
+from sessions.report.html import to_html
+from sessions.report.metrics import Metric, metrics
+from sessions.report.pdf import to_pdf
+from sessions.report.verdict import Check, Spec, judge, overall
+from sessions.table import Progress, silent
+
+
+@dataclass(frozen=True)
+class Report:
+    """All three forms, and the verdict."""
+
+    html: str
+    pdf: bytes
+    json: str
+    verdict: str  # pass, fail, incomplete
+
+    def write(self, out: Path, name: str = "report") -> list[Path]:
+        """Into the folder `out`, made when absent; raises OSError."""
+        out.mkdir(parents=True, exist_ok=True)
+        files = [out / f"{name}.{form}" for form in ("html", "pdf", "json")]
+        files[0].write_text(self.html, encoding="utf-8")
+        files[1].write_bytes(self.pdf)
+        files[2].write_text(self.json, encoding="utf-8")
+        return files
+
+
+def build(path: Path, spec: Spec, device: str = "", boot: int | None = None, progress: Progress = silent) -> Report:
+    """Report on an MCAP file; session.json beside it, where there is one, adds completeness and provenance.
+
+    Raises ReportError when the recording has nothing to report on, SpecError for a limit on no figure, OSError.
+    """
+    manifest = _manifest(path)
+    run = load_run(path, device, boot, lambda done, what: progress(0.6 * done, what))
+    progress(0.6, "analysing")
+    found = analyse(run, manifest)
+    figures = metrics(found, spec.estimator)
+    checks = judge(spec, figures)
+    progress(0.65, "drawing")
+    sha256 = _sha256(path)
+    document = compose(found, manifest, sha256, spec, checks, pictures(found))
+    progress(0.85, "writing")
+    report = Report(
+        html=to_html(document),
+        pdf=to_pdf(document),
+        json=_json(found, manifest, sha256, spec, figures, checks),
+        verdict=document.verdict,
+    )
+    progress(1.0, "done")
+    return report
+
+
+def _manifest(path: Path) -> Manifest | None:
+    try:
+        return read_manifest(path.parent)
+    except SessionError:
+        return None
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _json(
+    found: Analysis, manifest: Manifest | None, sha256: str, spec: Spec, figures: list[Metric], checks: list[Check]
+) -> str:
+    content = {
+        "session": manifest.id if manifest else None,
+        "device": found.run.device,
+        "boot": found.run.epoch,
+        "start_utc_s": found.run.start_utc_s,
+        "seconds": found.run.seconds,
+        "sha256": sha256,
+        "verdict": overall(checks),
+        "specification": spec.title,
+        "estimator": spec.estimator,
+        "checks": [asdict(check) | {"passed": check.passed} for check in checks],
+        "figures": {metric.name: metric.value for metric in figures},
+        "estimators": {rate.name: asdict(rate) for rate in found.rates},
+        "segments": [asdict(part) for part in found.segments],
+        "allan": [asdict(one) for one in found.allan_axes],
+        "navigation": {nav.name: asdict(nav) for nav in found.navigation},
+        "link": found.run.link,
+    }
+    return json.dumps(_plain(content), indent=1, sort_keys=True, ensure_ascii=False) + "\n"
+
+
+def _plain(value: Any) -> Any:
+    """numpy as lists; what is no number as null, for JSON has no NaN."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value

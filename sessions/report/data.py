@@ -1,0 +1,238 @@
+"""What a report needs of a recording, as arrays. SI, body frame b; times in s from the first sample of the run."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from messages.topics import ACCEL, GNSS, INNOVATION, LINK, NAV, RATE, TACHO, TRUTH, parse
+from sessions.table import Progress, Selection, Table, silent, tables
+
+Array = NDArray[np.float64]
+XYZ = ("x", "y", "z")
+
+
+class ReportError(ValueError):
+    """A recording that no report can be made of; the text says what is missing."""
+
+
+@dataclass(frozen=True)
+class Accel:
+    """Readings of all axes."""
+
+    t: Array  # (n,) s
+    f_axis: Array  # (n, axes) m/s^2
+    period_s: float
+
+
+@dataclass(frozen=True)
+class Tacho:
+    """The reference."""
+
+    t: Array  # (m,) s
+    omega: Array  # rad/s, signed where the direction is known
+    sigma: Array  # rad/s
+
+
+@dataclass(frozen=True)
+class Rate:
+    """One estimator's rotation."""
+
+    name: str
+    t: Array  # (n,) s
+    omega_b: Array  # (n, 3) rad/s
+    sigma: Array  # (n, 3) rad/s
+    alpha_b: Array  # (n, 3) rad/s^2
+    f_b: Array  # (n, 3) m/s^2
+    angle_z: Array  # rad
+    p_n: Array  # (n, 3) m
+    nis: Array
+    nis_dof: Array
+    still: Array  # bool
+    calibration: str
+
+
+@dataclass(frozen=True)
+class Navigation:
+    """One filter's navigation."""
+
+    name: str
+    t: Array
+    p_ned: Array  # (n, 3) m
+    v_n: Array  # (n, 3) m/s
+    sigma: Array  # (n, 15)
+
+
+@dataclass(frozen=True)
+class Corrections:
+    """One filter's corrections by fixes."""
+
+    name: str
+    t: Array
+    nis: Array
+    dof: Array
+    accepted: Array
+
+
+@dataclass(frozen=True)
+class Run:
+    """One boot of one device within a session."""
+
+    device: str
+    epoch: int  # boot counter of the board
+    boots: tuple[int, ...]  # all that the session holds
+    start_utc_s: float
+    seconds: float
+    accel: Accel | None
+    tacho: Tacho | None
+    truth_t: Array
+    truth_omega_z: Array
+    rates: list[Rate] = field(default_factory=list)
+    navigation: list[Navigation] = field(default_factory=list)
+    corrections: list[Corrections] = field(default_factory=list)
+    fixes: Array = field(default_factory=lambda: np.zeros((0, 4)))  # t, latitude rad, longitude rad, height m
+    link: dict[str, float] = field(default_factory=dict)  # last ledger of the line
+
+
+WANTED = frozenset(topic.name for topic in (ACCEL, TACHO, RATE, TRUTH, NAV, INNOVATION, GNSS, LINK))
+
+
+def load_run(path: Path, device: str = "", boot: int | None = None, progress: Progress = silent) -> Run:
+    """The longest boot (or the named one) of a device (default: the one with most samples) of a recording.
+
+    Raises ReportError when there is no such device or boot, or no estimate at all; OSError.
+    """
+    found = tables(path, Selection(WANTED), progress)
+    devices: dict[str, int] = {}
+    for key, table in found.items():
+        address = parse(key)
+        if address.topic in (ACCEL, RATE, NAV):
+            devices[address.device] = devices.get(address.device, 0) + len(table)
+    if not devices:
+        raise ReportError(f"{path}: no samples and no estimates of any device; nothing to report on")
+    device = device or max(sorted(devices), key=lambda name: devices[name])
+    if device not in devices:
+        raise ReportError(f"{path}: no device {device!r}; there is {', '.join(sorted(devices))}")
+    mine = {key: table for key, table in found.items() if parse(key).device == device}
+    timed = [table for key, table in mine.items() if parse(key).topic in (ACCEL, RATE, NAV)]
+    lengths = _boots(timed)
+    if boot is not None and boot not in lengths:
+        raise ReportError(f"{path}: no boot {boot} of {device}; there are {', '.join(map(str, sorted(lengths)))}")
+    epoch = boot if boot is not None else max(sorted(lengths), key=lambda b: round(lengths[b], 1))
+    return _run(mine, device, epoch, tuple(sorted(lengths)))
+
+
+def _boots(timed: list[Table]) -> dict[int, float]:
+    """Boot -> its length, s."""
+    lengths: dict[int, float] = {}
+    for table in timed:
+        for epoch in np.unique(table.data["epoch"]):
+            t = table.data["utc_s"][table.data["epoch"] == epoch]
+            lengths[int(epoch)] = max(lengths.get(int(epoch), 0.0), float(t.max() - t.min()))
+    return lengths
+
+
+def _run(mine: dict[str, Table], device: str, epoch: int, boots: tuple[int, ...]) -> Run:
+    by_topic: dict[str, list[tuple[str, Table]]] = {}
+    for key, table in sorted(mine.items()):
+        address = parse(key)
+        at = table.data.get("epoch", np.zeros(len(table))) == epoch
+        part = Table(table.columns, {name: column[at] for name, column in table.data.items()})
+        if len(part):
+            by_topic.setdefault(address.topic.name, []).append((address.estimator, part))
+    starts = [part.data["utc_s"].min() for topic in (ACCEL, RATE, NAV) for _, part in by_topic.get(topic.name, [])]
+    ends = [part.data["utc_s"].max() for topic in (ACCEL, RATE, NAV) for _, part in by_topic.get(topic.name, [])]
+    t0 = float(min(starts))
+
+    def only(topic: str) -> Table | None:
+        return by_topic[topic][0][1] if topic in by_topic else None
+
+    truth = only(TRUTH.name)
+    link = only(LINK.name)
+    return Run(
+        device=device,
+        epoch=epoch,
+        boots=boots,
+        start_utc_s=t0,
+        seconds=float(max(ends)) - t0,
+        accel=_accel(only(ACCEL.name), t0),
+        tacho=_tacho(only(TACHO.name), t0),
+        truth_t=truth.data["utc_s"] - t0 if truth else np.zeros(0),
+        truth_omega_z=truth.data["omega_ib_b_radps_z"] if truth else np.zeros(0),
+        rates=[_rate(name, table, t0) for name, table in by_topic.get(RATE.name, [])],
+        navigation=[_navigation(name, table, t0) for name, table in by_topic.get(NAV.name, [])],
+        corrections=[_corrections(name, table, t0) for name, table in by_topic.get(INNOVATION.name, [])],
+        fixes=_fixes(only(GNSS.name), t0),
+        link={name: float(link.data[name][-1]) for name in LEDGER} if link else {},
+    )
+
+
+LEDGER = (
+    "bytes_in", "good_frames", "bad_chunks", "bad_bytes", "lost_frames", "lost_samples", "device_dropped",
+    "latency_p99_s", "clock_skew_ppm",
+)  # fmt: skip
+
+
+def _accel(table: Table | None, t0: float) -> Accel | None:
+    if table is None:
+        return None
+    names = [column.name for column in table.columns if column.name.endswith("_mps2")]
+    return Accel(table.data["utc_s"] - t0, table.vector(*names), float(np.median(table.data["period_s"])))
+
+
+def _tacho(table: Table | None, t0: float) -> Tacho | None:
+    if table is None or len(table) < 2:
+        return None
+    return Tacho(table.data["utc_s"] - t0, table.data["omega_radps"], table.data["sigma_radps"])
+
+
+def _xyz(table: Table, name: str, ends: tuple[str, ...] = XYZ) -> Array:
+    return table.vector(*(f"{name}_{end}" for end in ends))
+
+
+def _rate(name: str, table: Table, t0: float) -> Rate:
+    diagonal = table.vector("omega_covariance_0", "omega_covariance_4", "omega_covariance_8")
+    cards = table.data.get("calibration")
+    return Rate(
+        name=name,
+        t=table.data["utc_s"] - t0,
+        omega_b=_xyz(table, "omega_ib_b_radps"),
+        sigma=np.sqrt(np.maximum(diagonal, 0.0)),
+        alpha_b=_xyz(table, "alpha_b_radps2"),
+        f_b=_xyz(table, "f_b_mps2"),
+        angle_z=table.data["angle_z_rad"],
+        p_n=_xyz(table, "p_n_m", ("n", "e", "d")) if "p_n_m_n" in table.data else np.zeros((len(table), 3)),
+        nis=table.data["nis"],
+        nis_dof=table.data["nis_dof"],
+        still=table.data["still"] > 0,
+        calibration=str(cards[-1]) if cards is not None else "",
+    )
+
+
+def _navigation(name: str, table: Table, t0: float) -> Navigation:
+    sigma = [column.name for column in table.columns if column.name.startswith("sigma_")]
+    at = np.isfinite(table.data["p_ned_m_n"]) if "p_ned_m_n" in table.data else np.zeros(len(table), dtype=bool)
+    position = _xyz(table, "p_ned_m", ("n", "e", "d"))[at] if at.any() else np.zeros((0, 3))
+    velocity = _xyz(table, "v_n_mps", ("n", "e", "d"))[at] if at.any() else np.zeros((0, 3))
+    spread = table.vector(*sigma)[at] if sigma and at.any() else np.zeros((int(at.sum()), 15))
+    return Navigation(name, (table.data["utc_s"] - t0)[at], position, velocity, spread)
+
+
+def _corrections(name: str, table: Table, t0: float) -> Corrections:
+    data = table.data
+    return Corrections(name, data["utc_s"] - t0, data["nis"], data["dof"], data["accepted"] > 0)
+
+
+def _fixes(table: Table | None, t0: float) -> Array:
+    if table is None:
+        return np.zeros((0, 4))
+    data = table.data
+    at = data["quality"] > 0
+    columns = (
+        data["utc_s"] - t0,
+        np.radians(data["latitude_deg"]),
+        np.radians(data["longitude_deg"]),
+        data["height_m"],
+    )
+    return np.column_stack(columns)[at]

@@ -1,0 +1,24 @@
+"""The report as one HTML file that needs nothing beside it."""
+
+import base64
+from pathlib import Path
+
+import jinja2
+
+from sessions.report.document import Document
+
+_environment = jinja2.Environment(
+    loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+    autoescape=True,
+    undefined=jinja2.StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+)
+
+
+def to_html(document: Document) -> str:
+    """The page; pictures are inside."""
+    pictures = [
+        (k, picture.caption, base64.b64encode(picture.png).decode()) for k, picture in enumerate(document.pictures, 1)
+    ]
+    return _environment.get_template("report.html").render(document=document, pictures=pictures)

@@ -1,0 +1,131 @@
+"""The report as PDF (A4), by ReportLab in its invariant mode: no date, no random id."""
+
+import io
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+from matplotlib import font_manager
+from reportlab.lib import colors
+from reportlab.lib.pagesizes import A4
+from reportlab.lib.styles import ParagraphStyle
+from reportlab.lib.units import mm
+from reportlab.pdfbase import pdfmetrics
+from reportlab.pdfbase.ttfonts import TTFont
+from reportlab.pdfgen.canvas import Canvas
+from reportlab.platypus import Image, KeepTogether, Paragraph, SimpleDocTemplate, Spacer, Table, TableStyle
+
+from sessions.report.document import Document, Grid
+
+FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
+INK, DIM, LINE = colors.HexColor("#16202a"), colors.HexColor("#5b6770"), colors.HexColor("#d6dce1")
+VERDICTS = {"pass": colors.HexColor("#00704f"), "fail": colors.HexColor("#b03a00")}
+MARGIN = 18 * mm
+WIDTH = A4[0] - 2 * MARGIN
+
+
+def _style(name: str, size: float, **more: object) -> ParagraphStyle:
+    usual = {"fontName": FONT, "fontSize": size, "leading": size * 1.35, "textColor": INK}
+    return ParagraphStyle(name, **(usual | more))
+
+
+def to_pdf(document: Document) -> bytes:
+    """The file's bytes; the same document gives the same bytes."""
+    _register_fonts()
+    buffer = io.BytesIO()
+    pages = SimpleDocTemplate(
+        buffer, pagesize=A4, leftMargin=MARGIN, rightMargin=MARGIN, topMargin=MARGIN, bottomMargin=MARGIN,
+        title=document.title, author="gyrofree", invariant=1,
+    )  # fmt: skip
+    pages.build(_story(document), onFirstPage=_footer(document), onLaterPages=_footer(document))
+    return buffer.getvalue()
+
+
+def _register_fonts() -> None:
+    """DejaVu, which matplotlib carries: the figures and the text look alike, and mathematical signs exist."""
+    folder = Path(font_manager.findfont("DejaVu Sans")).parent
+    for name in (FONT, BOLD):
+        if name not in pdfmetrics.getRegisteredFontNames():
+            pdfmetrics.registerFont(TTFont(name, str(folder / f"{name}.ttf")))
+
+
+def _footer(document: Document):
+    def draw(canvas: Canvas, pages: SimpleDocTemplate) -> None:
+        canvas.saveState()
+        canvas.setFont(FONT, 7)
+        canvas.setFillColor(DIM)
+        canvas.drawString(MARGIN, 10 * mm, document.title)
+        canvas.drawRightString(A4[0] - MARGIN, 10 * mm, f"page {pages.page}")
+        canvas.restoreState()
+
+    return draw
+
+
+def _story(document: Document) -> list:
+    verdict = VERDICTS.get(document.verdict, DIM)
+    head = Table(
+        [[
+            Paragraph(escape(document.title), _style("title", 17, fontName=BOLD)),
+            Paragraph(document.verdict.upper(), _style("verdict", 13, fontName=BOLD, textColor=verdict, alignment=2)),
+        ]],
+        colWidths=[WIDTH * 0.72, WIDTH * 0.28],
+        style=[("LINEBELOW", (0, 0), (-1, -1), 1.5, INK), ("LEFTPADDING", (0, 0), (-1, -1), 0)],
+    )  # fmt: skip
+    story: list = [head, Spacer(0, 4 * mm), _pairs(document.facts)]
+    if document.checks:
+        story += _grid(Grid("Acceptance", ("figure", "measured", "limit", "result"), list(document.checks)))
+    for number, picture in enumerate(document.pictures, 1):
+        caption = Paragraph(escape(f"Figure {number}. {picture.caption}"), _style("caption", 7.5, textColor=DIM))
+        image = Image(io.BytesIO(picture.png))
+        image.drawHeight *= WIDTH / image.drawWidth
+        image.drawWidth = WIDTH
+        story.append(KeepTogether([Spacer(0, 5 * mm), image, caption]))
+    for grid in document.grids:
+        story += _grid(grid)
+    story += [_title("Provenance"), _pairs(document.provenance), Spacer(0, 18 * mm), _signatures()]
+    return story
+
+
+def _title(text: str) -> Paragraph:
+    return Paragraph(escape(text), _style("heading", 10.5, fontName=BOLD, spaceBefore=7 * mm, spaceAfter=2 * mm))
+
+
+def _pairs(rows: list[tuple[str, str]]) -> Table:
+    cells = [
+        [Paragraph(escape(name), _style("name", 8, textColor=DIM)), Paragraph(escape(value), _style("value", 8))]
+        for name, value in rows
+    ]
+    padding = {"LEFTPADDING": 0, "BOTTOMPADDING": 1, "TOPPADDING": 1}
+    style = [(name, (0, 0), (-1, -1), points) for name, points in padding.items()]
+    return Table(cells, colWidths=[WIDTH * 0.28, WIDTH * 0.72], style=style)
+
+
+def _grid(grid: Grid) -> list:
+    size = 7.0 if len(grid.head) < 7 else 6.0
+    body, bold = _style("cell", size), _style("head", size, fontName=BOLD, textColor=DIM)
+    cells = [[Paragraph(escape(cell), bold) for cell in grid.head]]
+    cells += [[Paragraph(escape(cell), body) for cell in row] for row in grid.rows]
+    style = TableStyle([
+        ("LINEBELOW", (0, 0), (-1, 0), 0.7, INK), ("LINEBELOW", (0, 1), (-1, -1), 0.3, LINE),
+        ("LEFTPADDING", (0, 0), (-1, -1), 0), ("TOPPADDING", (0, 0), (-1, -1), 1.5),
+        ("BOTTOMPADDING", (0, 0), (-1, -1), 1.5), ("VALIGN", (0, 0), (-1, -1), "TOP"),
+    ])  # fmt: skip
+    widths = _widths(grid)
+    blocks = [_title(grid.title), Table(cells, colWidths=widths, style=style, repeatRows=1)]
+    if grid.remark:
+        blocks.append(Paragraph(escape(grid.remark), _style("remark", 7, textColor=DIM, spaceBefore=1.5 * mm)))
+    return [KeepTogether(blocks)] if len(grid.rows) < 12 else blocks
+
+
+def _widths(grid: Grid) -> list[float]:
+    """In proportion to the longest text of each column."""
+    columns = list(zip(grid.head, *grid.rows, strict=True))
+    longest = [max(6, *(max(len(word) for word in text.split("\n")) for text in column)) for column in columns]
+    capped = [min(length, 24) for length in longest]
+    return [WIDTH * length / sum(capped) for length in capped]
+
+
+def _signatures() -> Table:
+    style = [("LINEABOVE", (k, 0), (k, 0), 0.6, INK) for k in (0, 2, 4)]
+    labels = [Paragraph(text, _style("sign", 7.5, textColor=DIM)) for text in ("Tested by", "Approved by", "Date")]
+    row = [labels[0], "", labels[1], "", labels[2]]
+    return Table([row], colWidths=[WIDTH * share for share in (0.3, 0.05, 0.3, 0.05, 0.3)], style=style)
