@@ -1,7 +1,8 @@
 """One board: chunks in, bus messages out. Everything after the reader happens on one thread, `DeviceLink.run`.
 
 Reading and journalling need no bus. What is decoded before `go_live` only moves the counters, the clock and the state
-(sample index, HELLO, tachometer); its samples are in the journal and are never published later as if they were live.
+(sample index, HELLO, tachometer). What is put before there is a bus stands in the spool of published messages, where
+consumers can ask for it; it is never sent later as if it were live.
 """
 
 import logging
@@ -19,13 +20,14 @@ from gateway import convert
 from gateway.batch import Batch, Index, Joiner
 from gateway.clock import DeviceClock
 from gateway.gnss_link import GnssLink
-from messages.journal import Journal
-from messages.journal_file import BOARD, GNSS
 from gateway.link_report import LinkReport
 from gateway.reader import Chunk, Reader
 from gateway.settings import DeviceSettings, GatewaySettings
 from gateway.tacho import Tachometer
 from messages import gyrofree_pb2 as pb
+from messages.journal import Journal
+from messages.journal_file import BOARD, GNSS
+from messages.spool import Spool
 from messages.topics import ACCEL, IMU, LINK, LOCATION, TACHO, Topic
 from messages.topics import BOARD as BOARD_TOPIC
 from messages.topics import GNSS as GNSS_TOPIC
@@ -52,6 +54,9 @@ class DeviceLink:
         self._next_put: Put | None = None
         self.journal = Journal(
             settings.journal / device.name, settings.journal_bytes, settings.segment_bytes, settings.sync_s
+        )
+        self.spool = Spool(
+            settings.journal / device.name / "published", settings.published_bytes, settings.published_age_s
         )
         self.deframer = Deframer()
         self.ledger = Ledger()
@@ -83,6 +88,7 @@ class DeviceLink:
             for reader in self.readers:
                 reader.close()
             self.journal.close()
+            self.spool.close()
 
     def _loop(self, stop: threading.Event) -> None:
         due = time.monotonic()

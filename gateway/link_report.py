@@ -61,6 +61,8 @@ class LinkReport:
             clock_window_s=link.clock.span_s,
             journal_sequence=link.journal.last_seq,
             durable_sequence=link.journal.durable_seq,
+            published_sequence=link.spool.journal.last_seq,
+            published_durable=link.spool.journal.durable_seq,
             gnss_good=link.gnss.decoder.good,
             gnss_bad=link.gnss.decoder.bad,
             damage=ledger.damage,
@@ -78,6 +80,8 @@ class LinkReport:
             )
         if link.journal.message:
             found.append(link.journal.message)
+        elif link.spool.journal.message:
+            found.append(link.spool.journal.message)
         if abs(link.clock.skew_ppm) > CRYSTAL_PPM:
             scale = link.device.time_scale * (1.0 + link.clock.skew_ppm * 1e-6)
             found.append(

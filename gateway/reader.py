@@ -12,8 +12,8 @@ import threading
 import time
 from dataclasses import dataclass
 
-from messages.journal import Journal
 from gateway.ports import Port, PortEnd, PortError, open_port
+from messages.journal import Journal
 
 log = logging.getLogger(__name__)
 

@@ -13,10 +13,11 @@ import zenoh
 
 from gateway.device import DeviceLink
 from gateway.identity import claim
-from messages.journal import Journal, JournalBusy
 from gateway.settings import DeviceSettings, GatewaySettings
 from messages.bus import BusSettings, BusUnavailable, Publishers, open_client
-from messages.topics import history_key
+from messages.history import declare
+from messages.journal import Journal, JournalBusy
+from messages.topics import GATEWAY, history_key
 
 log = logging.getLogger(__name__)
 
@@ -55,8 +56,10 @@ def run(settings: GatewaySettings, bus: BusSettings, stop: threading.Event) -> N
 class _Line:
     """A board's link on a thread of its own. Raises JournalBusy when another gateway has the journal."""
 
-    def __init__(self, device: DeviceSettings, settings: GatewaySettings, stop: threading.Event) -> None:
+    def __init__(self, device: DeviceSettings, settings: GatewaySettings, prefix: str, stop: threading.Event) -> None:
         self.link = DeviceLink(device, settings)
+        self.publishers = Publishers(None, prefix, self.link.spool)  # keeps what it is given until there is a bus
+        self.link.go_live(self.publishers.put)
         self._stop = stop
         self._halt = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"link-{device.name}")
@@ -89,7 +92,7 @@ def _serve(
     """One board until `stop`: read it at once, publish when the session is there and the name is ours."""
     line = None
     try:
-        line = _open_line(device, settings, stop)
+        line = _open_line(device, settings, prefix, stop)
         session = opened.result()
         if line is not None and session is not None:
             _publish(line, device, settings, prefix, session, stop)
@@ -102,12 +105,12 @@ def _serve(
             line.close()
 
 
-def _open_line(device: DeviceSettings, settings: GatewaySettings, stop: threading.Event) -> _Line | None:
+def _open_line(device: DeviceSettings, settings: GatewaySettings, prefix: str, stop: threading.Event) -> _Line | None:
     """Wait until no other gateway has the journal; None when `stop` came first."""
     said = False
     while not stop.is_set():
         try:
-            return _Line(device, settings, stop)
+            return _Line(device, settings, prefix, stop)
         except JournalBusy as busy:
             if not said:
                 log.error("%s: refused: %s; the board is not read until the journal is free", device.name, busy)
@@ -134,20 +137,23 @@ def _publish(
     token = claim(session, prefix, device.name, stop, give_up)
     if token is None:
         return
-    history = None
-    mine = _open_line(device, settings, stop) if refused.is_set() else line
+    queryables = []
+    mine = _open_line(device, settings, prefix, stop) if refused.is_set() else line
     try:
         if mine is not None:
             link = mine.link
             key = history_key(prefix, device.name)
-            history = session.declare_queryable(key, lambda query: answer_history(query, key, link.journal))
-            link.go_live(Publishers(session, prefix).put)
+            queryables = [
+                session.declare_queryable(key, lambda query: answer_history(query, key, link.journal)),
+                declare(session, prefix, device.name, GATEWAY, link.spool),
+            ]
+            mine.publishers.attach(session)
         stop.wait()
     finally:
         if mine is not None:
             mine.close()
-        if history is not None:
-            history.undeclare()
+        for queryable in queryables:
+            queryable.undeclare()
         token.undeclare()
 
 

@@ -16,7 +16,8 @@ import zenoh
 from google.protobuf.message import DecodeError, Message
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from messages.topics import NAME, Topic
+from messages.spool import Spool
+from messages.topics import NAME, REPLAY_SUFFIX, Topic
 
 log = logging.getLogger(__name__)
 
@@ -64,6 +65,8 @@ def _config(settings: BusSettings, mode: str) -> zenoh.Config:
         values["connect/endpoints"] = [settings.router]
         values["connect/timeout_ms"] = 1000
         values["listen/endpoints"] = []
+        # Look for a router that went away every second: what was missed shall be on the screen within five.
+        values["connect/retry"] = {"period_init_ms": 500, "period_max_ms": 1000, "period_increase_factor": 1.5}
     for key, value in values.items():
         config.insert_json5(key, json.dumps(value))
     return config
@@ -118,23 +121,49 @@ def wait_connected(session: zenoh.Session, timeout_s: float) -> bool:
 
 
 class Publishers:
-    """Declared publishers of one session, made at first use. DROP: a slow link never stalls the caller."""
+    """Declared publishers of one session, made at first use. DROP: a slow link never stalls the caller.
 
-    def __init__(self, session: zenoh.Session, prefix: str) -> None:
+    With a spool, every message is kept there before it goes out, and its sequences go on where the spool's end; a
+    session may then come later (`attach`): until it does, messages are only kept.
+    """
+
+    def __init__(self, session: zenoh.Session | None, prefix: str, spool: Spool | None = None) -> None:
         self._session = session
         self._prefix = prefix
+        self._spool = spool
         self._by_key: dict[str, zenoh.Publisher] = {}
         self._sequence: dict[str, int] = {}
+
+    def resume(self) -> None:
+        """Count on from what the spool holds, for a publisher whose run goes on over its restarts."""
+        for (topic, device), sequence in (self._spool.last_sequences() if self._spool else {}).items():
+            self._sequence["/".join((self._prefix, device, topic))] = sequence
+
+    def attach(self, session: zenoh.Session) -> None:
+        """Publish from now on."""
+        self._session = session
 
     def put(self, topic: Topic[M], device: str, message: M, estimator: str = "") -> None:
         """Publish; a message with a header gets this key's next sequence unless the caller set one."""
         key = topic.key(self._prefix, device, estimator)
-        if key not in self._by_key:
-            self._by_key[key] = self._session.declare_publisher(key, congestion_control=zenoh.CongestionControl.DROP)
-        if "header" in message.DESCRIPTOR.fields_by_name and not message.header.sequence:
+        header = message.header if "header" in message.DESCRIPTOR.fields_by_name else None
+        if header is None or not header.sequence:
             self._sequence[key] = self._sequence.get(key, 0) + 1
-            message.header.sequence = self._sequence[key]
-        self._by_key[key].put(message.SerializeToString())
+            if header is not None:
+                header.sequence = self._sequence[key]
+        payload = message.SerializeToString()
+        if self._spool is not None and not device.endswith(REPLAY_SUFFIX):
+            name = key.split("/", 2)[2]
+            if header is not None:
+                self._spool.append(name, device, header.run, header.sequence, header.utc_ns, payload)
+            else:
+                self._spool.append(name, device, 0, self._sequence[key], message.timestamp.ToNanoseconds(), payload)
+        session = self._session
+        if session is None:
+            return
+        if key not in self._by_key:
+            self._by_key[key] = session.declare_publisher(key, congestion_control=zenoh.CongestionControl.DROP)
+        self._by_key[key].put(payload)
 
 
 def decode(topic: Topic[M], payload: bytes) -> M | None:

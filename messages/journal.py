@@ -62,10 +62,11 @@ class Journal:
         self.max_sync_s = 0.0
         self._write_message = ""
         self._sync_message = ""
+        self.place = (0, 0)  # of the last record: first sequence of its segment, offset in it
         self._lock = threading.Lock()
         self._folder_lock: int | None = None  # descriptor of the locked file; None: the folder could not be used yet
         self._fd: int | None = None
-        self._size = 0
+        self._size = self._first = 0  # of the open segment: bytes, sequence of its first record
         self._full: list[int] = []  # descriptors of finished segments that still want their fdatasync
         self._retry_at = 0.0
         self._sync_s = sync_s
@@ -100,6 +101,7 @@ class Journal:
                 self.unkept_bytes += len(data)
                 return 0
             self.last_seq += 1
+            self.place = (self._first, self._size)
             self._size += len(raw)
             if self._size >= self.segment_bytes:
                 self._finish_segment()
@@ -193,7 +195,7 @@ class Journal:
         except OSError as error:
             self._refuse(error)
             return False
-        self._size = len(head)
+        self._size, self._first = len(head), first
         if self._write_message:
             log.warning("journal %s: writable again; %d bytes were not kept", self.folder, self.unkept_bytes)
             self._write_message = ""

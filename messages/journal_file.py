@@ -19,7 +19,7 @@ RECORD_HEAD = struct.Struct("<4sQQQIB")
 CRC = struct.Struct("<I")
 MAX_BYTES = 1 << 20  # of one read; a longer length is damage
 
-BOARD, GNSS = 0, 1  # channels
+BOARD, GNSS, PUBLISHED = 0, 1, 2  # channels; journals of published messages are described in spool.py
 
 
 @dataclass(frozen=True)

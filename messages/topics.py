@@ -19,7 +19,10 @@ from messages import gyrofree_pb2 as pb
 M = TypeVar("M", bound=Message)
 
 NAME = re.compile(r"[a-z][a-z0-9_-]{0,31}")
+REPLAY_SUFFIX = "-replay"  # of a device's name when a recording of it is played on the bus
 RECORDER = "recorder"  # the device name under which the recorder speaks
+
+GATEWAY, ESTIMATES = "gateway", "estimator"  # processes that keep what they publish, by the topics' `source`
 
 
 class TopicError(ValueError):
@@ -118,7 +121,7 @@ def history_key(prefix: str, device: str) -> str:
 
 
 def published_key(prefix: str, device: str, source: str) -> str:
-    """Key of a queryable for published messages: HistoryQuery in, HistoryReply out; `*` asks for any device or source."""
+    """Key of a queryable for published messages: HistoryQuery in, HistoryReply out; `*` stands for any name."""
     for name in (prefix, device, source):
         if name != "*":
             check_name(name)

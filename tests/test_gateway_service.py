@@ -13,13 +13,14 @@ from firmware_protocol.codec import FLAG_SIMULATED, Deframer, Frame, encode
 from firmware_protocol.frames import Acc12
 from gateway import service
 from gateway.board_link import PtyLink, TcpLink
-from messages.journal_file import records, scan
 from gateway.player import LOG_EPOCH_S
 from gateway.settings import DeviceSettings, GatewaySettings
 from gateway.ubx import Epoch, ubx_bytes
 from gateway.virtual_board import PLAYED, SIMULATED, BoardAccel, BoardBytes, BoardPulse, VirtualBoard
 from messages import gyrofree_pb2 as pb
 from messages.bus import BusSettings, open_client, open_router, subscribe
+from messages.history import ask
+from messages.journal_file import records, scan
 from messages.topics import ACCEL, BOARD, GNSS, LINK, LOCATION, TACHO, history_key
 
 PERIOD_S = 0.002  # 500 Hz with n = 1: also exercises joining
@@ -295,7 +296,15 @@ def test_without_a_router_all_is_journalled_and_counted_and_not_published_later(
     assert status.journal_sequence and status.lost_frames == 0 and not bench.seen["accel"]
     board.run(samples(100, first=100), threading.Event())
     got = wait_for(lambda: (m := list(bench.seen["accel"])) and sum(len(b.counts) for b in m) >= 1200 and m)
-    assert got[0].first_index == 100 and got[0].header.sequence == 1 and got[0].header.epoch == 3
+    assert got[0].first_index == 100 and got[0].header.epoch == 3
+    # what went before is not sent as if it were live, but is there for who asks
+    asked = pb.HistoryQuery(
+        topics=["accel"], of="accel", until_run=got[0].header.run, until_sequence=got[0].header.sequence
+    )
+    reply = ask(bench.session, bench.bus.prefix, "cube", "gateway", asked)
+    before = [pb.AccelBatch.FromString(item.payload) for item in reply.items]
+    assert [b.first_index for b in before] == list(range(0, 100, 100 // len(before)))
+    assert [b.header.sequence for b in before] == list(range(1, got[0].header.sequence))
     assert [c for b in got for c in b.counts] == [c for s in samples(100, first=100) for c in s.counts12]
     assert sum(b.lost_samples for b in got) == 0
     status = bench.status(lambda s: s.good_frames == board.built)

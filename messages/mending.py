@@ -1,0 +1,297 @@
+"""Gaps of the bus, noticed by jumps of header.sequence, and filled with what the publisher kept.
+
+A Mender stands between a subscriber and its consumer. It takes messages as they arrive and gives them on in the order
+of publication, with the missing ones in their place; they come from the publisher's spool (spool.py). It has no
+thread, no clock and no bus: questions go out through `ask`, answers come back through `answer`, so that recorder,
+estimator and dashboard use it on their own threads, and a test without any.
+
+Messages belong together by device and publishing process (a "stream"): one question about a stream fills the gaps of
+all its topics, in the right order among them. With `hold`, live messages of a stream wait while one of its gaps is
+being filled, at most `max_held` of them; without, they pass at once and the filled ones come late.
+"""
+
+import logging
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from google.protobuf.message import DecodeError
+
+from messages import gyrofree_pb2 as pb
+from messages.topics import BY_NAME, REPLAY_SUFFIX, Topic
+
+log = logging.getLogger(__name__)
+
+MAX_HELD = 60_000
+REMEMBERED = 4096  # payloads without a header: the newest are recognised when they come again
+
+
+class Arrival(NamedTuple):
+    """One message: live as it came, or filled in."""
+
+    topic: Topic
+    device: str
+    estimator: str
+    payload: bytes
+    at_ns: int  # when it came, or, filled in, when it was published; UTC
+    late: bool = False
+
+    @property
+    def name(self) -> str:
+        """Topic with its estimator."""
+        return f"{self.topic.name}/{self.estimator}" if self.estimator else self.topic.name
+
+
+class Question(NamedTuple):
+    """What to ask the publisher of a stream."""
+
+    stream: tuple[str, str]  # device, source
+    query: pb.HistoryQuery
+
+
+@dataclass
+class _Key:
+    """What is known of one topic of a stream."""
+
+    run: int
+    last: int
+    missing: list[list[int]] = field(default_factory=list)  # [run, first, last], being asked for
+    filled: tuple[int, int] = (1, 0)  # sequences that came filled in before they came live
+    repaired: int = 0
+    lost: int = 0
+
+    def advance(self, run: int, sequence: int) -> None:
+        """A filled-in message is the newest now."""
+        follows = run == self.run and self.filled[1] == self.last
+        self.filled = (self.filled[0] if follows else sequence, sequence)
+        self.run, self.last = run, sequence
+
+
+@dataclass
+class _Stream:
+    asking: bool = False
+    held: deque[Arrival] = field(default_factory=deque)
+    waiting: deque[pb.HistoryQuery] = field(default_factory=deque)
+
+
+class Mender:
+    """See the module. `ask(question)` must not block; `sources` are the processes that have a spool."""
+
+    def __init__(
+        self,
+        ask: Callable[[Question], None],
+        *,
+        hold: bool = True,
+        max_held: int = MAX_HELD,
+        topics: tuple[Topic, ...] = (),
+        sources: tuple[str, ...] = ("gateway", "estimator"),
+        since_ns: int = 0,
+    ) -> None:
+        """`topics` limits what is asked for; none: everything. A run that began after `since_ns` is wanted whole."""
+        self._ask, self._hold, self._max_held = ask, hold, max_held
+        self._topics, self._sources, self._since_ns = topics, sources, since_ns
+        self._keys: dict[tuple[str, str], _Key] = {}
+        self._streams: dict[tuple[str, str], _Stream] = {}
+        self._seen: deque[int] = deque(maxlen=REMEMBERED)  # hashes of payloads without a header
+
+    @property
+    def held(self) -> int:
+        """Live messages that wait for a gap to be filled."""
+        return sum(len(stream.held) for stream in self._streams.values())
+
+    @property
+    def asking(self) -> bool:
+        """True while an answer is awaited."""
+        return any(stream.asking for stream in self._streams.values())
+
+    def counts(self) -> dict[str, tuple[int, int]]:
+        """Repaired and finally lost messages by "<device>/<topic>", where there are any."""
+        return {
+            f"{device}/{name}": (key.repaired, key.lost)
+            for (device, name), key in self._keys.items()
+            if key.repaired or key.lost
+        }
+
+    def seed(self, device: str, name: str, run: int, last: int) -> None:
+        """The consumer has everything of this topic up to here, from an earlier life."""
+        self._keys[device, name] = _Key(run, last)
+
+    def take(self, arrival: Arrival) -> list[Arrival]:
+        """One live message; what can be given on now, in order."""
+        if arrival.topic.source not in self._sources or arrival.device.endswith(REPLAY_SUFFIX):
+            return [arrival]
+        stream = self._streams.setdefault((arrival.device, arrival.topic.source), _Stream())
+        if self._hold and stream.asking:
+            stream.held.append(arrival)
+            if len(stream.held) <= self._max_held:
+                return []
+            log.warning("%s: no answer in time: going on with a gap", arrival.device)
+            return self._release(stream)
+        return self._pass(stream, arrival)
+
+    def answer(self, question: Question, reply: pb.HistoryReply | None) -> list[Arrival]:
+        """The publisher's answer (None: there is none); what can be given on now, in order."""
+        stream = self._streams.setdefault(question.stream, _Stream())
+        out: list[Arrival] = []
+        for item in reply.items if reply is not None else ():
+            out += self._fill(question.stream[0], item)
+        if reply is not None and reply.next:
+            query = pb.HistoryQuery()
+            query.CopyFrom(question.query)
+            query.position = reply.next
+            self._ask(Question(question.stream, query))
+            return out
+        if stream.waiting:
+            self._ask(Question(question.stream, stream.waiting.popleft()))
+            return out
+        self._give_up(question.stream)
+        stream.asking = False
+        while stream.held and not stream.asking:
+            out += self._pass(stream, stream.held.popleft())
+        return out
+
+    def release(self) -> list[Arrival]:
+        """Everything that is held, without waiting any longer: the end."""
+        return [arrival for stream in self._streams.values() for arrival in self._release(stream)]
+
+    # --- one message
+
+    def _pass(self, stream: _Stream, arrival: Arrival) -> list[Arrival]:
+        header = header_of(arrival)
+        if header is None:
+            return [] if self._known(arrival.payload) else [arrival]
+        key = self._keys.get((arrival.device, arrival.name))
+        if key is None:
+            key = self._keys[arrival.device, arrival.name] = _Key(header.run, header.sequence)
+            whole = 0 < self._since_ns < header.run and header.sequence > 1
+            if not whole:
+                return [arrival]
+            key.last = 0
+        if header.run == key.run and header.sequence == key.last + 1:
+            key.last += 1
+            return [arrival]
+        if header.run == key.run and header.sequence <= key.last:
+            if key.filled[0] <= header.sequence <= key.filled[1]:
+                return []  # it was filled in already
+            key.last = header.sequence  # a publisher without a spool began anew, or repeats itself
+            return [arrival]
+        if header.run != key.run and header.run < key.run:
+            key.run, key.last = header.run, header.sequence  # another recording, or a clock set back
+            return [arrival]
+        self._notice(stream, arrival, key, header)
+        if self._hold:
+            stream.held.appendleft(arrival)
+            return []
+        key.run, key.last = header.run, header.sequence
+        return [arrival]
+
+    def _notice(self, stream: _Stream, arrival: Arrival, key: _Key, header: pb.Header) -> None:
+        """A gap lies before this message: ask for what is in it."""
+        query = pb.HistoryQuery(
+            topics=self._wanted(arrival), of=arrival.name, after_run=key.run, after_sequence=key.last,
+            until_run=header.run, until_sequence=header.sequence,
+        )  # fmt: skip
+        if header.run == key.run:
+            key.missing.append([key.run, key.last + 1, header.sequence - 1])
+        else:
+            key.missing.append([key.run, key.last + 1, 1 << 62])
+            key.missing.append([header.run, 1, header.sequence - 1])
+        if stream.asking:
+            stream.waiting.append(query)
+        else:
+            stream.asking = True
+            self._ask(Question((arrival.device, arrival.topic.source), query))
+
+    def _wanted(self, arrival: Arrival) -> list[str]:
+        if not self._topics:
+            return []
+        return [t.name for t in self._topics if t.source == arrival.topic.source and not t.per_estimator]
+
+    def _fill(self, device: str, item: pb.HistoryItem) -> list[Arrival]:
+        name, _, estimator = item.topic.partition("/")
+        topic = BY_NAME.get(name)
+        if topic is None:
+            return []
+        arrival = Arrival(topic, device, estimator, item.payload, item.published_ns, late=True)
+        if not item.run:
+            return [] if self._known(item.payload) else [arrival]
+        key = self._keys.get((device, item.topic))
+        if key is None:
+            return []  # never heard live: not this consumer's gap
+        for gap in key.missing:
+            if gap[0] == item.run and gap[1] <= item.sequence <= gap[2]:
+                key.lost += item.sequence - gap[1]
+                gap[1] = item.sequence + 1
+                key.repaired += 1
+                if (item.run, item.sequence) > (key.run, key.last):
+                    key.advance(item.run, item.sequence)
+                return [arrival]
+        if (item.run, item.sequence) <= (key.run, key.last):
+            return []
+        key.advance(item.run, item.sequence)
+        key.repaired += 1
+        return [arrival]
+
+    def _give_up(self, stream: tuple[str, str]) -> None:
+        """What the answers have not brought is lost."""
+        for (device, name), key in self._keys.items():
+            if device == stream[0] and BY_NAME[name.partition("/")[0]].source == stream[1] and key.missing:
+                lost = sum(max(0, b - a + 1) for _, a, b in key.missing if b < 1 << 62)
+                if lost:
+                    log.warning("%s/%s: %d messages are lost: their publisher has them no more", device, name, lost)
+                key.lost += lost
+                run, _, last = key.missing[-1]
+                if (run, last) > (key.run, key.last):
+                    key.run, key.last = run, last
+                key.missing.clear()
+
+    def _release(self, stream: _Stream) -> list[Arrival]:
+        """Let go what is held, gaps and all."""
+        out, held = [], list(stream.held)
+        stream.held.clear()
+        stream.asking = False
+        stream.waiting.clear()
+        for arrival in held:
+            header = header_of(arrival)
+            key = self._keys.get((arrival.device, arrival.name))
+            if header is not None and key is not None:
+                if (header.run, header.sequence) <= (key.run, key.last):
+                    continue
+                key.lost += header.sequence - key.last - 1 if header.run == key.run else 0
+                key.run, key.last = header.run, header.sequence
+                key.missing.clear()
+            out.append(arrival)
+        return out
+
+    def _known(self, payload: bytes) -> bool:
+        mark = hash(payload)
+        if mark in self._seen:
+            return True
+        self._seen.append(mark)
+        return False
+
+
+def header_of(arrival: Arrival) -> pb.Header | None:
+    """The header of a message, the only part that is parsed; None for types without one and for damaged bytes."""
+    if "header" not in arrival.topic.type.DESCRIPTOR.fields_by_name:
+        return None
+    try:
+        return pb.Header.FromString(first_field(arrival.payload))
+    except (DecodeError, ValueError):
+        return None
+
+
+def first_field(payload: bytes) -> bytes:
+    """Content of field 1 when it stands first and is length-delimited; raises ValueError otherwise."""
+    if len(payload) < 2 or payload[0] != 0x0A:
+        raise ValueError("field 1 does not stand first")
+    size, at, shift = payload[1] & 0x7F, 2, 7
+    while payload[at - 1] & 0x80:
+        if at >= len(payload) or at > 4:
+            raise ValueError("length of field 1 does not end")
+        size |= (payload[at] & 0x7F) << shift
+        at, shift = at + 1, shift + 7
+    if at + size > len(payload):
+        raise ValueError("field 1 is longer than the message")
+    return payload[at : at + size]
