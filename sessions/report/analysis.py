@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from sessions.manifest import Manifest
 from sessions.report.data import Rate, Run
 from sessions.report.paper import CubeTest, PositionError, cube_test, local_gravity, position_error
-from sessions.report.segments import STEP, Segment, reference, segment
+from sessions.report.segments import STEP, Segment, measured, reference, segment
 from sessions.report.stability import Allan, Consistency, allan_axes, consistency, longest_rest
 from sessions.report.table_test import Plateau, ScaleFactor, plateaus, scale_factor
 
@@ -22,7 +22,7 @@ class RateResult:
     name: str
     plateaus: list[Plateau]
     fit: ScaleFactor | None
-    rms: Array | None  # (3,) rad/s over the whole run; None without a reference
+    rms: Array | None  # (3,) rad/s where the reference is measured; None without one
     angle_error: float | None  # rad, at the end
     nis: Consistency | None
     position: PositionError | None
@@ -113,7 +113,8 @@ def _rate_result(rate: Rate, run: Run, parts: list[Segment], bias: Array | None,
     if run.tacho is not None:
         omega_z = reference(run.tacho, rate.t)
         error = rate.omega_b - np.column_stack([np.zeros((len(omega_z), 2)), omega_z])
-        rms = np.sqrt((error**2).mean(axis=0))
+        known = measured(run.tacho, rate.t)
+        rms = np.sqrt((error[known] ** 2).mean(axis=0)) if known.any() else None
         grid = np.arange(rate.t[0], rate.t[-1], STEP)
         turned = float(reference(run.tacho, grid).sum() * STEP)
         angle = float(rate.angle_z[-1] - rate.angle_z[0]) - turned

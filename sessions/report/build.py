@@ -52,7 +52,7 @@ def build(path: Path, spec: Spec, device: str = "", boot: int | None = None, pro
     figures = metrics(found, spec.estimator)
     checks = judge(spec, figures)
     progress(0.65, "drawing")
-    sha256 = _sha256(path)
+    sha256 = sha256_of(path)
     document = compose(found, manifest, sha256, spec, checks, pictures(found))
     progress(0.85, "writing")
     report = Report(
@@ -72,7 +72,8 @@ def _manifest(path: Path) -> Manifest | None:
         return None
 
 
-def _sha256(path: Path) -> str:
+def sha256_of(path: Path) -> str:
+    """Hex digest of a file."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 

@@ -129,7 +129,8 @@ def _scale_factors(found: Analysis) -> Grid | None:
             "RMS x y z, deg/s", "angle error, deg")  # fmt: skip
     remark = (
         "indicated = bias + scale factor × reference, weighted least squares over all plateaus and standstills; "
-        "± is two standard errors. Linearity: largest residual over full scale. RMS and angle error: whole run."
+        "± is two standard errors. Linearity: largest residual over full scale. "
+        "RMS: where the tachometer measures or the table stands; angle error: end of the run."
     )
     return Grid("Scale factor, linearity, asymmetry, bias (IEEE Std 836, 1293)", head, rows, remark)
 

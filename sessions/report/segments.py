@@ -70,8 +70,20 @@ def reference(tacho: Tacho, t: Array) -> Array:
     return np.interp(t, np.concatenate(times), np.concatenate(rates), left=0.0, right=0.0)
 
 
+def measured(tacho: Tacho, t: Array) -> NDArray[np.bool_]:
+    """Where the reference is a measurement: not within SILENCE before pulses begin and after they end."""
+    begins = tacho.t[np.flatnonzero(np.diff(tacho.t, prepend=-np.inf) > SILENCE)]
+    ends = tacho.t[np.flatnonzero(np.diff(tacho.t, append=np.inf) > SILENCE)]
+    guess = np.zeros(len(t), dtype=bool)
+    for begin in begins:
+        guess |= (t > begin - SILENCE) & (t < begin + 0.1)
+    for end in ends:
+        guess |= (t > end - 0.1) & (t < end + SILENCE)
+    return ~guess
+
+
 def _to_zero(t: Array, omega: Array) -> float:
-    """Where the line through two rates, the outer one first, meets zero; at most SILENCE / 2 away from the outer one."""
+    """Where the line through two rates, the outer one first, meets zero; at most SILENCE / 2 from the outer one."""
     outward = t[0] - t[1]
     change = omega[0] - omega[1]
     reach = -omega[0] / change * outward if change * omega[0] < 0.0 else np.sign(outward) * SILENCE
