@@ -137,6 +137,21 @@ def rate_message(header: pb.Header, batch: pb.AccelBatch, index: int, name: str,
     return message
 
 
+def attitude_message(header: pb.Header, batch: pb.ImuBatch, index: int, name: str, state: Any) -> pb.AttitudeEstimate:
+    """AttitudeState as published; no filter of that kind knows north."""
+    return pb.AttitudeEstimate(
+        header=header,
+        estimator=name,
+        for_sequence=batch.header.sequence,
+        for_index=index,
+        q_nb=as_list(state.q_nb),
+        inclination_sigma_rad=float(state.inclination_sigma),
+        bias_omega_b_radps=as_list(state.bias_omega_b),
+        resting=bool(state.resting),
+        heading_known=False,
+    )
+
+
 def pose_message(header: pb.Header, name: str, p_n_m: Iterable[float], q_nb: Iterable[float]) -> FrameTransform:
     """Body against n as any viewer draws it: parent <device>/n, child <device>/<estimator>."""
     message = FrameTransform(parent_frame_id=f"{header.device}/n", child_frame_id=f"{header.device}/{name}")

@@ -16,6 +16,8 @@ from typing import Any, NamedTuple
 from google.protobuf.message import Message
 
 from estimator import convert
+from estimator.attitude.board import AttitudeBoard
+from estimator.attitude.filters import ATTITUDES
 from estimator.ins.board import NavBoard
 from estimator.ins.navigation import NAVIGATORS, Correction, Mode, NavigatorConfig
 from estimator.rate.board import RateBoard, WrongAxes
@@ -24,7 +26,7 @@ from estimator.stream import Stream, every, worth_a_line
 from estimator.warm import warm
 from messages import gyrofree_pb2 as pb
 from messages.bus import BusSettings, BusUnavailable, Publishers, decode, open_client
-from messages.topics import ACCEL, ESTIMATOR, GNSS, IMU, INNOVATION, NAV, POSE, RATE, Topic, TopicError, parse
+from messages.topics import ACCEL, ATTITUDE, ESTIMATOR, GNSS, IMU, INNOVATION, NAV, POSE, RATE, Topic, TopicError, parse
 
 log = logging.getLogger(__name__)
 
@@ -59,10 +61,12 @@ class Pipeline:
         """
         check_names("rate", settings.rate, rate_estimators())
         check_names("navigators", settings.navigators, NAVIGATORS)
+        check_names("attitudes", settings.attitudes, ATTITUDES)
         self._settings = settings
         self._clock = clock
         self._boards: dict[str, RateBoard] = {}
         self._vehicles: dict[str, NavBoard] = {}
+        self._attitudes: dict[str, AttitudeBoard] = {}
         self._clock_offset: dict[str, float] = {}
         self._cost = _Cost()
         self._second: dict[tuple[str, str], int] = {}
@@ -133,6 +137,18 @@ class Pipeline:
             header = convert.sample_header(batch.header, (len(samples.t_s) - 1) * batch.period_s)
             for name in self._settings.navigators:
                 out.append(Output(ESTIMATOR, device, name, self._nav_status(header, board, name)))
+        return out + self._tilt(batch, samples.values, rates)
+
+    def _tilt(self, batch: pb.ImuBatch, f_b: Any, omega_b: Any) -> list[Output]:
+        """Attitude of every tilt filter."""
+        header, device = batch.header, batch.header.device
+        if device not in self._attitudes:
+            self._attitudes[device] = AttitudeBoard(device, self._settings.attitudes, self._settings.attitude_limit_hz)
+        out = []
+        for o in self._attitudes[device].feed(header.epoch, batch.first_index, batch.period_s, f_b, omega_b):
+            then = convert.sample_header(header, o.row * batch.period_s)
+            message = convert.attitude_message(then, batch, o.index, o.estimator, o.state)
+            out.append(Output(ATTITUDE, device, o.estimator, message))
         return out
 
     def on_gnss(self, message: pb.GnssFix) -> list[Output]:

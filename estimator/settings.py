@@ -31,12 +31,14 @@ class EstimatorSettings(BaseModel):
 
     rate: list[str] = Field(default_factory=lambda: ["products-ekf", "least-squares"])  # gyro-free rate estimators
     navigators: list[str] = Field(default_factory=lambda: ["ekf"])  # INS/GNSS filters
+    attitudes: list[str] = Field(default_factory=lambda: ["vqf", "tilt-vector", "tilt-published"])  # tilt of six axes
     layout: LayoutSettings = LayoutSettings()  # of a device that layouts does not name
     layouts: dict[str, LayoutSettings] = Field(default_factory=dict)  # by device name
     vehicle: VehicleSettings = VehicleSettings()  # of a device that vehicles does not name
     vehicles: dict[str, VehicleSettings] = Field(default_factory=dict)  # by device name
     use_every_fix: int = Field(default=1, ge=1, le=1000)  # n: filters get one fix in n, the others only score them
     rate_limit_hz: float = Field(default=200.0, gt=0.0, le=1000.0)  # Hz, at most, of each rate/<estimator>
+    attitude_limit_hz: float = Field(default=50.0, gt=0.0, le=1000.0)  # Hz, at most, of each attitude/<estimator>
     nav_limit_hz: float = Field(default=20.0, gt=0.0, le=200.0)  # Hz, at most, of nav and pose
 
     def layout_of(self, device: str) -> LayoutSettings:

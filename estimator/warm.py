@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from estimator.attitude.filters import ATTITUDES
 from estimator.ins.fix import RTK_FIXED, Fix
 from estimator.ins.navigation import NAVIGATORS, Mode
 from estimator.rate.estimators import ESTIMATORS
@@ -40,6 +41,7 @@ def warm() -> None:
     try:
         _warm_navigators()
         _warm_rates()
+        _warm_attitudes()
     finally:
         logging.disable(logging.NOTSET)
 
@@ -50,6 +52,13 @@ def _warm_rates() -> None:
         estimator = make(test.layout)
         for index, sample in enumerate(itertools.islice(test, RATE_SAMPLES)):
             estimator.step(index, sample.t_s, sample.counts * test.sensor.count)
+
+
+def _warm_attitudes() -> None:
+    for make in ATTITUDES.values():
+        attitude = make(0.01)
+        for _ in range(2):
+            attitude.step(np.array([0.0, 0.0, -9.8]), np.zeros(3))
 
 
 def _warm_navigators() -> None:
