@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from gyrofree import cli_run, cli_users
+from gyrofree import cli_calibrate, cli_handover, cli_run, cli_sessions, cli_users
 from gyrofree.cli_options import AsJson, Config, Speed, Verbose, settings_of
 from gyrofree.config import ConfigError
 from gyrofree.process import EXIT_CONFIG as CONFIG
@@ -30,6 +30,9 @@ app = typer.Typer(
 )
 
 app.add_typer(cli_users.app, name="users")
+app.add_typer(cli_sessions.app, name="sessions")
+cli_handover.mount(app)
+app.add_typer(cli_calibrate.app, name="calibrate")
 app.add_typer(cli_run.app, name="reproduce")
 app.command()(cli_run.run)
 
@@ -168,10 +171,15 @@ def dashboard(config: Config = None, verbose: Verbose = False) -> None:
 def simulate(
     link: Annotated[Path | None, typer.Option(help="Make the pseudo-terminal reachable under this path.")] = None,
     tcp: Annotated[int | None, typer.Option(help="Listen on this TCP port of the loopback instead of a pty.")] = None,
-    profile: Annotated[str, typer.Option(help="Motion of the table: published, wobble, fast or still.")] = "published",
+    profile: Annotated[str, typer.Option(help="Motion of the table: published (or cw-ccw), wobble, fast, still.")] = "published",
     seed: Annotated[int, typer.Option(help="Seed of biases, scale errors and noise.")] = 1,
     device: Annotated[str, typer.Option(help="Device name under which the truth is published.")] = "cube",
     once: Annotated[bool, typer.Option(help="End after one run of the profile.")] = False,
+    csv: Annotated[
+        Path | None, typer.Option(help="Be no board: write one run with its truth to this CSV, for `gyrofree run`.")
+    ] = None,
+    layout: Annotated[str, typer.Option(help="With --csv: name of a layout, or its TOML file.")] = "cube",
+    half_side: Annotated[float, typer.Option(help="With --csv: centre to face, m.")] = 0.05,
     config: Config = None,
     verbose: Verbose = False,
 ) -> None:
@@ -180,15 +188,22 @@ def simulate(
     Attach a gateway to the printed port. The true motion goes to the bus as its own topic, marked simulated.
     """
     settings = settings_of(config)
-    from estimator.simulation.profiles import PROFILES
+    from estimator.simulation.profiles import named
 
-    if profile not in PROFILES:
-        raise fail(f"--profile {profile!r}: want one of {', '.join(PROFILES)}", CONFIG)
+    try:
+        profile_name = named(profile).name
+        if csv is not None:
+            from gyrofree import simulate_csv
+
+            print(f"{csv}: {simulate_csv.write(csv, profile, seed, layout, half_side)} samples")
+            return
+    except (ValueError, OSError) as error:
+        raise fail(str(error), CONFIG) from None
 
     def body(stop: threading.Event) -> None:
         from gyrofree import simulate as simulator
 
-        simulator.run(simulator.Options(link, tcp, profile, seed, device, once), settings.bus, stop)
+        simulator.run(simulator.Options(link, tcp, profile_name, seed, device, once), settings.bus, stop)
 
     run_service(body, verbose)
 
