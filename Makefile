@@ -1,5 +1,6 @@
 # make demo   everything it needs, then the live dashboard on one printed URL (SOURCE=drive DATA=<folder> plays a log)
 # make test   everything it needs, then all tests
+# make firmware  the board's image and map into build/firmware, with its size
 # make bench  the figures of README and docs, one JSON line each
 PYTHON ?= python3
 SOURCE ?= table
@@ -10,7 +11,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 DRIVE := $(if $(DATA),--data "$(DATA)")
 
-.PHONY: demo test setup dev system-packages bench docs messages lint compose-test clean
+.PHONY: demo test setup dev system-packages bench docs messages lint firmware compose-test clean
 
 demo: setup
 	@$(BIN)/gyrofree demo --source $(SOURCE) $(DRIVE) --speed $(SPEED) --port $(PORT) --bus-port $(BUS_PORT)
@@ -59,6 +60,10 @@ lint: dev
 
 bench: setup dev
 	@for file in tests/bench/bench_*.py; do echo "== $$file"; $(BIN)/python $$file || exit 1; done
+
+firmware:
+	@command -v arm-none-eabi-gcc >/dev/null || { echo "The board's compiler is needed; run: sudo apt-get install gcc-arm-none-eabi"; exit 1; }
+	@$(MAKE) --no-print-directory -C firmware_protocol/port/lpc1768 OUT="$(CURDIR)/build/firmware"
 
 docs: setup
 	$(BIN)/python -m firmware_protocol.document > docs/protocol.md

@@ -72,10 +72,11 @@ def _commands() -> Iterator[str]:
     yield ""
     yield from _table(("command", "name", "meaning"),
                       ((f"0x{x['id']:04x}", x["name"], x["text"]) for x in raw["command"]))
-    yield "Settings: no arguments to ask, one u32 to set; the ACK echoes the u32 in force. They live until the next boot."
+    yield "Settings: no arguments to ask, one u32 to set; the ACK echoes the u32 in force. They live until the next"
+    yield "boot."
     yield ""
-    yield from _table(("command", "name", "unit", "default", "meaning"),
-                      ((f"0x{x['id']:04x}", x["name"], x.get("unit", ""), x["default"], x["text"]) for x in raw["setting"]))
+    settings = ((f"0x{x['id']:04x}", x["name"], x.get("unit", ""), x["default"], x["text"]) for x in raw["setting"])
+    yield from _table(("command", "name", "unit", "default", "meaning"), settings)
     yield from _table(("status of ACK", "name", "meaning"), ((x["id"], x["name"], x["text"]) for x in raw["result"]))
 
 
