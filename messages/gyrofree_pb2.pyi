@@ -805,7 +805,7 @@ class RecorderStatus(_message.Message):
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., recording: _Optional[bool] = ..., session: _Optional[str] = ..., seconds: _Optional[float] = ..., messages: _Optional[int] = ..., bytes: _Optional[int] = ..., durable_messages: _Optional[int] = ..., message: _Optional[str] = ..., lost: _Optional[_Mapping[str, int]] = ..., repaired: _Optional[_Mapping[str, int]] = ..., repairing: _Optional[int] = ...) -> None: ...
 
 class HistoryQuery(_message.Message):
-    __slots__ = ("topics", "of", "after_run", "after_sequence", "until_run", "until_sequence", "from_utc_ns", "until_utc_ns", "position", "max_bytes", "every_s")
+    __slots__ = ("topics", "of", "after_run", "after_sequence", "until_run", "until_sequence", "from_utc_ns", "until_utc_ns", "position", "max_bytes", "until_of", "every_s")
     TOPICS_FIELD_NUMBER: _ClassVar[int]
     OF_FIELD_NUMBER: _ClassVar[int]
     AFTER_RUN_FIELD_NUMBER: _ClassVar[int]
@@ -816,6 +816,7 @@ class HistoryQuery(_message.Message):
     UNTIL_UTC_NS_FIELD_NUMBER: _ClassVar[int]
     POSITION_FIELD_NUMBER: _ClassVar[int]
     MAX_BYTES_FIELD_NUMBER: _ClassVar[int]
+    UNTIL_OF_FIELD_NUMBER: _ClassVar[int]
     EVERY_S_FIELD_NUMBER: _ClassVar[int]
     topics: _containers.RepeatedScalarFieldContainer[str]
     of: str
@@ -827,8 +828,9 @@ class HistoryQuery(_message.Message):
     until_utc_ns: int
     position: int
     max_bytes: int
+    until_of: str
     every_s: float
-    def __init__(self, topics: _Optional[_Iterable[str]] = ..., of: _Optional[str] = ..., after_run: _Optional[int] = ..., after_sequence: _Optional[int] = ..., until_run: _Optional[int] = ..., until_sequence: _Optional[int] = ..., from_utc_ns: _Optional[int] = ..., until_utc_ns: _Optional[int] = ..., position: _Optional[int] = ..., max_bytes: _Optional[int] = ..., every_s: _Optional[float] = ...) -> None: ...
+    def __init__(self, topics: _Optional[_Iterable[str]] = ..., of: _Optional[str] = ..., after_run: _Optional[int] = ..., after_sequence: _Optional[int] = ..., until_run: _Optional[int] = ..., until_sequence: _Optional[int] = ..., from_utc_ns: _Optional[int] = ..., until_utc_ns: _Optional[int] = ..., position: _Optional[int] = ..., max_bytes: _Optional[int] = ..., until_of: _Optional[str] = ..., every_s: _Optional[float] = ...) -> None: ...
 
 class HistoryReply(_message.Message):
     __slots__ = ("items", "next", "durable", "first_kept")
