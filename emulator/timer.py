@@ -27,7 +27,7 @@ class Timer:
         self._events = [None] * 4
         self._ir = self._tcr = self._pr = self._mcr = self._ccr = 0
         self._match, self._capture = [0] * 4, [0] * 4
-        self._base_clock = self._base_count = 0
+        self.base_clock = self._base_count = 0
 
     def _step(self) -> int:
         return self._system.divider(self._name) * (self._pr + 1)
@@ -36,7 +36,7 @@ class Timer:
         """TC at a clock."""
         if self._tcr & 3 != 1:
             return self._base_count
-        return (self._base_count + (clock - self._base_clock) // self._step()) % WRAP
+        return (self._base_count + (clock - self.base_clock) // self._step()) % WRAP
 
     def edge(self, channel: int, rising: bool) -> None:
         """An edge on a capture pin now."""
@@ -59,7 +59,7 @@ class Timer:
             return
         now = self._core.now
         left = (self._match[k] - self.count(now)) % WRAP
-        done = (now - self._base_clock) % self._step()
+        done = (now - self.base_clock) % self._step()
         at = now + (left or WRAP) * self._step() - done
         self._events[k] = self._core.schedule(at, lambda: self._matched(k))
 
@@ -76,7 +76,7 @@ class Timer:
         self._arm(k)
 
     def _rebase(self, count: int) -> None:
-        self._base_clock, self._base_count = self._core.now, count
+        self.base_clock, self._base_count = self._core.now, count
 
     def read(self, offset: int, size: int) -> int:
         """A register."""

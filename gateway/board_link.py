@@ -40,6 +40,13 @@ class PtyLink:
         """Send a frame; False when it had to be dropped because the reader takes nothing."""
         return _write_all(self._master, self._poll, data)
 
+    def read(self) -> bytes:
+        """What the host has sent since the last call."""
+        try:
+            return os.read(self._master, 4096)
+        except OSError:  # nothing there, or nobody has the port open
+            return b""
+
     def close(self) -> None:
         """Unplug."""
         if self._symlink is not None:
@@ -81,6 +88,15 @@ class TcpLink:
         except OSError:
             self._drop_client()
             return True
+
+    def read(self) -> bytes:
+        """What the host has sent since the last call."""
+        if self._client is None:
+            return b""
+        try:
+            return self._client.recv(4096)
+        except OSError:
+            return b""
 
     def close(self) -> None:
         """Unplug."""

@@ -49,8 +49,10 @@ class Options:
 class TruthPublisher:
     """Publishes the truth once the bus is there; until then truth has nobody to hear it."""
 
-    def __init__(self, bus: BusSettings, device: str, stop: threading.Event) -> None:
-        self._device = device
+    def __init__(
+        self, bus: BusSettings, device: str, stop: threading.Event, source: int = pb.SOURCE_SIMULATED
+    ) -> None:
+        self._device, self._source = device, source
         self._epoch = 0
         self._publishers: Publishers | None = None
         threading.Thread(target=self._connect, args=(bus, stop), name="truth", daemon=True).start()
@@ -75,7 +77,7 @@ class TruthPublisher:
             epoch=self._epoch,
             device_us=round(t_s * 1e6),
             utc_ns=time.time_ns(),
-            source=pb.SOURCE_SIMULATED,
+            source=self._source,
         )
         message = pb.Truth(
             header=header,

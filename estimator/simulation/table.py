@@ -183,6 +183,22 @@ class TableTest:
             low, high = np.where(before, middle, low), np.where(before, high, middle)
         return [Pulse(float(s), 1 if up else -1) for s, up in zip(high, rising, strict=True)]
 
+    def felt(self, t_s: Array, axes: slice = slice(None)) -> Array:
+        """What axes read at any times t_s (n,): (n, axes) m/s^2, bias and scale errors in it, no noise, no counts."""
+        C_nb, C2_nb = self._attitude(*self.profile.motion(t_s))
+        felt_b = self._felt(C_nb, C2_nb, self._arms[axes])
+        return np.einsum("tki,ki->tk", felt_b, self.layout.theta_b[axes]) * self.scale[axes] + self.bias[axes]
+
+    def truths(self, t_s: Array) -> list[Truth]:
+        """The truth at any times t_s (n,)."""
+        angle, rate, acceleration = self.profile.motion(t_s)
+        C_nb, C2_nb = self._attitude(angle, rate, acceleration)
+        q_nb, f_b = self._quaternion(angle), self._felt(C_nb, C2_nb, self._centre[None, :])[:, 0, :]
+        z, into = np.zeros(len(t_s)), np.mod(t_s, self.profile.seconds)
+        omega_b, alpha_b = np.column_stack([z, z, rate]), np.column_stack([z, z, acceleration])
+        return [Truth(q, w, a, f, float(g), float(p))
+                for q, w, a, f, g, p in zip(q_nb, omega_b, alpha_b, f_b, angle, into, strict=True)]  # fmt: skip
+
     def _attitude(self, angle: Array, rate: Array, acceleration: Array) -> tuple[Array, Array]:
         """C_nb (n, 3, 3) and its second time derivative, from cos and sin of the angle and their derivatives."""
         c, s = np.cos(angle), np.sin(angle)
