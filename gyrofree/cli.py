@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from gyrofree import cli_calibrate, cli_handover, cli_run, cli_sessions, cli_users
+from gyrofree import cli_calibrate, cli_handover, cli_layout, cli_run, cli_sessions, cli_users
 from gyrofree.cli_options import AsJson, Config, Speed, Verbose, settings_of
 from gyrofree.config import ConfigError
 from gyrofree.process import EXIT_CONFIG as CONFIG
@@ -30,6 +30,7 @@ app = typer.Typer(
 )
 
 app.add_typer(cli_users.app, name="users")
+app.add_typer(cli_layout.app, name="layout")
 app.add_typer(cli_sessions.app, name="sessions")
 cli_handover.mount(app)
 app.add_typer(cli_calibrate.app, name="calibrate")
@@ -171,7 +172,9 @@ def dashboard(config: Config = None, verbose: Verbose = False) -> None:
 def simulate(
     link: Annotated[Path | None, typer.Option(help="Make the pseudo-terminal reachable under this path.")] = None,
     tcp: Annotated[int | None, typer.Option(help="Listen on this TCP port of the loopback instead of a pty.")] = None,
-    profile: Annotated[str, typer.Option(help="Motion of the table: published (or cw-ccw), wobble, fast, still.")] = "published",
+    profile: Annotated[
+        str, typer.Option(help="Motion of the table: published (or cw-ccw), wobble, fast, still.")
+    ] = "published",
     seed: Annotated[int, typer.Option(help="Seed of biases, scale errors and noise.")] = 1,
     device: Annotated[str, typer.Option(help="Device name under which the truth is published.")] = "cube",
     once: Annotated[bool, typer.Option(help="End after one run of the profile.")] = False,

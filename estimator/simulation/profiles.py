@@ -109,3 +109,13 @@ PROFILES: dict[str, Profile] = {
         Profile("still", [_rest(30)]),
     )
 }
+
+ALIASES = {"cw-ccw": "published"}  # clockwise, then counter-clockwise
+
+
+def named(name: str) -> Profile:
+    """Profile of a name or of its other name; raises ValueError with the known ones."""
+    profile = PROFILES.get(ALIASES.get(name, name))
+    if profile is None:
+        raise ValueError(f"no profile {name!r}; want one of {', '.join([*PROFILES, *ALIASES])}")
+    return profile

@@ -1,0 +1,213 @@
+"""A cube's log through every rate estimator, scored against truth or, without it, against the tachometer."""
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.calibration.card import Card, read_card
+from estimator.layouts.catalogue import find
+from estimator.layouts.layout import GeometryError, Layout
+from estimator.offline.cube_axes import examine
+from estimator.offline.cube_log import CubeLog, LogError, read_log
+from estimator.rate.estimators import ESTIMATORS
+from estimator.settings import EstimatorSettings
+
+Array = NDArray[np.float64]
+Progress = Callable[[float, str], None]
+
+SURE = 5.0  # rad/s; an estimate less certain than that says "I do not know yet" and has no NEES
+WARM_SAMPLES = 800  # run on a throw-away estimator, into the first turn, so that no compiler is timed
+SHOW_GAPS = 20
+
+
+@dataclass(frozen=True)
+class Track:
+    """What one estimator said, arrays over samples (n)."""
+
+    name: str
+    omega_b: Array  # (n, 3) rad/s
+    P: Array  # (n, 3, 3)
+    q_nb: Array  # (n, 4)
+    angle_z: Array  # (n,) rad
+    alpha_b: Array  # (n, 3) rad/s^2
+    f_b: Array  # (n, 3) m/s^2
+    still: NDArray[np.bool_]  # (n,)
+    p_n: Array  # (n, 3) m
+    us_per_sample: float
+
+
+def nothing(done: float, what: str) -> None:
+    """Progress that nobody looks at."""
+
+
+def run_cube(
+    log: Path,
+    *,
+    layout: str = "cube",
+    half_side_m: float = 0.05,
+    lsb_mg: float | None = None,
+    card: Path | None = None,
+    estimators: list[str] | None = None,
+    plot: Path | None = None,
+    progress: Progress = nothing,
+) -> dict[str, Any]:
+    """Run the log; the JSON object of `gyrofree run`: estimators, default, gaps, axes, and notes for people.
+
+    A value that cannot be known (no truth for x and y, say) is None. Raises LogError, GeometryError, CardError
+    (all ValueError) and OSError.
+    """
+    if not half_side_m > 0.0:
+        raise GeometryError(f"--half-side {half_side_m}: want more than 0 m, from the centre to a face")
+    shape = find(layout, half_side_m)
+    progress(0.0, "reading")
+    data = read_log(log, shape.axis_names, lsb_mg)
+    used = read_card(card) if card is not None else None
+    tracks, notes = run_log(data, shape, used, estimators, progress)
+    truth = reference(data)
+    bound = _bound(data, shape, truth)
+    known = [name for name in estimators or ESTIMATORS]
+    default = EstimatorSettings().rate[0]
+    result = {
+        "estimators": {name: score(tracks.get(name), truth, bound) for name in known},
+        "default": default if default in tracks else next(iter(tracks), None),
+        "gaps": {
+            "count": len(data.gaps),
+            "missing_samples": sum(gap.missing for gap in data.gaps),
+            "list": [asdict(gap) for gap in data.gaps[:SHOW_GAPS]],
+        },
+        "axes": examine(data, shape),
+        "notes": notes + _notes(data, truth, used),
+    }
+    if plot is not None:
+        from estimator.offline.cube_plot import draw  # here: matplotlib only where something is drawn
+
+        progress(0.95, "drawing")
+        draw(plot, data, tracks, truth, result)
+    progress(1.0, "done")
+    return result
+
+
+def run_log(
+    data: CubeLog, shape: Layout, card: Card | None, names: Sequence[str] | None, progress: Progress = nothing
+) -> tuple[dict[str, Track], list[str]]:
+    """Tracks of the estimators that can use this layout, and why the others cannot. Raises LogError, CardError."""
+    f_axis = data.f_axis * np.array(shape.gain)
+    if card is not None:
+        shape, f_axis = card.layout(shape), card.correct(f_axis)
+    chosen = list(names) if names else list(ESTIMATORS)
+    for name in chosen:
+        if name not in ESTIMATORS:
+            raise LogError(f"no estimator {name!r}; want some of {', '.join(ESTIMATORS)}")
+    tracks, notes = {}, []
+    for k, name in enumerate(chosen):
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):  # an integral that runs away is a result, too
+                tracks[name] = run_estimator(
+                    name, data, shape, f_axis,
+                    lambda part, k=k, name=name: progress(0.05 + 0.9 * (k + part) / len(chosen), name),
+                )  # fmt: skip
+        except GeometryError as error:
+            notes.append(f"{name}: {error}")
+        except np.linalg.LinAlgError:
+            notes.append(f"{name}: its rate grew beyond all numbers on layout {shape.name}: no result")
+    return tracks, notes
+
+
+def run_estimator(
+    name: str, data: CubeLog, shape: Layout, f_axis: Array, progress: Callable[[float], None] = lambda part: None
+) -> Track:
+    """Every sample of a log through one estimator; missing samples are announced to it as on the live path."""
+    make = ESTIMATORS[name]
+    warm = make(shape)
+    for k in range(min(WARM_SAMPLES, len(data.t_s))):
+        warm.step(k, k * data.period_s, f_axis[k])
+    estimator, n = make(shape), len(data.t_s)
+    omega, P, q, angle = np.zeros((n, 3)), np.zeros((n, 3, 3)), np.zeros((n, 4)), np.zeros(n)
+    alpha, force, still, p_n = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n, dtype=bool), np.zeros((n, 3))
+    missing = np.diff(data.index, prepend=data.index[0] - 1) - 1
+    busy = 0
+    for k in range(n):
+        started = time.thread_time_ns()
+        if missing[k]:
+            estimator.skip(int(missing[k]))
+        s = estimator.step(int(data.index[k]), float(data.t_s[k]), f_axis[k])
+        busy += time.thread_time_ns() - started
+        omega[k], P[k], q[k], angle[k], still[k] = s.omega_b, s.P, s.q_nb, s.angle_z, s.still
+        alpha[k], force[k], p_n[k] = s.alpha_b, s.f_b, s.p_n
+        if k % 200 == 0:
+            progress(k / n)
+    return Track(name, omega, P, q, angle, alpha, force, still, p_n, busy / n / 1000.0)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What the estimates are compared with. NaN where it is not known."""
+
+    name: str  # "truth", "tachometer" or ""
+    omega_b: Array  # (n, 3) rad/s
+    angle_z: Array  # (n,) rad, integral of omega_z; NaN without it
+
+
+def reference(data: CubeLog) -> Reference:
+    """Truth if the log has it, else the tachometer, else nothing."""
+    omega = np.full((len(data.t_s), 3), np.nan)
+    name = ""
+    if data.omega_b is not None:
+        omega, name = data.omega_b, "truth"
+    elif data.tacho is not None:
+        omega[:, 2], name = data.tacho, "tachometer"
+    step = 0.5 * np.diff(data.t_s) * (omega[1:, 2] + omega[:-1, 2])
+    return Reference(name, omega, np.concatenate([[0.0], np.cumsum(step)]) + 0.0 * omega[:, 2])
+
+
+def score(track: Track | None, truth: Reference, bound: Array | None) -> dict[str, Any]:
+    """RMS of the rate error per axis (rad/s), of the angle about z at the end, NEES (3 degrees, so 3 is right)."""
+    if track is None:
+        nothing_known = dict.fromkeys(("rate_rms_radps", "angle_error_final_rad", "bound_rate_rms_radps"))
+        return {**nothing_known, "nees_mean": None, "us_per_sample": None}
+    error = track.omega_b - truth.omega_b
+    rms = np.sqrt(np.mean(error**2, axis=0))
+    return {
+        "rate_rms_radps": [_known(value) for value in rms],
+        "angle_error_final_rad": _known(abs(track.angle_z[-1] - truth.angle_z[-1])),
+        "bound_rate_rms_radps": [None] * 3 if bound is None else [_known(value) for value in bound],
+        "nees_mean": nees_mean(error, track.P),
+        "us_per_sample": track.us_per_sample,
+    }
+
+
+def nees_mean(error: Array, P: Array) -> float | None:
+    """Mean of e^T P^-1 e over the samples at which the estimator knew something; None without all three errors."""
+    sure = np.isfinite(error).all(axis=1) & (np.trace(P, axis1=1, axis2=2) < 3.0 * SURE**2)
+    if not sure.any():
+        return None
+    e, V = error[sure], P[sure]
+    return float(np.mean(np.einsum("ni,ni->n", e, np.linalg.solve(V, e[:, :, None])[:, :, 0])))
+
+
+def _known(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _bound(data: CubeLog, shape: Layout, truth: Reference) -> Array | None:
+    return None
+
+
+def _notes(data: CubeLog, truth: Reference, card: Card | None) -> list[str]:
+    found = [f"calibration card {card.id}" if card else "no calibration card: nominal scale, positions and directions"]
+    if truth.name == "tachometer":
+        found.append("scored against the tachometer: only z is known")
+    elif not truth.name:
+        found.append("neither truth nor tachometer in the log: nothing to score against")
+    if data.gaps:
+        worst = max(data.gaps, key=lambda gap: gap.seconds)
+        found.append(
+            f"{len(data.gaps)} gaps, the longest {worst.seconds:.3f} s after t_s {worst.t_s:.3f} (line {worst.line})"
+        )
+    return found
