@@ -184,6 +184,7 @@ def nav_message(header: pb.Header, batch: pb.ImuBatch, index: int, name: str, s:
         origin_longitude_deg=math.degrees(s.origin[1]),
         origin_height_m=s.origin[2],
         fix_age_s=s.fix_age,
+        alignment=s.alignment,
     )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.ins import ekf as ins_ekf
-from estimator.ins.alignment import Alignment, AlignmentSettings
+from estimator.ins.alignment import Alignment, AlignmentSettings, Start
 from estimator.ins.earth import ned_between
 from estimator.ins.error_model import DP, STATES, ImuNoise, fix_residual
 from estimator.ins.fix import Fix, FixSettings, fix_noise
@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 INNOVATIONS = ("position N m", "position E m", "height m", "velocity N m/s", "velocity E m/s", "velocity D m/s")
 
 
+ALIGNED = [0, 1, 2, 9, 10, 11, 12, 13, 14]  # error states of Start.P
 FUTURE = 10.0  # s; a fix further ahead of the newest sample than this is not waited for
 WITHHELD = "withheld to score the filter"
 
@@ -97,6 +98,7 @@ class Solution:
     position_covariance: Array  # (3, 3) NED m^2
     origin: tuple[float, float, float]  # rad, rad, m: the first fix
     fix_age: float  # s since the last fix used; infinite before the first
+    alignment: str = ""  # for people: what the alignment does or waits for, or how it ended
 
 
 class Navigator(Protocol):
@@ -122,6 +124,7 @@ class EkfNavigator:
         self._last_fix: Fix | None = None
         self._last_used = -math.inf
         self._rejected_in_row = 0
+        self._aligned = ""  # how navigation began
         self._origin: tuple[float, float, float] | None = None
         self._lever = np.array(config.lever_arm_b)
 
@@ -227,18 +230,17 @@ class EkfNavigator:
         if fix.v_n is None:
             self._took(fix)
             return replace(nothing_compared(fix), reason="aligning: no velocity in the fix")
-        self._align.speed(math.hypot(fix.v_n[0], fix.v_n[1]))
+        self._align.fix(fix.t, fix.v_n, fix.sigma_v)
         k = self._history.first_after(fix.t)
-        C_nb = None
-        if k is not None:
-            C_nb = self._align.heading(self._attitude_at(fix.t, k), fix.v_n)
-        if C_nb is not None:
-            self._state = self._first_state(fix, C_nb)
+        start = None if k is None else self._align.start(self._attitude_at(fix.t, k), fix.v_n)
+        if start is not None:
+            self._state = self._first_state(fix, start)
             self._history.restart(self._state, k)
             self._history.advance(self._state, math.inf, self._work)
             self.mode = Mode.NAVIGATING
-            log.info("course %.1f deg at %.1f m/s: navigating", math.degrees(math.atan2(fix.v_n[1], fix.v_n[0])),
-                     math.hypot(fix.v_n[0], fix.v_n[1]))  # fmt: skip
+            self._aligned = start.how
+            log.info("%s; course %.1f deg at %.1f m/s: navigating", start.how,
+                     math.degrees(math.atan2(fix.v_n[1], fix.v_n[0])), math.hypot(fix.v_n[0], fix.v_n[1]))  # fmt: skip
         self._took(fix)
         return replace(nothing_compared(fix), reason="aligning")
 
@@ -249,20 +251,21 @@ class EkfNavigator:
             C_nb = C_nb @ exp(-(w - self._align.gyro_bias) * dt)
         return C_nb
 
-    def _first_state(self, fix: Fix, C_nb: Array) -> ins_ekf.InsState:
+    def _first_state(self, fix: Fix, start: Start) -> ins_ekf.InsState:
         c = self.config
         s = ins_ekf.InsState()
         s.x[LAT], s.x[LON], s.x[H] = fix.latitude, fix.longitude, fix.height
         s.x[V] = fix.v_n
-        s.x[C] = C_nb.ravel()
-        s.x[BG] = self._align.gyro_bias
+        s.x[C], s.x[BA], s.x[BG] = start.C_nb.ravel(), start.bias_accel, start.bias_gyro
         antenna = np.zeros(STATES)
-        antenna[6:9] = (C_nb @ self._lever) * (1.0, 1.0, -1.0)
+        antenna[6:9] = (start.C_nb @ self._lever) * (1.0, 1.0, -1.0)
         ins_ekf.reset(s.x, antenna)
         sigma_p = np.minimum(c.sigma_p, np.maximum(3.0 * fix.sigma_p, 0.1))
         sigma_v = np.maximum(c.sigma_v, fix.sigma_v)
         tilt, yaw, ba, bg = c.sigma_tilt, c.sigma_yaw, c.sigma_bias_accel, c.sigma_bias_gyro
         s.P = np.diag(np.square(np.concatenate([[tilt, tilt, yaw], sigma_v, sigma_p, [ba] * 3, [bg] * 3])))
+        if start.P is not None:
+            s.P[np.ix_(ALIGNED, ALIGNED)] = start.P
         s.acc[ins_ekf.ACC_TIME] = fix.t
         return s
 
@@ -280,7 +283,7 @@ class EkfNavigator:
             t, self.mode, float(x[LAT]), float(x[LON]), float(x[H]),
             np.array(ned_between(*self._origin, x[LAT], x[LON], x[H])),
             x[V].copy(), dcm_to_quaternion(x[C].reshape(3, 3)), x[BA].copy(), x[BG].copy(), np.sqrt(np.diag(P)),
-            P[DP, DP] * np.outer(down, down), self._origin, t - self._last_used,
+            P[DP, DP] * np.outer(down, down), self._origin, t - self._last_used, self._aligned,
         )  # fmt: skip
 
     def _waiting_solution(self, t: float) -> Solution:
@@ -299,7 +302,7 @@ class EkfNavigator:
         origin = self._origin or (0.0, 0.0, 0.0)
         return Solution(
             t, self.mode, *where, np.array(ned_between(*origin, *where)), v, dcm_to_quaternion(self._align.C),
-            np.zeros(3), self._align.gyro_bias, sigma, np.diag(sigma_p**2), origin, age,
+            np.zeros(3), self._align.gyro_bias, sigma, np.diag(sigma_p**2), origin, age, self._align.text,
         )  # fmt: skip
 
 
