@@ -161,9 +161,11 @@ def dashboard(config: Config = None, verbose: Verbose = False) -> None:
     def body(stop: threading.Event) -> None:
         from dashboard import service
         from dashboard.control import ProcessReplay
+        from dashboard.jobs import Jobs
 
         replayer = [sys.executable, "-m", "gyrofree", "replay"] + (["--config", str(config)] if config else [])
-        service.run(settings.dashboard, settings.bus, stop, replay=ProcessReplay(replayer))
+        jobs = Jobs([sys.executable, "-m", "gyrofree"])
+        service.run(settings.dashboard, settings.bus, stop, replay=ProcessReplay(replayer), jobs=jobs)
 
     run_service(body, verbose)
 

@@ -1,14 +1,14 @@
 """Layouts as TOML files: the built-in ones beside this module, and the user's own.
 
-    name = "mine"
-    scale_m = 0.05                      # length that counts as 1 in kappa and GDOP; default: the largest coordinate
-    [[axes]]
-    name = "left-x"                     # default a1, a2, ...
-    position_m = [0.05, 0.0, 0.0]       # from the body's centre, body frame
-    direction = [0, 1, -1]              # any length
-    sensor = "adxl345"                  # adxl345, mpu9150 or a table [sensors.NAME] of this file
-    scale = 1.0                         # true m/s^2 per m/s^2 of the board's nominal scale
-    channel = 0                         # column of the board's samples; default: the order of the file
+name = "mine"
+scale_m = 0.05                      # length that counts as 1 in kappa and GDOP; default: the largest coordinate
+[[axes]]
+name = "left-x"                     # default a1, a2, ...
+position_m = [0.05, 0.0, 0.0]       # from the body's centre, body frame
+direction = [0, 1, -1]              # any length
+sensor = "adxl345"                  # adxl345, mpu9150 or a table [sensors.NAME] of this file
+scale = 1.0                         # true m/s^2 per m/s^2 of the board's nominal scale
+channel = 0                         # column of the board's samples; default: the order of the file
 """
 
 import difflib
@@ -99,7 +99,9 @@ def parse(values: dict[str, Any], where: str) -> Layout:
     for axis, place in zip(axes, places, strict=True):
         model = axis.get("sensor", "adxl345")
         if model not in sensors:
-            raise GeometryError(f"{place}: sensor {model!r}, want one of {', '.join(sensors)} or a table [sensors.{model}]")
+            raise GeometryError(
+                f"{place}: sensor {model!r}, want one of {', '.join(sensors)} or a table [sensors.{model}]"
+            )
         models.append(sensors[model])
     return Layout(
         str(values.get("name", Path(where).stem)), r, np.array(directions), scale, tuple(names), tuple(channels),
@@ -164,7 +166,9 @@ def _direction(axis: dict[str, Any], where: str) -> np.ndarray:
 def _channel(axis: dict[str, Any], default: int, where: str) -> int:
     value = axis.get("channel", default)
     if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < MOST_AXES:
-        raise GeometryError(f"{where}: channel = {value!r}, want the column of the board's samples, 0 to {MOST_AXES - 1}")
+        raise GeometryError(
+            f"{where}: channel = {value!r}, want the column of the board's samples, 0 to {MOST_AXES - 1}"
+        )
     return value
 
 
@@ -176,6 +180,7 @@ def _sensors(tables: Any, where: str) -> dict[str, Sensor]:
         _known(table, set(SENSOR), f"{where}: [sensors.{name}]")
         base = SENSORS["adxl345"]
         found[name] = Sensor(
-            name, *(_number(table, key, getattr(base, field), f"{where}: [sensors.{name}]") for key, field in SENSOR.items())
+            name,
+            *(_number(table, key, getattr(base, field), f"{where}: [sensors.{name}]") for key, field in SENSOR.items()),
         )
     return found

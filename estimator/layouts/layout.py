@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 PRODUCTS = np.triu_indices(3)  # xx xy xz yy yz zz: order of the products everywhere
-RANK_TOLERANCE = 1e-9  # of the largest singular value, with lengths in units of the layout's scale
+RANK_TOLERANCE = 1e-4  # of the largest singular value, lengths in units of the layout's scale: directions to 4 digits
 
 
 class GeometryError(ValueError):
