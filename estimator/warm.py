@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from estimator.attitude.filters import ATTITUDES
+from estimator.ins.alignment_motion import MotionSettings, MotionWindow
 from estimator.ins.fix import RTK_FIXED, Fix
 from estimator.ins.navigation import NAVIGATORS, Mode
 from estimator.rate.estimators import ESTIMATORS
@@ -42,6 +43,7 @@ def warm() -> None:
         _warm_navigators()
         _warm_rates()
         _warm_attitudes()
+        _warm_alignment()
     finally:
         logging.disable(logging.NOTSET)
 
@@ -52,6 +54,16 @@ def _warm_rates() -> None:
         estimator = make(test.layout)
         for index, sample in enumerate(itertools.islice(test, RATE_SAMPLES)):
             estimator.step(index, sample.t_s, sample.counts * test.sensor.count)
+
+
+def _warm_alignment() -> None:
+    window = MotionWindow(MotionSettings())
+    for k in range(700):
+        window.imu(0.01 * k, np.array([0.0, 0.0, -9.8]), np.zeros(3))
+        if k % 100 == 50:
+            window.fix(0.01 * k, np.array([10.0, 0.0, 0.0]), np.full(3, 0.1))
+    if window.solve() is None:
+        raise RuntimeError("the made-up start in motion was not solved: warm.py does not fit alignment_motion.py")
 
 
 def _warm_attitudes() -> None:
