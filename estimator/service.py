@@ -62,6 +62,9 @@ class Pipeline:
         check_names("rate", settings.rate, rate_estimators())
         check_names("navigators", settings.navigators, NAVIGATORS)
         check_names("attitudes", settings.attitudes, ATTITUDES)
+        for layout in (settings.layout, *settings.layouts.values()):
+            if layout.file:  # a wrong file is refused at the start, not at the first sample
+                make_layout(layout)
         self._settings = settings
         self._clock = clock
         self._boards: dict[str, RateBoard] = {}
@@ -235,10 +238,13 @@ def check_names(key: str, names: list[str], known: dict[str, Any]) -> None:
 
 
 def make_layout(settings: LayoutSettings) -> Any:
-    """Accelerometer layout from its settings."""
-    from estimator.layouts.layout import CUBE
+    """Accelerometer layout from its settings; raises UnknownEstimator for a file that is none."""
+    from estimator.layouts import catalogue, layout
 
-    return CUBE(settings.half_side_m)
+    try:
+        return catalogue.find(settings.file or settings.kind, settings.half_side_m)
+    except layout.GeometryError as error:
+        raise UnknownEstimator(f"[estimator] layout: {error}") from None
 
 
 class Service:

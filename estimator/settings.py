@@ -1,9 +1,11 @@
 """[estimator] of gyrofree.toml."""
 
-from typing import Annotated, Literal
+from pathlib import Path
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+KINDS = sorted(file.stem for file in (Path(__file__).parent / "layouts").glob("*.toml"))
 Metres = Annotated[float, Field(ge=-1000.0, le=1000.0)]
 
 
@@ -12,8 +14,16 @@ class LayoutSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    kind: Literal["cube"] = "cube"  # four triads on a cube, the wiring of the published test
+    kind: str = "cube"  # a file of estimator/layouts by name: cube, chen-6, nine, edges-12, stars-12, array-24
     half_side_m: float = Field(default=0.05, gt=0.0, le=10.0)  # m, from the cube's centre to a face
+    file: str = ""  # the user's own layout instead, a TOML file (docs/layouts.md); its sizes are its own
+
+    @field_validator("kind")
+    @classmethod
+    def _known(cls, kind: str) -> str:
+        if kind not in KINDS:
+            raise ValueError(f"no layout {kind!r}, want one of {', '.join(KINDS)}; your own goes into file")
+        return kind
 
 
 class VehicleSettings(BaseModel):
