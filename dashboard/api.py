@@ -1,5 +1,6 @@
 """REST under /api; /api/openapi.json describes it, /api/docs shows that. SI units, times in s since 1970."""
 
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -101,6 +102,9 @@ class SessionOut(BaseModel):
     lost: int
     completeness: float | None = Field(description="received share of what is known to have been sent, 0 to 1")
     note: str
+    title: str = Field(description="by people, as are tags and outcome")
+    tags: list[str]
+    outcome: str
     problem: str
     downloadable: bool
 
@@ -152,6 +156,9 @@ def session_out(info: SessionInfo, recording: str = "") -> SessionOut:
         lost=info.lost,
         completeness=info.messages / expected if expected else None,
         note=info.note,
+        title=info.annotations.title,
+        tags=info.annotations.tags,
+        outcome=info.annotations.outcome,
         problem="" if now else info.problem,
         downloadable=info.path is not None and info.state != "open",
     )
@@ -169,7 +176,9 @@ def list_sessions(front: Front, text: str = "") -> list[SessionOut]:
 
 
 def _haystack(row: SessionOut) -> str:
-    return " ".join([row.id, *row.devices, *row.sources, row.note, row.state]).lower()
+    day = datetime.fromtimestamp(row.start_s, UTC).strftime("%Y-%m-%d")
+    words = [row.id, day, *row.devices, *row.sources, row.note, row.state, row.title, *row.tags, row.outcome]
+    return " ".join(words).lower()
 
 
 def find_session(front: Front, session: str) -> SessionInfo:

@@ -8,6 +8,7 @@ from fastapi import HTTPException, Request
 
 from dashboard.auth import Gate, Role, Session, User, same_token
 from dashboard.control import BusWatch, RecorderControl, Replay
+from dashboard.jobs import Jobs
 from dashboard.settings import DashboardSettings
 from sessions.catalogue import Catalogue
 
@@ -25,6 +26,7 @@ class Front:
     watch: BusWatch | None = None
     recorder: RecorderControl | None = None
     replay: Replay | None = None
+    jobs: Jobs | None = None
     open_widgets: Callable[[], Collection[str]] = field(default=lambda: ())
 
 

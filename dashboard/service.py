@@ -15,6 +15,7 @@ from dashboard.app import create_app
 from dashboard.auth import Gate
 from dashboard.control import BusWatch, RecorderControl, Replay
 from dashboard.front import Front
+from dashboard.jobs import Jobs
 from dashboard.settings import DashboardSettings
 from dashboard.users import UserStore, load_users
 from messages.bus import BusSettings, open_client
@@ -92,10 +93,17 @@ def serve(front: Front, bound: socket.socket, stop: threading.Event) -> None:
     asyncio.run(until_stopped())
 
 
-def run(settings: DashboardSettings, bus: BusSettings, stop: threading.Event, replay: Replay | None = None) -> None:
+def run(
+    settings: DashboardSettings,
+    bus: BusSettings,
+    stop: threading.Event,
+    replay: Replay | None = None,
+    jobs: Jobs | None = None,
+) -> None:
     """The dashboard until `stop` is set.
 
     `replay` starts replays for the sessions page (control.ProcessReplay); without it the page has no such button.
+    `jobs` makes reports and exports in the background.
     Raises PortTaken when the port or viser's is in use, UsersError for a damaged users file, BusUnavailable when it is
     stopped before a router answers.
     """
@@ -120,6 +128,7 @@ def run(settings: DashboardSettings, bus: BusSettings, stop: threading.Event, re
                 watch=BusWatch(session, bus.prefix),
                 recorder=RecorderControl(session, bus.prefix),
                 replay=replay,
+                jobs=jobs,
                 open_widgets=lambda: _open_widgets(handle),
             )
             log.info("dashboard at %s", settings.url)
@@ -128,6 +137,8 @@ def run(settings: DashboardSettings, bus: BusSettings, stop: threading.Event, re
             finally:
                 if replay is not None:
                     replay.stop()
+                if jobs is not None:
+                    jobs.close()
                 handle.stop()
         finally:
             session.close()

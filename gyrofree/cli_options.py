@@ -1,9 +1,12 @@
 """Options that several commands share."""
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
+from rich.table import Table
 
 from gyrofree.config import ConfigError, Settings, load_or_default
 from gyrofree.process import EXIT_CONFIG, fail
@@ -22,3 +25,8 @@ def settings_of(path: Path | None) -> Settings:
         return load_or_default(path)
     except ConfigError as error:
         raise fail(str(error), EXIT_CONFIG) from None
+
+
+def show_table(table: Table) -> None:
+    """On standard output; wide where that is a file or a pipe, which has no width of its own."""
+    Console(file=sys.stdout, width=None if sys.stdout.isatty() else 160).print(table)

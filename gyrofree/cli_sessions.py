@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
-from gyrofree.cli_options import AsJson, Config, settings_of
+from gyrofree.cli_options import AsJson, Config, settings_of, show_table
 from gyrofree.cli_run import progress_bar
 from gyrofree.config import Settings
 from gyrofree.process import EXIT_CONFIG, EXIT_FAILED, fail
@@ -54,7 +53,8 @@ def list_sessions(
     if as_json:
         print(json.dumps(rows, indent=2))
         return
-    table = Table("id", "device", "start (UTC)", "length", "state", "complete", "size", "tags", "title")
+    head = ("device", "start (UTC)", "length", "state", "complete", "size", "tags", "title")
+    table = Table(Column("id", no_wrap=True), *head)
     for row in rows:
         start = datetime.fromtimestamp(row["start_utc_s"], UTC)
         table.add_row(
@@ -62,26 +62,22 @@ def list_sessions(
             row["state"], _percent(row["completeness"]), f"{row['bytes'] / 1e6:.2f} MB", ", ".join(row["tags"]),
             row["title"],
         )  # fmt: skip
-    Console(file=sys.stdout).print(table)
+    show_table(table)
 
 
 def summaries(catalogue: Catalogue) -> list[dict[str, Any]]:
     """One dict per session, for people and programs; raises SessionError."""
     rows = []
     for info in catalogue.list():
-        try:
-            notes = read_annotations(catalogue.root / info.id)
-            problem = info.problem
-        except SessionError as error:
-            notes, problem = None, str(error)
+        notes = info.annotations
         total = info.messages + info.lost
         rows.append({
             "id": info.id, "devices": list(info.devices), "sources": list(info.sources),
             "start_utc_s": info.start_utc_ns / 1e9, "seconds": info.seconds, "state": info.state,
             "bytes": info.bytes, "messages": info.messages, "lost": info.lost,
             "completeness": info.messages / total if total else None, "note": info.note,
-            "title": notes.title if notes else "", "tags": notes.tags if notes else [],
-            "outcome": notes.outcome if notes else "", "notes": len(notes.notes) if notes else 0, "problem": problem,
+            "title": notes.title, "tags": notes.tags, "outcome": notes.outcome, "notes": len(notes.notes),
+            "problem": info.problem,
         })  # fmt: skip
     return rows
 
@@ -112,11 +108,11 @@ def show(session: Session, as_json: AsJson = False, config: Config = None) -> No
                         ("outcome", notes.outcome), ("recovery", manifest.recovery)):  # fmt: skip
         if value:
             print(f"{name}: {value}")
-    table = Table("topic", "messages", "lost", "publisher restarts", "repeated", "unreadable")
+    table = Table(Column("topic", no_wrap=True), "messages", "lost", "publisher restarts", "repeated", "unreadable")
     for key, count in sorted(manifest.keys.items()):
         cells = (count.messages, count.lost, count.restarts, count.repeated, count.unreadable)
         table.add_row(key, *map(str, cells))
-    Console(file=sys.stdout).print(table)
+    show_table(table)
     for note in notes.notes:
         print(f"{'all' if note.at_s is None else f'{note.at_s:.2f} s'}  {note.author}: {note.text}")
 

@@ -1,9 +1,10 @@
 """The sessions of a folder: list, find, name their files. Reads only; recovery is the recorder's (recover.py)."""
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from sessions.annotations import Annotations, read_annotations
 from sessions.manifest import RECORDING, SESSION_ID, Manifest, SessionError, check_id, read_manifest
 
 
@@ -23,6 +24,7 @@ class SessionInfo:
     note: str
     problem: str = ""  # why it is unreadable or incomplete; empty when all is well
     sources: tuple[str, ...] = ()  # HARDWARE, SIMULATED, EMULATED, PLAYED
+    annotations: Annotations = field(default_factory=Annotations)  # title, tags, outcome and notes by people
 
 
 class Catalogue:
@@ -74,6 +76,7 @@ class Catalogue:
             problem = f"{path}: {size} bytes, but {manifest.bytes} when it was closed: changed or cut since"
         elif manifest.state == "open":
             problem = f"{RECORDING} is not closed: it is being recorded, or was cut off and waits for the recorder"
+        notes, damage = _annotations(folder)
         return SessionInfo(
             id=session,
             devices=tuple(manifest.devices),
@@ -85,6 +88,15 @@ class Catalogue:
             lost=manifest.lost,
             path=path,
             note=manifest.note,
-            problem=problem,
+            problem="; ".join(filter(None, (problem, damage))),
             sources=tuple(manifest.sources),
+            annotations=notes,
         )
+
+
+def _annotations(folder: Path) -> tuple[Annotations, str]:
+    """What people added, and why it cannot be read."""
+    try:
+        return read_annotations(folder), ""
+    except SessionError as error:
+        return Annotations(), str(error)

@@ -1,0 +1,78 @@
+// The page of one session: replay, report, export, notes, labels, deletion.
+import { call, toast } from "/static/rest.js";
+
+const session = document.querySelector("main").dataset.session;
+const path = `sessions/${encodeURIComponent(session)}`;
+const by = (id) => document.getElementById(id);
+
+async function guarded(button, work) {
+  button.disabled = true;
+  try {
+    await work();
+  } catch (error) {
+    toast(error.message);
+  } finally {
+    button.disabled = false;
+  }
+}
+
+// Until a job has ended; `line` says how far it is.
+async function ended(job, line) {
+  while (job.state === "waiting" || job.state === "running") {
+    const size = job.bytes ? `, ${(job.bytes / 1e6).toFixed(1)} MB` : "";
+    line.textContent = `${job.state}, ${job.seconds.toFixed(0)} s${size}`;
+    await new Promise((resolve) => setTimeout(resolve, 500));
+    job = await call(`jobs/${job.number}`);
+  }
+  line.textContent = "";
+  if (job.state === "failed") throw new Error(job.message || `${job.kind} failed`);
+  return job;
+}
+
+by("replay")?.addEventListener("click", (event) => guarded(event.target, async () => {
+  await call(`${path}/replay`, { speed: 1.0 });
+  location.assign("/");
+}));
+
+by("report")?.addEventListener("click", (event) => guarded(event.target, async () => {
+  await ended(await call(`${path}/report`, {}), by("report-state"));
+  location.reload();
+}));
+
+by("export")?.addEventListener("submit", (event) => {
+  event.preventDefault();
+  const form = event.target;
+  guarded(form.querySelector("button"), async () => {
+    const order = { format: form.format.value, start_s: Number(form.start_s.value || 0) };
+    if (form.end_s.value !== "") order.end_s = Number(form.end_s.value);
+    const job = await ended(await call(`${path}/export`, order), by("export-state"));
+    location.assign(`/api/jobs/${job.number}/download`);
+  });
+});
+
+by("note")?.addEventListener("submit", (event) => {
+  event.preventDefault();
+  const form = event.target;
+  guarded(form.querySelector("button"), async () => {
+    const order = { text: form.text.value };
+    if (form.at_s.value !== "") order.at_s = Number(form.at_s.value);
+    await call(`${path}/notes`, order);
+    location.reload();
+  });
+});
+
+by("labels")?.addEventListener("submit", (event) => {
+  event.preventDefault();
+  const form = event.target;
+  guarded(form.querySelector("button"), async () => {
+    const tags = form.tags.value.split(/[\s,]+/).filter(Boolean);
+    await call(`${path}/labels`, { title: form.title.value, tags, outcome: form.outcome.value });
+    location.reload();
+  });
+});
+
+by("delete")?.addEventListener("click", (event) => guarded(event.target, async () => {
+  if (!confirm(`Delete session ${session} for good?`)) return;
+  await call(`${path}/delete`, {});
+  location.assign("/sessions");
+}));
