@@ -19,6 +19,7 @@ from typing import NamedTuple
 from google.protobuf.message import DecodeError
 
 from messages import gyrofree_pb2 as pb
+from messages.header import first_field
 from messages.topics import BY_NAME, REPLAY_SUFFIX, Topic
 
 log = logging.getLogger(__name__)
@@ -56,7 +57,7 @@ class _Key:
 
     run: int
     last: int
-    missing: list[list[int]] = field(default_factory=list)  # [run, first, last], being asked for
+    missing: list[list[int]] = field(default_factory=list)  # [run, first, last, countable], being asked for
     filled: tuple[int, int] = (1, 0)  # sequences that came filled in before they came live
     repaired: int = 0
     lost: int = 0
@@ -73,6 +74,7 @@ class _Stream:
     asking: bool = False
     held: deque[Arrival] = field(default_factory=deque)
     waiting: deque[pb.HistoryQuery] = field(default_factory=deque)
+    tried: set[tuple[str, int, int]] = field(default_factory=set)  # beginnings that were asked for
 
 
 class Mender:
@@ -135,6 +137,10 @@ class Mender:
         stream = self._streams.setdefault(question.stream, _Stream())
         out: list[Arrival] = []
         for item in reply.items if reply is not None else ():
+            skipped = self._skipped(stream, question, item)
+            if skipped is not None:
+                self._ask(skipped)
+                return out
             out += self._fill(question.stream[0], item)
         if reply is not None and reply.next:
             query = pb.HistoryQuery()
@@ -147,6 +153,7 @@ class Mender:
             return out
         self._give_up(question.stream)
         stream.asking = False
+        stream.tried.clear()
         while stream.held and not stream.asking:
             out += self._pass(stream, stream.held.popleft())
         return out
@@ -176,7 +183,10 @@ class Mender:
                 return []  # it was filled in already
             key.last = header.sequence  # a publisher without a spool began anew, or repeats itself
             return [arrival]
-        if header.run != key.run and header.run < key.run:
+        if header.run > key.run and header.sequence == key.last + 1:  # the same estimator counts on
+            key.run, key.last = header.run, header.sequence
+            return [arrival]
+        if header.run < key.run:
             key.run, key.last = header.run, header.sequence  # another recording, or a clock set back
             return [arrival]
         self._notice(stream, arrival, key, header)
@@ -193,10 +203,10 @@ class Mender:
             until_run=header.run, until_sequence=header.sequence,
         )  # fmt: skip
         if header.run == key.run:
-            key.missing.append([key.run, key.last + 1, header.sequence - 1])
-        else:
-            key.missing.append([key.run, key.last + 1, 1 << 62])
-            key.missing.append([header.run, 1, header.sequence - 1])
+            key.missing.append([key.run, key.last + 1, header.sequence - 1, 1])
+        else:  # how many there were at the end of the one run, and where the other began to count, only the answer says
+            key.missing.append([key.run, key.last + 1, 1 << 62, 0])
+            key.missing.append([header.run, 1, header.sequence - 1, 0])
         if stream.asking:
             stream.waiting.append(query)
         else:
@@ -207,6 +217,25 @@ class Mender:
         if not self._topics:
             return []
         return [t.name for t in self._topics if t.source == arrival.topic.source and not t.per_estimator]
+
+    def _skipped(self, stream: _Stream, question: Question, item: pb.HistoryItem) -> Question | None:
+        """Another topic had lost some before this question's beginning: what to ask instead, from there on."""
+        key = self._keys.get((question.stream[0], item.topic))
+        if key is None or item.run < key.run or item.sequence == key.last + 1:
+            return None
+        if (item.run == key.run and item.sequence <= key.last) or any(
+            gap[0] == key.run and gap[1] <= gap[2] for gap in key.missing
+        ):
+            return None
+        begin = item.topic, key.run, key.last
+        if begin in stream.tried:
+            return None  # it is gone
+        stream.tried.add(begin)
+        query = pb.HistoryQuery()
+        query.CopyFrom(question.query)
+        query.until_of, query.position = query.until_of or query.of, 0
+        query.of, query.after_run, query.after_sequence = begin
+        return Question(question.stream, query)
 
     def _fill(self, device: str, item: pb.HistoryItem) -> list[Arrival]:
         name, _, estimator = item.topic.partition("/")
@@ -221,14 +250,14 @@ class Mender:
             return []  # never heard live: not this consumer's gap
         for gap in key.missing:
             if gap[0] == item.run and gap[1] <= item.sequence <= gap[2]:
-                key.lost += item.sequence - gap[1]
-                gap[1] = item.sequence + 1
+                _take_out(key.missing, gap, item.sequence)
                 key.repaired += 1
                 if (item.run, item.sequence) > (key.run, key.last):
                     key.advance(item.run, item.sequence)
                 return [arrival]
         if (item.run, item.sequence) <= (key.run, key.last):
             return []
+        key.lost += item.sequence - key.last - 1 if item.run == key.run else 0
         key.advance(item.run, item.sequence)
         key.repaired += 1
         return [arrival]
@@ -237,13 +266,13 @@ class Mender:
         """What the answers have not brought is lost."""
         for (device, name), key in self._keys.items():
             if device == stream[0] and BY_NAME[name.partition("/")[0]].source == stream[1] and key.missing:
-                lost = sum(max(0, b - a + 1) for _, a, b in key.missing if b < 1 << 62)
+                lost = sum(max(0, last - first + 1) * countable for _, first, last, countable in key.missing)
                 if lost:
                     log.warning("%s/%s: %d messages are lost: their publisher has them no more", device, name, lost)
                 key.lost += lost
-                run, _, last = key.missing[-1]
-                if (run, last) > (key.run, key.last):
-                    key.run, key.last = run, last
+                newest = max(((run, last) for run, _, last, _ in key.missing if last < 1 << 62), default=(0, 0))
+                if newest > (key.run, key.last):
+                    key.run, key.last = newest
                 key.missing.clear()
 
     def _release(self, stream: _Stream) -> list[Arrival]:
@@ -272,6 +301,16 @@ class Mender:
         return False
 
 
+def _take_out(missing: list[list[int]], gap: list[int], sequence: int) -> None:
+    """One message of a gap has come: what is left of it before and behind."""
+    run, first, last, countable = gap
+    missing.remove(gap)
+    if first < sequence:  # a run's own first numbers may never have been
+        missing.append([run, first, sequence - 1, int(countable or first > 1)])
+    if sequence < last:
+        missing.append([run, sequence + 1, last, countable])
+
+
 def header_of(arrival: Arrival) -> pb.Header | None:
     """The header of a message, the only part that is parsed; None for types without one and for damaged bytes."""
     if "header" not in arrival.topic.type.DESCRIPTOR.fields_by_name:
@@ -280,18 +319,3 @@ def header_of(arrival: Arrival) -> pb.Header | None:
         return pb.Header.FromString(first_field(arrival.payload))
     except (DecodeError, ValueError):
         return None
-
-
-def first_field(payload: bytes) -> bytes:
-    """Content of field 1 when it stands first and is length-delimited; raises ValueError otherwise."""
-    if len(payload) < 2 or payload[0] != 0x0A:
-        raise ValueError("field 1 does not stand first")
-    size, at, shift = payload[1] & 0x7F, 2, 7
-    while payload[at - 1] & 0x80:
-        if at >= len(payload) or at > 4:
-            raise ValueError("length of field 1 does not end")
-        size |= (payload[at] & 0x7F) << shift
-        at, shift = at + 1, shift + 7
-    if at + size > len(payload):
-        raise ValueError("field 1 is longer than the message")
-    return payload[at : at + size]

@@ -132,11 +132,11 @@ class Spool:
         start = query.position or self._start(query, device)
         if start is None:
             return
-        until_ns = query.until_utc_ns or (1 << 62)
+        until_ns, until_of = query.until_utc_ns or (1 << 62), query.until_of or query.of
         for entry in self._from(start):
             if device not in ("*", entry.device):
                 continue
-            if query.until_run and entry.topic == query.of and entry.run == query.until_run:
+            if query.until_run and entry.topic == until_of and entry.run == query.until_run:
                 if entry.sequence >= query.until_sequence:
                     return
             if entry.published_ns > until_ns + LATE_S * 1e9:
@@ -154,7 +154,7 @@ class Spool:
             if after is not None:
                 return after
         if query.until_run:
-            return self._after(names, (query.of, device, query.until_run), 0)
+            return self._after(names, (query.until_of or query.of, device, query.until_run), 0)
         if query.after_run:
             return None
         first = 1

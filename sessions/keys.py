@@ -3,6 +3,7 @@
 from google.protobuf.message import DecodeError
 
 from messages import gyrofree_pb2 as pb
+from messages.header import first_field
 from messages.topics import Address
 from sessions.manifest import KeyCount
 
@@ -12,7 +13,7 @@ class KeyState:
 
     __slots__ = (
         "channel", "device", "foreign", "last_run", "last_sequence", "sources",
-        "messages", "lost", "restarts", "repeated", "unreadable",
+        "messages", "lost", "restarts", "repeated", "unreadable", "repaired", "dark_us", "_last_us", "_last_epoch",
     )  # fmt: skip
 
     def __init__(self, channel: int, address: Address) -> None:
@@ -21,6 +22,8 @@ class KeyState:
         type_ = address.topic.type
         self.foreign = None if "header" in type_.DESCRIPTOR.fields_by_name else type_  # foxglove: time, no Header
         self.messages = self.lost = self.restarts = self.repeated = self.unreadable = 0  # plain: once per message
+        self.repaired = self.dark_us = self._last_us = 0
+        self._last_epoch: int | None = None
         self.last_run: int | None = None
         self.last_sequence = 0
         self.sources: set[int] = set()
@@ -34,18 +37,23 @@ class KeyState:
             restarts=self.restarts,
             repeated=self.repeated,
             unreadable=self.unreadable,
+            repaired=self.repaired,
+            dark_s=self.dark_us * 1e-6,
+            last_run=self.last_run or 0,
+            last_sequence=self.last_sequence,
         )
 
-    def publish_time(self, payload: bytes) -> int:
+    def publish_time(self, payload: bytes, late: bool = False) -> int:
         """The payload's own time, ns since 1970, 0 when it says none; counts jumps of the sequence.
 
         Of our own messages only the header, which stands first, is parsed: the whole would cost more than recording it.
         """
         self.messages += 1
+        self.repaired += late
         try:
             if self.foreign is not None:
                 return self.foreign.FromString(payload).timestamp.ToNanoseconds()
-            header = pb.Header.FromString(_first_field(payload))
+            header = pb.Header.FromString(first_field(payload))
         except (DecodeError, ValueError):
             self.unreadable += 1
             return 0
@@ -54,25 +62,13 @@ class KeyState:
             jump = sequence - self.last_sequence
             if run != self.last_run or jump < 0:
                 self.restarts += 1
+                if header.epoch == self._last_epoch:  # the same boot: the board's own clock says how long nobody spoke
+                    self.dark_us += max(0, header.device_us - self._last_us)
             elif jump == 0:
                 self.repeated += 1
             else:
                 self.lost += jump - 1
         self.last_run, self.last_sequence = run, sequence
+        self._last_epoch, self._last_us = header.epoch, header.device_us
         self.sources.add(header.source)
         return header.utc_ns
-
-
-def _first_field(payload: bytes) -> bytes:
-    """Content of field 1 when it stands first and is length-delimited; raises ValueError otherwise."""
-    if len(payload) < 2 or payload[0] != 0x0A:
-        raise ValueError("field 1 does not stand first")
-    size, at, shift = payload[1] & 0x7F, 2, 7
-    while payload[at - 1] & 0x80:
-        if at >= len(payload) or at > 4:
-            raise ValueError("length of field 1 does not end")
-        size |= (payload[at] & 0x7F) << shift
-        at, shift = at + 1, shift + 7
-    if at + size > len(payload):
-        raise ValueError("field 1 is longer than the message")
-    return payload[at : at + size]

@@ -32,6 +32,15 @@ class KeyCount(BaseModel):
     restarts: int = 0  # header.run changed or header.sequence went back: the publisher began anew
     repeated: int = 0  # the same header.sequence twice running
     unreadable: int = 0  # payloads without a readable header; recorded all the same
+    repaired: int = 0  # of `messages`, filled in from what their publisher had kept
+    dark_s: float = 0.0  # s, by the board's clock, between the last message of one publisher and the first of the next
+    last_run: int = 0  # of the newest message: where the session after a crash goes on
+    last_sequence: int = 0
+
+    @property
+    def expected(self) -> int:
+        """Messages that ought to be here: those that are, without repetitions, and those known to be missing."""
+        return self.messages - self.repeated + self.lost
 
 
 class Manifest(BaseModel):
@@ -45,7 +54,7 @@ class Manifest(BaseModel):
     file: Literal["recording.mcap", "recovered.mcap"] = RECORDING
     note: str = ""
     user: str = ""  # who ordered the start; empty when it began by itself
-    continues: str = ""  # id of the session before, when this one began because that file was full
+    continues: str = ""  # id of the session before, when this one began because that file was full or cut off
     devices: list[str] = []
     sources: list[str] = []  # names of messages.Source seen in headers: HARDWARE, SIMULATED, ...
     start_utc_ns: int = 0  # receive time of the start, ns since 1970
@@ -57,6 +66,8 @@ class Manifest(BaseModel):
     overflow: int = 0  # messages not recorded because the disk or the process could not keep up
     unknown: int = 0  # messages on keys that are not in the topic table; not recorded
     recovery: str = ""  # what the recovery found and kept
+    certificate: dict[str, dict[str, object]] = {}  # per device: certificate.DeviceCertificate
+    provenance: dict[str, dict[str, object]] = {}  # per device: firmware, board, calibration cards
     versions: dict[str, str] = {}
     configuration: dict[str, object] = {}
 

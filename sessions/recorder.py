@@ -8,15 +8,20 @@ import logging
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
+from pathlib import Path
 
 import zenoh
 from google.protobuf.message import DecodeError
 
 from messages import gyrofree_pb2 as pb
 from messages.bus import BusSettings, BusUnavailable, Publishers, open_client
+from messages.history import Asker
+from messages.mending import Question
 from messages.topics import RECORDER, STATUS, recorder_control_key
-from sessions.manifest import SESSION_NAME
-from sessions.recover import recover_all
+from sessions.intake import Intake
+from sessions.manifest import SESSION_NAME, Manifest, SessionError
+from sessions.recover import cut_off, recover_all, recover_session
 from sessions.settings import RecorderSettings
 from sessions.store import SessionStore, start
 
@@ -24,6 +29,9 @@ log = logging.getLogger(__name__)
 
 DRAIN_S = 0.1  # a message waits at most this long before it is in the running chunk
 STATUS_S = 1.0
+REPAIR_S = 2.0  # the end of a session waits so long for gaps that are being filled
+RESUME_S = 600.0  # a session that was cut off within this time is gone on with
+RESUME_BYTES = 256 * 1024**2  # larger ones are recovered beside the recording, and not gone on with
 RETRY_S = 5.0  # an automatic start that the disk refused is tried again after this
 
 
@@ -31,14 +39,22 @@ class Recorder:
     """The recorder without its loop: `on_sample` and `on_query` are for Zenoh's threads, the rest for one thread."""
 
     def __init__(
-        self, settings: RecorderSettings, bus: BusSettings, configuration: dict[str, object] | None = None
+        self,
+        settings: RecorderSettings,
+        bus: BusSettings,
+        configuration: dict[str, object] | None = None,
+        ask: Callable[[Question], None] | None = None,
     ) -> None:
+        """`ask` puts a question to a publisher; its answer comes back through `on_answer`. None: gaps stay."""
         self.settings = settings
         self.bus = bus
         self.wake = threading.Event()
         self._configuration = configuration
         self._inbox: deque[tuple[int, str, bytes]] = deque()
         self._orders: deque[zenoh.Query] = deque()
+        self._ask = ask
+        self._fresh = True
+        self._intake = Intake(bus.prefix, None, 0)
         self._overflow = 0
         self._store: SessionStore | None = None
         self._recording = False  # read by Zenoh's thread
@@ -61,6 +77,21 @@ class Recorder:
         self._orders.append(query)
         self.wake.set()
 
+    def on_answer(self, question: object, reply: pb.HistoryReply | None) -> None:
+        """The asker's thread: what a publisher kept."""
+        self._intake.answered(question, reply)
+        self.wake.set()
+
+    def listen(self) -> None:
+        """Keep what comes from now on for the session that is about to begin."""
+        self._recording = True
+
+    def resume(self, manifest: Manifest) -> None:
+        """Begin a session where the one of `manifest` was cut off; what came since is asked of the publishers."""
+        log.info("going on where %s was cut off", manifest.id)
+        if self._begin(name=manifest.id[16:48], note=manifest.note, user=manifest.user, continues=manifest.id):
+            self._intake.resume(manifest)
+
     def step(self) -> None:
         """Write what came in, answer orders, close a chunk when it is time."""
         self.wake.clear()
@@ -79,8 +110,12 @@ class Recorder:
         store, inbox = self._store, self._inbox
         if store is None:
             return
+        intake = self._intake
+        for entry in intake.answers():
+            store.add(*entry)
         for _ in range(len(inbox)):  # what comes in meanwhile waits for the next step
-            store.add(*inbox.popleft())
+            for entry in intake.take(*inbox.popleft()):
+                store.add(*entry)
         if self._overflow:
             log.error("%s: %d messages came faster than they can be written", store.manifest.id, self._overflow)
             store.manifest.overflow += self._overflow
@@ -112,6 +147,9 @@ class Recorder:
             self._retry_at = time.monotonic() + RETRY_S if self.settings.auto_start else None
             return False
         self._message, self._retry_at = "", None
+        if self._fresh:  # a file that only goes on keeps what is known of the streams
+            self._intake = Intake(self.bus.prefix, self._ask, store.manifest.start_utc_ns)
+        self._fresh = True
         self._store, self._recording = store, True
         self._last_flush = time.monotonic()
         log.info("recording %s", store.folder)
@@ -122,6 +160,7 @@ class Recorder:
         log.info("%s: %d bytes: continuing in a new session", manifest.id, store.size)
         name = manifest.id[16:48]  # after the time
         self._end(keep_listening=True)
+        self._fresh = False
         if not self._begin(name=name, note=manifest.note, user=manifest.user, continues=manifest.id):
             self._retry_at = time.monotonic() + RETRY_S
 
@@ -131,11 +170,22 @@ class Recorder:
             return
         self._recording = keep_listening
         self._drain()
+        if not keep_listening:
+            self._finish_repairs(store)
         closed = store.close()
         self._last = self._describe(store)
         self._store = None
         self._message = "" if closed else store.error
         log.info("%s: %s, %d messages", store.manifest.id, "closed" if closed else "left open", store.messages)
+
+    def _finish_repairs(self, store: SessionStore) -> None:
+        """Wait a little for answers that are under way; then what is held is written with its gaps."""
+        end = time.monotonic() + REPAIR_S
+        while self._intake.asking and time.monotonic() < end:
+            time.sleep(0.01)
+            self._drain()
+        for entry in self._intake.release():
+            store.add(*entry)
 
     def close(self) -> None:
         """End the running session and refuse orders that still wait."""
@@ -193,6 +243,8 @@ class Recorder:
             bytes=store.size,
             durable_messages=store.durable_messages,
             lost={key: lost for key, lost in store.lost().items() if lost},
+            repaired=store.repaired(),
+            repairing=self._intake.held,
         )
 
 
@@ -206,20 +258,22 @@ def run(
 
     `configuration` goes into session.json of every session. A router that is not there yet is waited for.
     """
-    # Beside the recording, not before it: a large file takes a minute, and what runs is locked against recovery. When
-    # the process ends first, the session stays open and the next start does it.
-    threading.Thread(target=recover_all, args=(settings.root,), name="recovery", daemon=True).start()
     try:
         session = open_client(bus, stop)
     except BusUnavailable:
         if stop.is_set():
             return
         raise
-    recorder = Recorder(settings, bus, configuration)
     with session:
         publishers = Publishers(session, bus.prefix)
+        asker = Asker(session, bus.prefix, lambda question, reply: recorder.on_answer(question, reply))
+        recorder = Recorder(settings, bus, configuration, lambda q: asker.ask(q, *q.stream, q.query))
         samples = session.declare_subscriber(f"{bus.prefix}/**", recorder.on_sample)
         orders = session.declare_queryable(recorder_control_key(bus.prefix), recorder.on_query)
+        _go_on(recorder, settings.root)
+        # Beside the recording, not before it: a large file takes a minute, and what runs is locked against recovery.
+        # When the process ends first, the session stays open and the next start does it.
+        threading.Thread(target=recover_all, args=(settings.root,), name="recovery", daemon=True).start()
         next_status = 0.0
         try:
             while not stop.is_set():
@@ -232,4 +286,20 @@ def run(
             samples.undeclare()
             orders.undeclare()
             recorder.close()
+            asker.close()
             publishers.put(STATUS, RECORDER, recorder.status())
+
+
+def _go_on(recorder: Recorder, root: Path) -> None:
+    """Recover the session that a crash cut off a moment ago, and go on with it; older ones are not gone on with."""
+    folder = cut_off(root, RESUME_S, RESUME_BYTES)
+    if folder is None:
+        return
+    recorder.listen()  # a recovery takes a second: what comes meanwhile belongs to the next session
+    try:
+        manifest = recover_session(folder)
+    except (SessionError, OSError) as error:
+        log.error("recovery: %s", error)
+        return
+    if manifest is not None:
+        recorder.resume(manifest)

@@ -6,10 +6,12 @@ so the file is read as a stream, chunk by chunk with CRCs checked, and written a
 
 import logging
 import os
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from messages.topics import TopicError, parse
+from messages.topics import Address, TopicError, parse
+from sessions.certificate import Witness, certify
 from sessions.keys import KeyState
 from sessions.manifest import (
     RECORDING,
@@ -36,6 +38,7 @@ class Salvage:
     keys: dict[str, KeyCount]
     channels: dict[int, str]
     damage: Damage
+    witness: Witness = field(default_factory=Witness)
     start_utc_ns: int = 0
     end_utc_ns: int = 0
     sha256: str = ""  # of the new file
@@ -68,6 +71,7 @@ def salvage(source: Path, target: Path, channels: dict[int, str] | None = None) 
 def _copy(source: Path, fd: int, channels: dict[int, str] | None) -> Salvage:
     out = McapLog(fd, CHUNK_BYTES)
     states: dict[str, KeyState] = {}
+    addresses: dict[str, Address] = {}
     result = Salvage({}, {}, Damage())
     for message in read(source, result.damage, channels):
         state = states.get(message.key)
@@ -78,11 +82,12 @@ def _copy(source: Path, fd: int, channels: dict[int, str] | None) -> Salvage:
                 result.damage.orphans += 1
                 continue
             state = KeyState(out.open_channel(message.key, address.topic), address)
-            states[message.key] = state
+            states[message.key], addresses[message.key] = state, address
         state.publish_time(message.payload)
+        result.witness.look(addresses[message.key], message.payload)
         out.add(state.channel, message.log_ns, message.publish_ns, message.payload, state.last_sequence)
         result.start_utc_ns = result.start_utc_ns or message.log_ns
-        result.end_utc_ns = message.log_ns
+        result.end_utc_ns = max(result.end_utc_ns, message.log_ns)
         if out.pending > 4 * CHUNK_BYTES:
             out.push()
     out.finish()
@@ -110,7 +115,11 @@ def recover_session(folder: Path) -> Manifest | None:
     finally:
         os.close(fd)
     manifest.state, manifest.file = "recovered", RECOVERED
+    for key, count in found.keys.items():  # the file does not tell which of its messages were filled in
+        count.repaired = manifest.keys[key].repaired if key in manifest.keys else 0
     manifest.keys, manifest.channels = found.keys, found.channels
+    manifest.certificate = {device: c.model_dump() for device, c in certify(found.keys, found.witness.wire()).items()}
+    manifest.provenance = found.witness.provenance() or manifest.provenance
     manifest.devices = sorted({parse(key).device for key in found.keys})
     manifest.start_utc_ns = manifest.start_utc_ns or found.start_utc_ns
     manifest.end_utc_ns = found.end_utc_ns or manifest.start_utc_ns
@@ -123,6 +132,24 @@ def recover_session(folder: Path) -> Manifest | None:
     write_manifest(folder, manifest)
     log.warning("%s: recovered %s", manifest.id, manifest.recovery)
     return manifest
+
+
+def cut_off(root: Path, within_s: float, max_bytes: int) -> Path | None:
+    """Folder of the newest session, when it is open, was written to within that time, and nobody writes it now."""
+    try:
+        newest = max((f for f in root.iterdir() if (f / RECORDING).exists()), key=lambda f: f.name, default=None)
+        if newest is None or read_manifest(newest).state != "open":
+            return None
+        state = (newest / RECORDING).stat()
+        if time.time() - state.st_mtime > within_s or state.st_size > max_bytes:
+            return None
+        fd = os.open(newest / RECORDING, os.O_RDONLY | os.O_CLOEXEC)
+    except (SessionError, OSError):
+        return None  # recover_all says what is wrong with it
+    try:
+        return newest if lock(fd) else None
+    finally:
+        os.close(fd)
 
 
 def recover_all(root: Path) -> list[Manifest]:

@@ -16,7 +16,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from messages import gyrofree_pb2 as pb
-from messages.topics import TopicError, parse
+from messages.topics import Address, TopicError, parse
+from sessions.certificate import Witness, certify
 from sessions.keys import KeyState
 from sessions.manifest import RECORDING, Manifest, sync_folder, write_manifest
 from sessions.mcap_log import McapLog
@@ -57,6 +58,8 @@ class SessionStore:
         self._write_error = self._sync_error = ""
         self._settings = settings
         self._keys: dict[str, KeyState | None] = {}
+        self._witness = Witness()
+        self._addresses: dict[str, Address] = {}
         self._accepted = self._pushed = 0  # messages added; of those, handed to the operating system
         self._fd = os.open(folder / RECORDING, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o640)
         try:
@@ -98,18 +101,26 @@ class SessionStore:
         """Messages missing so far by jumps of header.sequence, per key."""
         return {key: state.lost for key, state in self._keys.items() if state is not None}
 
-    def add(self, received_ns: int, key: str, payload: bytes) -> None:
-        """Record one message. Unknown keys and messages beyond max_pending_bytes are counted, not kept."""
+    def repaired(self) -> dict[str, int]:
+        """Messages filled in so far, per key."""
+        return {key: state.repaired for key, state in self._keys.items() if state is not None and state.repaired}
+
+    def add(self, received_ns: int, key: str, payload: bytes, late: bool = False) -> None:
+        """Record one message; `late`: it was filled in.
+
+        Unknown keys and messages beyond max_pending_bytes are counted, not kept.
+        """
         state = self._keys.get(key) or self._open_key(key)
         if state is None:
             return
         if self._log.pending > self._settings.max_pending_bytes:
             self.manifest.overflow += 1
             return
-        publish_ns = state.publish_time(payload) or received_ns
+        publish_ns = state.publish_time(payload, late) or received_ns
         self._log.add(state.channel, received_ns, publish_ns, payload, state.last_sequence)
+        self._witness.look(self._addresses[key], payload)
         self._accepted += 1
-        self._last_ns = received_ns
+        self._last_ns = max(self._last_ns, received_ns)
 
     def _open_key(self, key: str) -> KeyState | None:
         if key not in self._keys:
@@ -121,6 +132,7 @@ class SessionStore:
             else:
                 if not address.topic.recorded:
                     return None
+                self._addresses[key] = address
                 self._keys[key] = KeyState(self._log.open_channel(key, address.topic), address)
         state = self._keys[key]
         self.manifest.unknown += state is None
@@ -156,6 +168,10 @@ class SessionStore:
         self.manifest.devices = sorted({state.device for state in known.values()})
         sources = set().union(*(state.sources.copy() for state in known.values()))
         self.manifest.sources = sorted(pb.Source.Name(s).removeprefix("SOURCE_") for s in sources if s in _SOURCES)
+        self.manifest.provenance = self._witness.provenance()
+        self.manifest.certificate = {
+            device: found.model_dump() for device, found in certify(self.manifest.keys, self._witness.wire()).items()
+        }
         return self.manifest.model_copy()
 
     def _sync_loop(self) -> None:

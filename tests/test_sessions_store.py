@@ -88,7 +88,11 @@ def test_session_json_counts_jumps_restarts_and_hashes_the_file(settings):
     assert store.close()
     written = json.loads((store.folder / "session.json").read_text())
     assert written["state"] == "closed" and written["devices"] == ["cube"] and written["sources"] == ["SIMULATED"]
-    assert written["keys"] == {KEY: {"messages": 8, "lost": 3, "restarts": 1, "repeated": 1, "unreadable": 1}}
+    counts = {"messages": 8, "lost": 3, "restarts": 1, "repeated": 1, "unreadable": 1, "repaired": 0}
+    assert list(written["keys"]) == [KEY] and counts.items() <= written["keys"][KEY].items()
+    topic = written["certificate"]["cube"]["topics"]["accel"]
+    assert topic == {"expected": 10, "received": 7, "repaired": 0, "lost": 3, "damaged": 1}
+    assert written["certificate"]["cube"]["complete"] is False
     assert written["unknown"] == 1 and written["configuration"] == {"bus": {"prefix": "p"}}
     assert written["sha256"] == hashlib.sha256((store.folder / "recording.mcap").read_bytes()).hexdigest()
     assert [m.payload for m in read(store.folder / "recording.mcap")][-1] == b"\xff\xfe no message"
