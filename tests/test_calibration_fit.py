@@ -98,10 +98,10 @@ def test_jacobians_match_differences():
     place, r0 = model.places(CUBE)
     unit = draw.normal(size=(5, 3))
     unit /= np.linalg.norm(unit, axis=1)[:, None]
-    p = Parameters(draw.normal(size=12), CUBE.theta_b + 0.1 * draw.normal(size=(12, 3)), r0, unit[:3], unit[3:4], unit[4:], draw.normal(size=(1, 3)))  # fmt: skip
-    steps = model.Steps(
-        np.zeros((6, 12)), np.full(6, 20), *draw.normal(size=(3, 6)), 5.0 * draw.normal(size=6), np.zeros(6)
-    )
+    c = CUBE.theta_b + 0.1 * draw.normal(size=(12, 3))
+    p = Parameters(draw.normal(size=12), c, r0, unit[:3], unit[3:4], unit[4:], draw.normal(size=(1, 3)))
+    angle, alpha = draw.normal(size=(3, 6)), 5.0 * draw.normal(size=6)
+    steps = model.Steps(np.zeros((6, 12)), np.full(6, 20), *angle, alpha, np.zeros(6))
     H = model.steps_jacobian(p, 0, steps, place, 9.8)
     H_pose = model.pose_jacobian(p, 1, 9.8)
     zero, H_gauge = model.gauge(p, CUBE.theta_b, r0)
