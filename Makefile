@@ -1,4 +1,5 @@
-# make demo   everything it needs, then the live dashboard on one printed URL (SOURCE=drive DATA=<folder> plays a log)
+# make demo   everything it needs, then the live dashboard on one printed URL (SOURCE=drive DATA=<folder> plays a log,
+#             BOARD=emulated runs the firmware image in the emulator)
 # make test   everything it needs, then all tests
 # make firmware  the board's image and map into build/firmware, with its size
 # make bench  the figures of README and docs, one JSON line each
@@ -13,8 +14,9 @@ DRIVE := $(if $(DATA),--data "$(DATA)")
 
 .PHONY: demo test setup dev system-packages bench docs messages lint firmware compose-test clean
 
-demo: setup
-	@$(BIN)/gyrofree demo --source $(SOURCE) $(DRIVE) --speed $(SPEED) --port $(PORT) --bus-port $(BUS_PORT)
+# BOARD=emulated: the table is sensed by the firmware image in the emulator
+demo: setup $(if $(filter emulated,$(BOARD)),.make/board firmware)
+	@$(BIN)/gyrofree demo --source $(if $(filter emulated,$(BOARD)),emulated,$(SOURCE)) $(DRIVE) --speed $(SPEED) --port $(PORT) --bus-port $(BUS_PORT)
 
 setup: .make/warm
 
@@ -33,6 +35,10 @@ setup: .make/warm
 .make/warm: .make/runtime $(wildcard estimator/*.py estimator/*/*.py)
 	@echo "Compiling the filters once, for the cache ..."
 	@$(BIN)/python -m estimator.warm
+	@touch $@
+
+.make/board: requirements/board.txt .make/runtime
+	$(PIP) install --require-hashes -r requirements/board.txt
 	@touch $@
 
 dev: .make/dev

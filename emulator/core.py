@@ -15,7 +15,7 @@ from emulator.nvic import Nvic
 
 EXC_RETURN_HANDLER, EXC_RETURN_THREAD = 0xFFFFFFF1, 0xFFFFFFF9
 ENTRY_CLOCKS = EXIT_CLOCKS = 12  # Cortex-M3 TRM 3.9.1; tail-chaining (6) is not modelled
-WFI = b"\x30\xbf"
+WFI = 0xBF30
 THUMB = 1 << 24
 ALIGNED = 1 << 9
 
@@ -128,7 +128,7 @@ class Core:
         self._pc = self.engine.get("PC") & ~1
         if code == 0 and self.state[cy.STOPPED]:
             return
-        if code == 0 and self.engine.read(self._pc - 2, 2) == WFI:
+        if code == 0 and self.engine.code_before(self._pc) == WFI:
             self.asleep = True
         elif code == EXCEPTION and self._pc >= 0xFFFFFFE0:
             self._leave()
@@ -152,8 +152,8 @@ class Core:
         pad = sp & 4
         low = sp - pad - 32
         stacked = frame[:6] + [self._pc, (xpsr | THUMB) & ~ALIGNED | (ALIGNED if pad else 0)]
-        engine.write(low, struct.pack("<8I", *stacked))
-        handler = struct.unpack("<I", engine.read(self.nvic.vectors + 4 * number, 4))[0]
+        engine.write_frame(low, stacked)
+        handler = engine.flash_word(self.nvic.vectors + 4 * number)
         frame[5] = EXC_RETURN_HANDLER if self.nvic.active else EXC_RETURN_THREAD
         frame[6], frame[7], frame[8] = handler & ~1, THUMB | number, low
         engine.set_frame(frame)
@@ -167,7 +167,7 @@ class Core:
     def _leave(self) -> None:
         engine = self.engine
         sp = engine.get("SP")
-        r0, r1, r2, r3, r12, lr, pc, xpsr = struct.unpack("<8I", engine.read(sp, 32))
+        r0, r1, r2, r3, r12, lr, pc, xpsr = engine.read_frame(sp)
         sp += 32 + (4 if xpsr & ALIGNED else 0)
         self.nvic.leave()
         number = self.nvic.active[-1] if self.nvic.active else 0

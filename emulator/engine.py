@@ -4,6 +4,7 @@ Unicorn's GPL engine is an extra for tests and demonstrations; nothing else in t
 """
 
 import ctypes
+import struct
 from collections.abc import Callable
 
 import numpy as np
@@ -16,6 +17,8 @@ NOWHERE = 0xFFFFFFF0  # no code there: emu_start's mandatory end address
 NEVER = 1 << 62
 HOOK_BLOCK = 8
 PAGE = 0x4000
+
+_FRAME = struct.Struct("<8I")
 
 Read = Callable[[int, int], int]  # offset, size -> value
 Write = Callable[[int, int, int], None]  # offset, size, value
@@ -56,6 +59,8 @@ class Engine:
         )
         self.state = (ctypes.c_int64 * cy.STATE_SIZE)()
         self.flash = np.full(FLASH_SIZE, 0xFF, dtype=np.uint8)
+        self._flash_view = memoryview(self.flash)
+        self._buffer = ctypes.create_string_buffer(64)
         self._kept: list[object] = []
         self._map_flash()
         self._hook()
@@ -135,6 +140,31 @@ class Engine:
     def write(self, address: int, data: bytes) -> None:
         """Memory, flash too."""
         self._unicorn.mem_write(address, data)
+
+    def code_before(self, address: int) -> int:
+        """The halfword of flash in front of an address; 0 outside of the flash."""
+        view = self._flash_view
+        return view[address - 2] | view[address - 1] << 8 if 2 <= address <= FLASH_SIZE else 0
+
+    def flash_word(self, address: int) -> int:
+        """A word of the flash."""
+        return int.from_bytes(self._flash_view[address : address + 4], "little")
+
+    def read_frame(self, address: int) -> tuple[int, ...]:
+        """Eight words of a stacked exception frame; raises EmulationError when the stack is not in memory."""
+        self._check_stack(self._library.uc_mem_read(self._handle, ctypes.c_uint64(address), self._buffer,
+                                                    ctypes.c_uint64(32)), address)  # fmt: skip
+        return _FRAME.unpack_from(self._buffer)
+
+    def write_frame(self, address: int, words: list[int]) -> None:
+        """Stack an exception frame; raises EmulationError when the stack is not in memory."""
+        self._check_stack(self._library.uc_mem_write(self._handle, ctypes.c_uint64(address), _FRAME.pack(*words),
+                                                     ctypes.c_uint64(32)), address)  # fmt: skip
+
+    @staticmethod
+    def _check_stack(code: int, address: int) -> None:
+        if code:
+            raise EmulationError(f"image: stack pointer {address:#010x} is outside of the memory: stack overflow?")
 
     @staticmethod
     def _check(code: int) -> None:

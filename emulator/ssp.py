@@ -39,29 +39,26 @@ class Ssp:
         self._cr0 = self._cr1 = self._cpsr = self._imsc = 0
         self._done: deque[tuple[int, int]] = deque()  # (clock, value) of frames on the wire or received
         self._overrun = False
+        self._settle()
 
-    @property
-    def frame_clocks(self) -> int:
-        """Core clocks of one frame."""
+    def _settle(self) -> None:
+        """Compute what follows from registers and clocks."""
         bits = (self._cr0 & 15) + 1
-        return bits * max(2, self._cpsr) * ((self._cr0 >> 8) + 1) * self._system.divider(self._name)
-
-    @property
-    def mode3(self) -> bool:
-        """Clock idle high, sampled on the second edge, at most 5 MHz: what an ADXL345 understands."""
-        bit_clocks = self.frame_clocks // ((self._cr0 & 15) + 1)
-        return self._cr0 & 0xF0 == 0xC0 and bit_clocks * 5_000_000 >= self._system.cclk
-
-    def _busy_until(self) -> int:
-        return self._done[-1][0] if self._done else 0
+        bit_clocks = max(2, self._cpsr) * ((self._cr0 >> 8) + 1) * self._system.divider(self._name)
+        self._settled = self._system.version
+        self.frame_clocks = bits * bit_clocks  # core clocks of one frame
+        # Clock idle high, sampled on the second edge, at most 5 MHz: what an ADXL345 understands.
+        self.mode3 = self._cr0 & 0xF0 == 0xC0 and bit_clocks * 5_000_000 >= self._system.cclk
 
     def _transfer(self, value: int) -> None:
-        now = self._core.now
-        waiting = sum(1 for at, _ in self._done if at > now)
+        if self._settled != self._system.version:
+            self._settle()
+        now, busy_until = self._core.now, self._done[-1][0] if self._done else 0
+        waiting = -((now - busy_until) // self.frame_clocks) if busy_until > now else 0
         if not self._cr1 & 2 or waiting > DEPTH:
             return
         self.frames += 1
-        end = max(now, self._busy_until()) + self.frame_clocks
+        end = max(now, busy_until) + self.frame_clocks
         if len(self._done) >= DEPTH + waiting:
             self._overrun = True
             return
@@ -110,10 +107,12 @@ class Ssp:
             self._transfer(value & 0xFFFF)
         elif offset == CR0:
             self._cr0 = value & 0xFFFF
+            self._settle()
         elif offset == CR1:
             self._cr1 = value
         elif offset == CPSR:
             self._cpsr = value & 0xFE
+            self._settle()
         elif offset == IMSC:
             self._imsc = value
         elif offset == ICR:

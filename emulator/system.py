@@ -26,6 +26,7 @@ class SystemControl:
 
     def __init__(self) -> None:
         self.cause = POWER_ON
+        self.version = 0  # of the clocks; whoever keeps something computed from them compares it
         self.reset()
 
     def reset(self) -> None:
@@ -33,6 +34,7 @@ class SystemControl:
         self._registers = {0: 0x303A, 0x0C4: 0x042887DE}
         self._pll = [0, 0]  # control and configuration in force
         self._feed = 0
+        self.version += 1
 
     @property
     def cclk(self) -> int:
@@ -62,6 +64,7 @@ class SystemControl:
 
     def write(self, offset: int, size: int, value: int) -> None:
         """A register."""
+        self.version += 1
         if offset == PLL0FEED:
             if self._feed == 0xAA and value == 0x55:
                 self._pll = [self._registers.get(PLL0CON, 0), self._registers.get(PLL0CFG, 0)]

@@ -37,12 +37,14 @@ class Uart:
         """Registers after reset; bytes being sent are cut off."""
         self._ier = self._fcr = self._lcr = 0
         self._dll, self._dlm, self._fdr = 1, 0, 0x10
+        self._step_of, self._step = -1, 0  # byte_clocks as computed for this version of the clocks
         self._leaving: deque[tuple[int, int]] = deque()  # (clock at which its stop bit has left, byte)
         for event in (self._empty_event, self._timeout_event):
             if event is not None:
                 event.cancelled = True
         self._empty_event = self._timeout_event = None
-        self._thre_pending = self._timed_out = self._overrun = False
+        self._empty_at = 0
+        self._thre_pending = self._timed_out = self._overrun = self._raised = False
         self._received: deque[int] = deque()
 
     @property
@@ -53,6 +55,11 @@ class Uart:
     @property
     def byte_clocks(self) -> int:
         """Core clocks of one byte on the line."""
+        if self._step_of != self._system.version:
+            self._step_of, self._step = self._system.version, self._byte_clocks()
+        return self._step
+
+    def _byte_clocks(self) -> int:
         mul, add = max(1, self._fdr >> 4), self._fdr & 15
         divisor = max(1, self._dll | self._dlm << 8)
         return self._bits * 16 * divisor * (mul + add) * self._system.divider(self._name) // mul
@@ -70,9 +77,7 @@ class Uart:
         self._drain(now)
         self._held_until = max(self._held_until, now + clocks)
         self._leaving = deque((at + clocks, byte) for at, byte in self._leaving)
-        if self._empty_event is not None:
-            self._empty_event.cancelled, at = True, self._empty_event.at + clocks
-            self._empty_event = self._core.schedule(at, self._empty)
+        self._empty_at += clocks
 
     def feed(self, data: bytes) -> None:
         """Bytes come in, one per byte time from now on, behind those still on their way."""
@@ -117,7 +122,8 @@ class Uart:
 
     def _send(self, byte: int) -> None:
         now = self._core.now
-        self._drain(now)
+        if self._leaving and self._leaving[0][0] <= now:
+            self._drain(now)
         self._thre_pending = False
         if len(self._leaving) > DEPTH:  # sixteen wait, one is in the shift register
             self.lost_to_full_fifo += 1
@@ -125,13 +131,17 @@ class Uart:
         step = self.byte_clocks
         begin = max(now, self._held_until, self._leaving[-1][0] if self._leaving else 0)
         self._leaving.append((begin + step, byte))
-        if self._empty_event is not None:
-            self._empty_event.cancelled = True
         # The FIFO is empty when its last byte enters the shift register, a byte's time before that one has left.
-        self._empty_event = self._core.schedule(max(begin, now + 1), self._empty)
-        self._update()
+        self._empty_at = max(begin, now + 1)
+        if self._empty_event is None:
+            self._empty_event = self._core.schedule(self._empty_at, self._empty)
+        if self._raised:
+            self._update()
 
     def _empty(self) -> None:
+        if self._core.now < self._empty_at:  # bytes were added since
+            self._empty_event = self._core.schedule(self._empty_at, self._empty)
+            return
         self._empty_event = None
         self._thre_pending = True
         self._drain(self._core.now)
@@ -149,7 +159,10 @@ class Uart:
         return 0x02 if self._ier & 2 and self._thre_pending else 0x01
 
     def _update(self) -> None:
-        self._core.nvic.line(self._irq, self._cause() != 1)
+        raised = self._cause() != 1
+        if raised != self._raised:
+            self._raised = raised
+            self._core.nvic.line(self._irq, raised)
 
     def read(self, offset: int, size: int) -> int:
         """A register."""
@@ -187,12 +200,12 @@ class Uart:
         """A register."""
         if offset == DATA:
             if self._lcr & DLAB:
-                self._dll = value & 0xFF
+                self._dll, self._step_of = value & 0xFF, -1
             else:
                 self._send(value & 0xFF)
         elif offset == IER:
             if self._lcr & DLAB:
-                self._dlm = value & 0xFF
+                self._dlm, self._step_of = value & 0xFF, -1
             else:
                 self._ier = value & 7
                 self._update()
@@ -203,6 +216,6 @@ class Uart:
                 self._restart_timeout()
             self._update()
         elif offset == LCR:
-            self._lcr = value & 0xFF
+            self._lcr, self._step_of = value & 0xFF, -1
         elif offset == FDR:
-            self._fdr = value & 0xFF
+            self._fdr, self._step_of = value & 0xFF, -1

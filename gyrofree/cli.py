@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from gyrofree import cli_calibrate, cli_handover, cli_layout, cli_run, cli_sessions, cli_users
+from gyrofree import cli_board, cli_calibrate, cli_handover, cli_layout, cli_run, cli_sessions, cli_users
 from gyrofree.cli_options import AsJson, Config, Speed, Verbose, settings_of
 from gyrofree.config import ConfigError
 from gyrofree.process import EXIT_CONFIG as CONFIG
@@ -36,6 +36,7 @@ cli_handover.mount(app)
 app.add_typer(cli_calibrate.app, name="calibrate")
 app.add_typer(cli_run.app, name="reproduce")
 app.command()(cli_run.run)
+app.command()(cli_board.board)
 
 
 def _show_version(wanted: bool) -> None:
@@ -56,7 +57,11 @@ def _root(
 @app.command()
 def demo(
     source: Annotated[
-        str, typer.Option(help="'table': the simulated rotating table. 'drive': the log in --data, played.")
+        str,
+        typer.Option(
+            help="'table': the simulated rotating table. 'emulated': the same table, sensed by the firmware image in "
+            "an emulator. 'drive': the log in --data, played."
+        ),
     ] = "table",
     data: Annotated[Path | None, typer.Option(help="Folder with imu.csv and gnss.csv, for --source drive.")] = None,
     speed: Speed = 1.0,
@@ -73,14 +78,17 @@ def demo(
 
     if source == "table":
         board, device, layout = ["simulate"], "cube", "cube"
+    elif source == "emulated":
+        cli_board.check()
+        board, device, layout = ["board", "--emulate", "--speed", str(speed)], "cube", "cube"
     elif source == "drive":
         if data is None:
             raise fail("--source drive wants --data FOLDER with imu.csv and gnss.csv", CONFIG)
         _check_log(data)
         board, device, layout = ["play", str(data), "--speed", str(speed), "--loop"], "car", "imu"
     else:
-        raise fail(f"--source {source!r}: want 'table' or 'drive'", CONFIG)
-    scale = speed if source == "drive" else 1.0
+        raise fail(f"--source {source!r}: want 'table', 'emulated' or 'drive'", CONFIG)
+    scale = 1.0 if source == "table" else speed
     demonstration.run(
         demonstration.Plan(folder.absolute(), board, device, layout, port, bus_port, record=record, time_scale=scale)
     )

@@ -82,6 +82,19 @@ def _options(image, link, tcp, profile, seed, speed, clock_ppm, faults, device):
     return Options(path, link, tcp, profile, seed, speed, clock_ppm, parsed, device)
 
 
+def check() -> None:
+    """End the command with one line when there is no image or no emulator."""
+    from emulator.engine import EmulatorMissing, Engine
+    from gyrofree.emulated import IMAGE
+
+    if not IMAGE.is_file():
+        raise fail(f"{IMAGE}: no firmware image there; build it with `make firmware`")
+    try:
+        Engine()
+    except EmulatorMissing as error:
+        raise fail(str(error)) from None
+
+
 def _say_load(image: Path, as_json: bool) -> None:
     from dataclasses import asdict
 
