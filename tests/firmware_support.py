@@ -32,7 +32,7 @@ def compiled(program: Path, *sources: Path) -> Path:
 @cache
 def firmware_image(out: Path) -> Path:
     """`make firmware` into a folder; the folder."""
-    subprocess.run(["make", "-C", str(FIRMWARE / "port" / "lpc1768"), f"OUT={out}"], check=True, timeout=120,
+    subprocess.run(["make", "-j2", "-C", str(FIRMWARE / "port" / "lpc1768"), f"OUT={out}"], check=True, timeout=120,
                    capture_output=True)
     return out
 

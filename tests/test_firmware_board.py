@@ -73,7 +73,8 @@ def test_a_sensor_that_dies_is_taken_out_and_comes_back(world, fault):
     masks = [row.sensor_mask for row in world.of(Acc12)]
     assert masks[0] == 15 and 0b1101 in masks and masks[-1] == 15
     status = world.of(Status)[-1]
-    assert 8 <= status.spi_errors[1] <= 16 and status.init_errors[1] >= 1 and sum(status.spi_errors) == status.spi_errors[1]
+    assert 8 <= status.spi_errors[1] <= 16 and status.init_errors[1] >= 1
+    assert status.spi_errors[0] == status.spi_errors[2] == status.spi_errors[3] == 0
     rows = world.of(Acc12)
     assert all(row.stale_mask & 2 for row in rows if row.sensor_mask == 0b1101)
     assert world.ledger.lost_samples == 0
@@ -106,7 +107,7 @@ def test_the_fifo_keeps_every_value(world):
     steps = [(b - a) % 5 for a, b in zip(ripples, ripples[1:], strict=False)]
     assert steps.count(1) >= len(steps) - 4  # after the gap it takes the oldest away until it is at the newest
     assert world.of(Status)[-1].fifo_overruns == (0, 0, 0, 0)
-    assert world.ledger.lost_samples == world.of(Status)[-1].missed_ticks + 0 == 4
+    assert world.ledger.lost_samples == world.of(Status)[-1].missed_ticks == 4
 
 
 def test_a_fifo_that_is_not_read_overruns(world):
@@ -191,7 +192,8 @@ def test_status_and_reboot_on_command(world):
 
 
 def test_self_test_deflects_and_judges(world):
-    world.say("fault 3 stuck", "run 300000").command("stop").command("self_test").command("start").command("rate_hz", 200)
+    world.say("fault 3 stuck", "run 300000")
+    world.command("stop").command("self_test").command("start").command("rate_hz", 200)
     world.say("run 1500000").command("start").say("run 500000").play()
     stop, start, rate, test, again = world.acks()
     assert [a.status for a in (stop, start, rate, test, again)] == [0, RESULTS["busy"], RESULTS["busy"], 0, 0]
