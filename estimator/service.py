@@ -6,7 +6,6 @@ carries a measured duration and is left out of such a comparison.
 """
 
 import logging
-import queue
 import threading
 import time
 from collections.abc import Callable
@@ -22,17 +21,15 @@ from estimator.ins.board import NavBoard
 from estimator.ins.navigation import NAVIGATORS, Correction, Mode, NavigatorConfig
 from estimator.rate.board import RateBoard, WrongAxes
 from estimator.settings import EstimatorSettings, LayoutSettings
-from estimator.stream import Stream, every, worth_a_line
-from estimator.warm import warm
+from estimator.stream import Stream, every
 from messages import gyrofree_pb2 as pb
-from messages.bus import BusSettings, BusUnavailable, Publishers, decode, open_client
-from messages.topics import ACCEL, ATTITUDE, ESTIMATOR, GNSS, IMU, INNOVATION, NAV, POSE, RATE, Topic, TopicError, parse
+from messages.bus import BusSettings
+from messages.topics import ACCEL, ATTITUDE, ESTIMATOR, GNSS, IMU, INNOVATION, NAV, POSE, RATE, Topic
 
 log = logging.getLogger(__name__)
 
 POSE_HZ = 20.0
 INPUTS = (ACCEL, IMU, GNSS)
-BACKLOG = 20_000  # messages; more than a minute of a full-rate board, then the newest are dropped and counted
 NO_TRANSLATION = (0.0, 0.0, 0.0)  # a cube on its table turns and stays
 STATES = {
     Mode.WAITING: "waiting for samples",
@@ -247,86 +244,8 @@ def make_layout(settings: LayoutSettings) -> Any:
         raise UnknownEstimator(f"[estimator] layout: {error}") from None
 
 
-class Service:
-    """Bus callbacks append, one worker steps the pipeline in order of arrival and publishes."""
-
-    def __init__(self, pipeline: Pipeline, put: Callable[[Output], None]) -> None:
-        self._pipeline = pipeline
-        self._put = put
-        self._queue: queue.SimpleQueue[tuple[Topic, Message] | None] = queue.SimpleQueue()
-        self._bad = 0
-        self._dropped = 0
-        self.failure: BaseException | None = None
-
-    def offer(self, topic: Topic, message: Message) -> None:
-        """Called on the bus's thread: append and return."""
-        if self._queue.qsize() >= BACKLOG:
-            self._dropped += 1
-            if self._dropped % 1000 == 1:
-                log.error("%d messages waiting: too slow, %d dropped so far", BACKLOG, self._dropped)
-            return
-        self._queue.put((topic, message))
-
-    def finish(self) -> None:
-        """Ask the worker to end after what is queued now."""
-        self._queue.put(None)
-
-    def work(self, stop: threading.Event) -> None:
-        """The worker: until finish(). An unexpected error sets `stop`: run() raises it, the supervisor starts anew."""
-        try:
-            while (item := self._queue.get()) is not None:
-                self._handle(*item)
-        except BaseException as error:
-            self.failure = error
-            stop.set()
-
-    def _handle(self, topic: Topic, message: Message) -> None:
-        try:
-            outputs = self._pipeline.on(topic, message)
-        except convert.BadMessage as error:
-            self._bad += 1
-            if worth_a_line(self._bad):
-                log.warning("%s: ignored (%d so far)", error, self._bad)
-            return
-        for output in outputs:
-            self._put(output)
-
-
 def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) -> None:
-    """Estimate until `stop` is set; sets it itself and raises when the worker fails."""
-    pipeline = Pipeline(settings)
-    warm()
-    try:
-        session = open_client(bus, stop)
-    except BusUnavailable:
-        if stop.is_set():
-            return
-        raise
-    with session:
-        publishers = Publishers(session, bus.prefix)
-        service = Service(pipeline, lambda o: publishers.put(o.topic, o.device, o.message, o.estimator))
-        worker = threading.Thread(target=service.work, args=(stop,), name="estimator", daemon=True)
-        worker.start()
-        # One subscriber for all topics: each has a thread of its own, and a fix must not overtake its samples.
-        subscriber = session.declare_subscriber(f"{bus.prefix}/*/*", _on(service))
-        log.info("estimating: rate %s; navigation %s", ", ".join(settings.rate), ", ".join(settings.navigators))
-        stop.wait()
-        subscriber.undeclare()
-        service.finish()
-        worker.join(timeout=3.0)
-    if service.failure is not None:
-        raise service.failure
+    """Estimate on the bus until `stop` is set; raises what made the worker fail."""
+    from estimator.live import run as live  # it needs the pipeline of this module
 
-
-def _on(service: Service) -> Callable[[Any], None]:
-    def on_sample(sample: Any) -> None:
-        try:
-            topic = parse(str(sample.key_expr)).topic
-        except TopicError:
-            return
-        if topic in INPUTS:
-            message = decode(topic, sample.payload.to_bytes())
-            if message is not None:
-                service.offer(topic, message)
-
-    return on_sample
+    live(settings, bus, stop)

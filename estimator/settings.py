@@ -47,6 +47,9 @@ class EstimatorSettings(BaseModel):
     vehicle: VehicleSettings = VehicleSettings()  # of a device that vehicles does not name
     vehicles: dict[str, VehicleSettings] = Field(default_factory=dict)  # by device name
     use_every_fix: int = Field(default=1, ge=1, le=1000)  # n: filters get one fix in n, the others only score them
+    journal: Path | None = None  # folder: what is published, and the state to go on with after a crash
+    journal_bytes: int = Field(default=1 << 30, ge=1 << 20)  # bytes kept, the oldest go first ...
+    journal_age_s: float = Field(default=7200.0, ge=60.0)  # ... and s
     rate_limit_hz: float = Field(default=200.0, gt=0.0, le=1000.0)  # Hz, at most, of each rate/<estimator>
     attitude_limit_hz: float = Field(default=50.0, gt=0.0, le=1000.0)  # Hz, at most, of each attitude/<estimator>
     nav_limit_hz: float = Field(default=20.0, gt=0.0, le=200.0)  # Hz, at most, of nav and pose

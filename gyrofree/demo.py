@@ -54,6 +54,9 @@ port = "{plan.folder / "board"}"
 layout = "{plan.layout}"
 time_scale = {plan.time_scale}
 
+[estimator]
+journal = "{plan.folder / "estimates"}"
+
 [recorder]
 root = "{plan.folder / "sessions"}"
 auto_start = {str(plan.record).lower()}

@@ -1,6 +1,6 @@
 """Child processes under one roof: one readable log, restart of what dies, an orderly end.
 
-A child that ends is started again after a pause that grows from 0.5 to 5 s and shrinks back after 20 s of good life;
+A child that ends is started again after a pause that grows from 0.05 to 5 s and shrinks back after 20 s of good life;
 one that says that its configuration is wrong or its port is taken (exit code 2 or 3) ends the whole.
 """
 
@@ -19,7 +19,7 @@ from rich.text import Text
 
 from gyrofree.process import EXIT_CONFIG, EXIT_TAKEN
 
-PAUSE_FIRST = 0.5  # s
+PAUSE_FIRST = 0.05  # s; while a gateway is away its board's samples are lost
 PAUSE_LONGEST = 5.0  # s
 GOOD_LIFE = 20.0  # s
 PATIENCE = 4.0  # s between SIGTERM and SIGKILL

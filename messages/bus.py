@@ -133,11 +133,21 @@ class Publishers:
         self._spool = spool
         self._by_key: dict[str, zenoh.Publisher] = {}
         self._sequence: dict[str, int] = {}
+        self._published: dict[str, int] = {}  # by an earlier life of this process
 
     def resume(self) -> None:
         """Count on from what the spool holds, for a publisher whose run goes on over its restarts."""
         for (topic, device), sequence in (self._spool.last_sequences() if self._spool else {}).items():
             self._sequence["/".join((self._prefix, device, topic))] = sequence
+
+    def repeat(self, sequences: dict[str, int]) -> None:
+        """The publisher goes back to an earlier state: what it published since then comes again and is passed over."""
+        self._published = dict(self._sequence)
+        self._sequence.update(sequences)
+
+    def sequences(self) -> dict[str, int]:
+        """Newest sequence of each key, for `repeat`."""
+        return dict(self._sequence)
 
     def attach(self, session: zenoh.Session) -> None:
         """Publish from now on."""
@@ -151,6 +161,8 @@ class Publishers:
             self._sequence[key] = self._sequence.get(key, 0) + 1
             if header is not None:
                 header.sequence = self._sequence[key]
+            if self._sequence[key] <= self._published.get(key, 0):
+                return
         payload = message.SerializeToString()
         if self._spool is not None and not device.endswith(REPLAY_SUFFIX):
             name = key.split("/", 2)[2]

@@ -75,7 +75,7 @@ def ask(
 class Asker:
     """Asks on a thread of its own, one question after the other; `done(token, reply)` is called there."""
 
-    RETRIES = 6  # a link that is just back may carry samples before it carries questions
+    RETRIES = 4  # a link that is just back may carry samples before it carries questions
     RETRY_S = 0.5
 
     def __init__(self, session: zenoh.Session, prefix: str, done: Callable[[object, pb.HistoryReply | None], None]):

@@ -119,6 +119,10 @@ class Mender:
         """The consumer has everything of this topic up to here, from an earlier life."""
         self._keys[device, name] = _Key(run, last)
 
+    def taken(self) -> dict[tuple[str, str], tuple[int, int]]:
+        """Run and sequence of the newest message given on, by device and topic: for `seed` in a later life."""
+        return {name: (key.run, key.last) for name, key in self._keys.items()}
+
     def take(self, arrival: Arrival) -> list[Arrival]:
         """One live message; what can be given on now, in order."""
         if arrival.topic.source not in self._sources or arrival.device.endswith(REPLAY_SUFFIX):

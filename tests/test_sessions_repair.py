@@ -1,6 +1,7 @@
 """What the bus lost is filled in from what the publisher kept: the same bytes, in their order, none twice."""
 
 import random
+import sys
 import threading
 import time
 
@@ -19,7 +20,12 @@ from sessions.mcap_log import read
 from sessions.settings import RecorderSettings
 
 PATIENCE = 30.0  # s; generous, the tests wait for states
-T0 = time.time_ns() - 3_500_000_000  # a message is published a moment after the time in its header
+T0 = 0  # ns, of the first header; set for each test: a message is published a moment after the time in its header
+
+
+@pytest.fixture(autouse=True)
+def t0(monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "T0", time.time_ns() - 3_500_000_000)
 
 
 def until(condition, what: str):
