@@ -2,17 +2,19 @@
 #             BOARD=emulated runs the firmware image in the emulator)
 # make test   everything it needs, then all tests
 # make firmware  the board's image and map into build/firmware, with its size
+# make fuzz   libFuzzer on the board's decoder and commands (SECONDS=60)
 # make bench  the figures of README and docs, one JSON line each
 PYTHON ?= python3
 SOURCE ?= table
 SPEED ?= 1
 PORT ?= 8080
 BUS_PORT ?= 7447
+SECONDS ?= 60
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 DRIVE := $(if $(DATA),--data "$(DATA)")
 
-.PHONY: demo test setup dev system-packages bench docs messages lint firmware compose-test clean
+.PHONY: demo test setup dev system-packages bench docs messages lint firmware fuzz compose-test clean
 
 # BOARD=emulated: the table is sensed by the firmware image in the emulator
 demo: setup $(if $(filter emulated,$(BOARD)),.make/board firmware)
@@ -70,6 +72,9 @@ bench: setup dev
 firmware:
 	@command -v arm-none-eabi-gcc >/dev/null || { echo "The board's compiler is needed; run: sudo apt-get install gcc-arm-none-eabi"; exit 1; }
 	@$(MAKE) --no-print-directory -C firmware_protocol/port/lpc1768 OUT="$(CURDIR)/build/firmware"
+
+fuzz: setup dev system-packages
+	$(BIN)/python tests/fuzz.py --seconds $(SECONDS)
 
 docs: setup
 	$(BIN)/python -m firmware_protocol.document > docs/protocol.md
