@@ -43,7 +43,7 @@ class Header(_message.Message):
     def __init__(self, device: _Optional[str] = ..., sequence: _Optional[int] = ..., epoch: _Optional[int] = ..., device_us: _Optional[int] = ..., utc_ns: _Optional[int] = ..., utc_sigma_s: _Optional[float] = ..., source: _Optional[_Union[Source, str]] = ..., run: _Optional[int] = ..., late: _Optional[bool] = ...) -> None: ...
 
 class AccelBatch(_message.Message):
-    __slots__ = ("header", "first_index", "period_s", "axes", "counts", "f_mps2", "stale_mask", "lost_samples", "frame_sequence", "received_ns")
+    __slots__ = ("header", "first_index", "period_s", "axes", "counts", "f_mps2", "stale_mask", "lost_samples", "frame_sequence", "received_ns", "axis_offset_s")
     HEADER_FIELD_NUMBER: _ClassVar[int]
     FIRST_INDEX_FIELD_NUMBER: _ClassVar[int]
     PERIOD_S_FIELD_NUMBER: _ClassVar[int]
@@ -54,6 +54,7 @@ class AccelBatch(_message.Message):
     LOST_SAMPLES_FIELD_NUMBER: _ClassVar[int]
     FRAME_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     RECEIVED_NS_FIELD_NUMBER: _ClassVar[int]
+    AXIS_OFFSET_S_FIELD_NUMBER: _ClassVar[int]
     header: Header
     first_index: int
     period_s: float
@@ -64,7 +65,8 @@ class AccelBatch(_message.Message):
     lost_samples: int
     frame_sequence: int
     received_ns: int
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., first_index: _Optional[int] = ..., period_s: _Optional[float] = ..., axes: _Optional[int] = ..., counts: _Optional[_Iterable[int]] = ..., f_mps2: _Optional[_Iterable[float]] = ..., stale_mask: _Optional[int] = ..., lost_samples: _Optional[int] = ..., frame_sequence: _Optional[int] = ..., received_ns: _Optional[int] = ...) -> None: ...
+    axis_offset_s: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., first_index: _Optional[int] = ..., period_s: _Optional[float] = ..., axes: _Optional[int] = ..., counts: _Optional[_Iterable[int]] = ..., f_mps2: _Optional[_Iterable[float]] = ..., stale_mask: _Optional[int] = ..., lost_samples: _Optional[int] = ..., frame_sequence: _Optional[int] = ..., received_ns: _Optional[int] = ..., axis_offset_s: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class ImuBatch(_message.Message):
     __slots__ = ("header", "first_index", "period_s", "f_b_mps2", "omega_ib_b_radps", "lost_samples", "frame_sequence", "received_ns")
@@ -651,14 +653,16 @@ class EstimatorCommand(_message.Message):
     def __init__(self, action: _Optional[_Union[EstimatorCommand.Action, str]] = ..., device: _Optional[str] = ..., seconds: _Optional[float] = ..., card: _Optional[str] = ..., user: _Optional[str] = ...) -> None: ...
 
 class BoardCommand(_message.Message):
-    __slots__ = ("name", "value", "user")
+    __slots__ = ("name", "value", "user", "ask")
     NAME_FIELD_NUMBER: _ClassVar[int]
     VALUE_FIELD_NUMBER: _ClassVar[int]
     USER_FIELD_NUMBER: _ClassVar[int]
+    ASK_FIELD_NUMBER: _ClassVar[int]
     name: str
     value: int
     user: str
-    def __init__(self, name: _Optional[str] = ..., value: _Optional[int] = ..., user: _Optional[str] = ...) -> None: ...
+    ask: bool
+    def __init__(self, name: _Optional[str] = ..., value: _Optional[int] = ..., user: _Optional[str] = ..., ask: _Optional[bool] = ...) -> None: ...
 
 class Reply(_message.Message):
     __slots__ = ("ok", "message")

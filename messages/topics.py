@@ -128,6 +128,11 @@ def published_key(prefix: str, device: str, source: str) -> str:
     return f"{prefix}/{device}/published/{source}"
 
 
+def control_key(prefix: str, device: str, what: str) -> str:
+    """Key of a queryable for orders to one device: what is "board-control" (BoardCommand in, Reply out) or alike."""
+    return f"{check_name(prefix)}/{check_name(device)}/{check_name(what)}"
+
+
 def replay_control_key(prefix: str) -> str:
     """Key of a replay's queryable: ReplayCommand in, ReplayStatus out."""
     return f"{check_name(prefix)}/{REPLAY.name}/control"
