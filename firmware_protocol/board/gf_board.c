@@ -62,7 +62,7 @@ void gf_board_tick(gf_board_t *b, uint64_t ticks, uint32_t missed) {
 
 /* ---- frames ---- */
 
-static int send(gf_board_t *b, uint8_t type, uint64_t t_us, const uint8_t *payload, size_t size) {
+static int send_frame(gf_board_t *b, uint8_t type, uint64_t t_us, const uint8_t *payload, size_t size) {
   return gf_send(&b->sender, type, t_us, payload, size);
 }
 
@@ -92,7 +92,7 @@ static void send_hello(gf_board_t *b) {
     hello.sensors[i].rate_code = b->sensors.rate_code;
     hello.sensors[i].scale_ng = GF_ADXL345_SCALE_NG;
   }
-  (void)send(b, GF_TYPE_HELLO, to_us(b, now(b)), payload, gf_pack_hello(payload, &hello));
+  (void)send_frame(b, GF_TYPE_HELLO, to_us(b, now(b)), payload, gf_pack_hello(payload, &hello));
   b->sender.flags = (uint8_t)(b->sender.flags & ~(uint32_t)GF_FLAG_CONFIG);
 }
 
@@ -133,16 +133,16 @@ static void send_status(gf_board_t *b) {
   status.free_stack = b->port.free_stack(b->port.context);
   status.cpu_permille = b->permille;
   status.last_seq = b->sender.built - 1u;
-  (void)send(b, GF_TYPE_STATUS, to_us(b, at), payload, gf_pack_status(payload, &status));
+  (void)send_frame(b, GF_TYPE_STATUS, to_us(b, at), payload, gf_pack_status(payload, &status));
 }
 
 static void flush(gf_board_t *b) {
   if (b->acc.n != 0u) {
-    (void)send(b, GF_TYPE_ACC12, b->acc.t_us, b->acc.payload, b->acc.size);
+    (void)send_frame(b, GF_TYPE_ACC12, b->acc.t_us, b->acc.payload, b->acc.size);
     b->acc.n = 0;
   }
   if (b->adc.n != 0u) {
-    (void)send(b, GF_TYPE_ADC, b->adc.t_us, b->adc.payload, b->adc.size);
+    (void)send_frame(b, GF_TYPE_ADC, b->adc.t_us, b->adc.payload, b->adc.size);
     b->adc.n = 0;
   }
 }
@@ -211,7 +211,7 @@ static void acknowledge(gf_board_t *b, const gf_command_t *command, gf_result_t 
                         size_t size) {
   uint8_t payload[GF_ACK_SIZE + GF_ACK_MAX_ECHO];
   const size_t length = gf_pack_ack(payload, command->command, command->token, (int16_t)result, echo, size);
-  (void)send(b, GF_TYPE_ACK, to_us(b, now(b)), payload, length);
+  (void)send_frame(b, GF_TYPE_ACK, to_us(b, now(b)), payload, length);
 }
 
 /* The line that a setting is about, or NULL. */
@@ -280,7 +280,7 @@ static void end_test(gf_board_t *b) {
   halt(b);
   echo[0] = b->test.passed;
   echo[1] = b->test.tested;
-  for (uint32_t i = 0; i < GF_AXES; i++) {
+  for (size_t i = 0; i < GF_AXES; i++) {
     gf_put_u16(echo + 2u + 2u * i, (uint16_t)b->test.change[i]);
   }
   b->testing = 0;
@@ -380,13 +380,13 @@ static void listen(gf_board_t *b) {
 
 static void forward(gf_board_t *b, uint64_t at) {
   while (gf_tacho_poll(&b->tacho, at)) {
-    (void)send(b, GF_TYPE_TACHO, b->tacho.frame.t_us, b->tacho.frame.payload, b->tacho.frame.size);
+    (void)send_frame(b, GF_TYPE_TACHO, b->tacho.frame.t_us, b->tacho.frame.payload, b->tacho.frame.size);
   }
   while (gf_pps_poll(&b->pps)) {
-    (void)send(b, GF_TYPE_PPS, b->pps.t_us, b->pps.payload, sizeof b->pps.payload);
+    (void)send_frame(b, GF_TYPE_PPS, b->pps.t_us, b->pps.payload, sizeof b->pps.payload);
   }
   while (gf_gnss_poll(&b->gnss, at)) {
-    (void)send(b, GF_TYPE_GPS, b->gnss.frame.t_us, b->gnss.frame.payload, b->gnss.frame.size);
+    (void)send_frame(b, GF_TYPE_GPS, b->gnss.frame.t_us, b->gnss.frame.payload, b->gnss.frame.size);
   }
 }
 

@@ -129,7 +129,7 @@ static size_t unstuff(uint8_t *body, size_t size) {
 
 static uint8_t bit_count(uint8_t mask) {
   uint8_t count = 0;
-  for (; mask != 0u; mask = (uint8_t)(mask & (mask - 1u))) {
+  for (uint32_t left = mask; left != 0u; left &= left - 1u) {
     count++;
   }
   return count;
@@ -233,6 +233,8 @@ gf_event_t gf_push(gf_decoder_t *d, uint8_t byte) {
     d->overrun = 1;
   } else if (d->size == 0u && d->zeros > 1u) {
     event = idle(d);
+  } else {
+    /* one more byte of a chunk */
   }
   d->body[d->size++] = byte;
   return event;

@@ -70,7 +70,7 @@ static void count_missing(uint32_t *errors, uint8_t wanted, uint8_t good) {
   }
 }
 
-static uint8_t start(gf_adxl345_t *s, uint8_t wanted) {
+static uint8_t start_sensors(gf_adxl345_t *s, uint8_t wanted) {
   uint8_t mask = showing(s, wanted, GF_ADXL345_DEVID, GF_ADXL345_IDENTITY);
   mask = write_register(s, mask, GF_ADXL345_POWER_CTL, 0);
   mask = write_register(s, mask, GF_ADXL345_DATA_FORMAT, s->format);
@@ -97,12 +97,12 @@ uint8_t gf_adxl345_start(gf_adxl345_t *s, uint32_t rate_hz, uint32_t range_g, in
   s->rate_code = gf_adxl345_rate_code(rate_hz);
   s->fifo = fifo ? STREAM : 0;
   s->alive = 0;
-  return start(s, (1u << GF_SPI_DEVICES) - 1u);
+  return start_sensors(s, (1u << GF_SPI_DEVICES) - 1u);
 }
 
 uint8_t gf_adxl345_start_missing(gf_adxl345_t *s) {
   const uint8_t missing = (uint8_t)(~(uint32_t)s->alive & ((1u << GF_SPI_DEVICES) - 1u));
-  return missing == 0u ? s->alive : start(s, missing);
+  return missing == 0u ? s->alive : start_sensors(s, missing);
 }
 
 /* ---- samples ---- */
@@ -149,7 +149,7 @@ static void fail(gf_adxl345_t *s, uint32_t i) {
 
 /* Read the sensors of the mask once; returns those with a new value.  Those that fail are counted. */
 static uint8_t read_once(gf_adxl345_t *s, uint8_t mask) {
-  static const uint16_t out[SAMPLE_WORDS] = {(READ | MULTIPLE | GF_ADXL345_INT_SOURCE) << 8, 0, 0, 0, 0};
+  static const uint16_t out[SAMPLE_WORDS] = {((uint32_t)READ | MULTIPLE | GF_ADXL345_INT_SOURCE) << 8, 0, 0, 0, 0};
   uint16_t in[GF_SPI_DEVICES][GF_SPI_WORDS];
   const uint8_t answered = s->spi->exchange(s->spi->context, mask, out, in, SAMPLE_WORDS);
   uint8_t fresh = 0;
@@ -171,7 +171,7 @@ static uint8_t read_once(gf_adxl345_t *s, uint8_t mask) {
 
 /* The sensors of the mask whose FIFO holds more than we let wait. */
 static uint8_t behind(const gf_adxl345_t *s, uint8_t mask) {
-  static const uint16_t out[1] = {(READ | GF_ADXL345_FIFO_STATUS) << 8};
+  static const uint16_t out[1] = {((uint32_t)READ | GF_ADXL345_FIFO_STATUS) << 8};
   uint16_t in[GF_SPI_DEVICES][GF_SPI_WORDS];
   uint8_t full = s->spi->exchange(s->spi->context, mask, out, in, 1);
   for (uint32_t i = 0; i < GF_SPI_DEVICES; i++) {
@@ -219,8 +219,8 @@ static void judge(gf_adxl345_test_t *test) {
   for (uint32_t i = 0; i < 12u; i++) {
     test->change[i] = (int16_t)((test->bent[i] - test->rest[i]) / GF_ADXL345_TEST_MEAN);
   }
-  for (uint32_t i = 0; i < GF_SPI_DEVICES; i++) {
-    if (has(test->tested, i) && is_response(&test->change[3u * i])) {
+  for (size_t i = 0; i < GF_SPI_DEVICES; i++) {
+    if (has(test->tested, (uint32_t)i) && is_response(&test->change[3u * i])) {
       test->passed = (uint8_t)(test->passed | (1u << i));
     }
   }

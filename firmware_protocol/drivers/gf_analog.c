@@ -16,6 +16,8 @@ uint8_t gf_analog_read(gf_analog_t *analog) {
       analog->counts[i] = values[i] > GF_ANALOG_FULL_SCALE ? (uint16_t)GF_ANALOG_FULL_SCALE : values[i];
     } else if (((uint32_t)analog->mask >> i & 1u) != 0u) {
       analog->missed[i]++;
+    } else {
+      /* not in use */
     }
   }
   return fresh;
