@@ -120,7 +120,7 @@ def test_chart_data_are_of_one_length_finite_and_end_with_the_mask():
     t = np.arange(0, 10, 0.01)
     curves = [Curve("a", "#56B4E9", t, np.sin(t), half=1e6 * np.ones_like(t)), Curve("b", "#D55E00", t[::7], t[::7])]
     data = _data(curves, 0.0, 10.0, 0)
-    assert len(data) == 1 + 3 + 1 + 1 and {len(array) for array in data} == {series.POINTS}
+    assert len(data) == 1 + 3 + 1 + 3 and {len(array) for array in data} == {series.POINTS}
     assert all(np.isfinite(array).all() for array in data) and not data[-1].any()
     assert data[2].max() < 20.0  # a band without bound does not press the curves flat
 
@@ -404,3 +404,27 @@ def test_browser_shows_the_cube_as_the_truth_has_it(bus):
             browser.close()
     finally:
         handle.stop()
+
+
+def test_what_comes_late_takes_its_place_and_is_marked():
+    """A hole in the rows of a chart is filled by late messages; an older past extends the axis to the left."""
+    store = Store()
+
+    def batch(k: int) -> pb.AccelBatch:
+        header = pb.Header(device="cube", sequence=k, run=1, utc_ns=10**18 + k * 100_000_000)
+        return pb.AccelBatch(header=header, period_s=0.1, axes=1, f_mps2=[float(k)])
+
+    for k in [*range(100, 120), *range(150, 160)]:
+        store.put(tp.ACCEL, "cube", "", batch(k))
+    device = store.device("cube")
+    store.put_late("cube", [(tp.ACCEL, "", batch(k)) for k in range(120, 150)], repaired=True)
+    t, rows = device.window("accel", "", -1.0, 10.0)
+    assert list(rows[:, 0]) == list(range(100, 160)) and np.allclose(t, np.arange(60) * 0.1)
+    assert len(device.late) == 1 and np.allclose(device.late[0], [2.0, 4.9])
+    store.put_late("cube", [(tp.ACCEL, "", batch(k)) for k in range(40, 110)], repaired=False)
+    t, rows = device.window("accel", "", -100.0, 10.0)
+    assert list(rows[:, 0]) == list(range(40, 160)) and device.t_first == pytest.approx(-6.0) and len(device.late) == 1
+    assert device.get("accel").message.header.sequence == 159
+    edges = np.linspace(0.0, 6.0, 13)
+    assert list(series.stretch_mask(device.late, edges)) == [0.0] * 8 + [1.0] * 12 + [0.0] * 4
+    assert list(np.flatnonzero(series.moment_mask([0.1, 5.9, 7.0], edges))) == [0, 22]

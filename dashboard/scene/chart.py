@@ -2,7 +2,8 @@
 
 uPlot's own legend knows values only under the cursor, so the heading takes its place. Known traps of the charts and
 what is done about them: NaN is never sent; the time axis is told that it is not a date; a gap is a grey series on a
-scale of its own, drawn last and opaque so that it covers the straight line beneath.
+scale of its own, drawn last and opaque so that it covers the straight line beneath. What was filled in after a loss has
+an amber strip at the bottom, and a note a vertical line, made the same way.
 """
 
 from collections.abc import Sequence
@@ -13,6 +14,9 @@ import viser
 
 from dashboard.scene import series
 from dashboard.scene.palette import number, rgba
+
+LATE_HEIGHT = 0.035  # of the strip that marks filled-in data, of the chart's height
+REPAIRED, MARK = "#e69f00", "#cc79a7"  # both of the colour-blind safe palette
 
 
 @dataclass
@@ -51,8 +55,21 @@ class Chart:
         with folder:
             self._heading = client.gui.add_html("", order=order)
 
-    def show(self, curves: Sequence[Curve], t0: float, t1: float, dark: bool, primary: int = 0) -> None:
-        """Draw the window [t0, t1]; gaps are those of the curve number `primary`."""
+    def show(
+        self,
+        curves: Sequence[Curve],
+        t0: float,
+        t1: float,
+        dark: bool,
+        primary: int = 0,
+        late: Sequence[Sequence[float]] = (),
+        marks: Sequence[float] = (),
+    ) -> None:
+        """Draw the window [t0, t1]; gaps are those of the curve number `primary`.
+
+        Stretches [from, until] of `late` get a strip at the bottom: filled in after a loss. Each of `marks` (s) gets a
+        line from top to bottom.
+        """
         heading = self._heading_html(curves)
         if self._heading.content != heading:
             self._heading.content = heading
@@ -61,7 +78,7 @@ class Chart:
             if self._plot is not None and self._plot.visible:
                 self._plot.visible = False
             return
-        data = _data(curves, t0, t1, min(primary, len(curves) - 1))
+        data = _data(curves, t0, t1, min(primary, len(curves) - 1), late, marks)
         signature = (dark, *((c.label, c.colour, c.half is not None, c.dash, c.width) for c in curves))
         if self._plot is None:
             self._build(curves, data, dark)
@@ -123,11 +140,20 @@ def _lines(curves: Sequence[Curve], dark: bool) -> tuple[tuple[dict, ...], tuple
             lines += [edge | {"label": f"{curve.label} +3σ"}, edge | {"label": f"{curve.label} −3σ"}]
     grey = "#3b3b3b" if dark else "#d5d5d5"
     gap = {"label": "gap", "scale": "gap", "stroke": grey, "width": 0, "fill": grey, "fillTo": 0}
-    lines.append(gap | {"points": {"show": False}})
+    strip = gap | {"label": "filled in", "stroke": REPAIRED, "fill": REPAIRED}
+    mark = gap | {"label": "mark", "stroke": MARK, "fill": MARK}
+    lines += [line | {"points": {"show": False}} for line in (strip, mark, gap)]
     return tuple(lines), tuple(bands) or None
 
 
-def _data(curves: Sequence[Curve], t0: float, t1: float, primary: int) -> tuple[np.ndarray, ...]:
+def _data(
+    curves: Sequence[Curve],
+    t0: float,
+    t1: float,
+    primary: int,
+    late: Sequence[Sequence[float]] = (),
+    marks: Sequence[float] = (),
+) -> tuple[np.ndarray, ...]:
     """The arrays of a chart: time, each curve with the edges of its band, and the gap mask; all of one length."""
     edges, x = series.grid(t0, t1)
     lines = [series.decimate(curve.t, curve.y, edges)[0] for curve in curves]
@@ -144,6 +170,8 @@ def _data(curves: Sequence[Curve], t0: float, t1: float, primary: int) -> tuple[
                 np.clip(centre + half, low - reach, high + reach),
                 np.clip(centre - half, low - reach, high + reach),
             ]
+    out.append(LATE_HEIGHT * series.stretch_mask(late, edges))
+    out.append(series.moment_mask(marks, edges))
     t = curves[primary].t
     out.append(series.gap_mask(t, edges, max(series.gap_limit(t), 2.5 * (edges[1] - edges[0]))))
     return tuple(out)

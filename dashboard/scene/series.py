@@ -5,6 +5,8 @@ buckets and each keeps the smallest and the largest value of a series. All serie
 uPlot wants one x array for all. uPlot draws a straight line across NaN, so a gap is told by a mask beside the values.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 POINTS = 400  # per series: two per bucket
@@ -60,3 +62,21 @@ def gap_mask(t: np.ndarray, edges: np.ndarray, gap_s: float) -> np.ndarray:
 def gap_limit(t: np.ndarray, least: float = 0.25) -> float:
     """The pause between samples above which a series counts as interrupted: five usual periods, at least `least` s."""
     return least if len(t) < 3 else max(least, 5.0 * float(np.median(np.diff(t))))
+
+
+def stretch_mask(stretches: Sequence[Sequence[float]], edges: np.ndarray) -> np.ndarray:
+    """1 inside the stretches [from, until], s, else 0; (2 b,) for b buckets, one bucket at least for each."""
+    inside = np.zeros(len(edges) - 1)
+    for begin, end in stretches:
+        if end >= edges[0] and begin <= edges[-1]:
+            first = max(np.searchsorted(edges, begin, side="right") - 1, 0)
+            inside[first : max(np.searchsorted(edges, end, side="right"), first + 1)] = 1.0
+    return np.repeat(inside, 2)
+
+
+def moment_mask(moments: Sequence[float], edges: np.ndarray) -> np.ndarray:
+    """1 at the first point of each bucket that holds one of the moments, s, else 0; (2 b,) for b buckets."""
+    mask = np.zeros(2 * (len(edges) - 1))
+    inside = [moment for moment in moments if edges[0] <= moment < edges[-1]]
+    mask[2 * (np.searchsorted(edges, np.array(inside), side="right") - 1)] = 1.0
+    return mask

@@ -15,7 +15,9 @@ from dashboard.scene.geometry import Track, ned_from_geodetic
 from messages import gyrofree_pb2 as pb
 from messages import topics as tp
 
-HISTORY_S = 320.0  # kept in the rings; the longest window a view offers is 300 s
+HISTORY_S = 620.0  # kept in the rings; the longest window a view offers is 600 s
+LATE_JOIN_S = 2.0  # repaired stretches nearer than this are one
+MARKS = 200  # notes and marks of a device that are drawn
 STALE_S = 1.0  # a value older than this is greyed
 FIXES_REMEMBERED = 100  # until the filter has said whether it believes them
 SLOW_STALE_S = {"link": 3.0, "status": 3.0, "estimator": 3.0, "board": 30.0, "gnss": 2.5, "innovation": 10.0}
@@ -39,12 +41,27 @@ class Ring:
         self._next = (self._next + 1) % len(self._rows)
         self.count = min(self.count + 1, len(self._rows))
 
+    def merge(self, rows: np.ndarray) -> None:
+        """Take in older rows (n, columns + 1), time first, in any order; at an equal time what is there stays."""
+        held = self.rows()
+        both = np.concatenate([held, rows])
+        order = np.argsort(both[:, 0], kind="stable")
+        both = both[order]
+        keep = np.append(True, np.diff(both[:, 0]) > 1e-6)
+        both = both[keep][-len(self._rows) :]
+        self._rows[: len(both)] = both
+        self.count = len(both)
+        self._next = self.count % len(self._rows)
+
+    def rows(self) -> np.ndarray:
+        """All rows, oldest first, time in the first column."""
+        if self.count < len(self._rows):
+            return self._rows[: self.count]
+        return np.concatenate([self._rows[self._next :], self._rows[: self._next]])
+
     def window(self, t0: float, t1: float) -> tuple[np.ndarray, np.ndarray]:
         """Times (n,) and values (n, columns) of the rows with t0 <= t <= t1, oldest first, copied."""
-        if self.count < len(self._rows):
-            rows = self._rows[: self.count]
-        else:
-            rows = np.concatenate([self._rows[self._next :], self._rows[: self._next]])
+        rows = self.rows()
         first, last = np.searchsorted(rows[:, 0], [t0, t1 + 1e-9])
         chosen = rows[first:last].copy()
         return chosen[:, 0], chosen[:, 1:]
@@ -84,6 +101,9 @@ class Device:
     tracks: dict[str, Track] = field(default_factory=dict)
     fixes: dict[int, tuple[float, ...]] = field(default_factory=dict)  # p_n of the newest, by sequence
     t_newest: float = 0.0
+    t_first: float = 0.0  # below zero when older data were fetched
+    late: list[list[float]] = field(default_factory=list)  # stretches [from, until] that were filled in, s
+    marks: list[tuple[float, str]] = field(default_factory=list)  # notes: when, s, and their text
     origin: tuple[float, float, float] | None = None  # latitude deg, longitude deg, height m of n's origin
     run: int = 0
     generation: int = 0  # counts the times everything was forgotten because time jumped back
@@ -144,6 +164,35 @@ class Store:
             else:
                 self._put_device(topic, device, estimator, message, arrived)
 
+    def put_late(self, name: str, messages: list[tuple[tp.Topic, str, Message]], repaired: bool) -> None:
+        """Take in older messages of a device: what the bus had lost (`repaired`), or what was before we listened."""
+        with self.lock:
+            known = self.devices.get(name)
+            if known is None:
+                return
+            shadow = Device(name, known.utc0_ns, latest=known.latest, origin=known.origin)
+            for topic, estimator, message in messages:
+                if "header" not in message.DESCRIPTOR.fields_by_name:
+                    continue
+                message.header.late = True
+                t = (message.header.utc_ns - known.utc0_ns) * 1e-9
+                if abs(t - known.t_newest) > HISTORY_S:
+                    continue
+                row = _ROWS.get(topic.name)
+                if row is not None:
+                    row(shadow, topic, estimator, t, message)
+                    known.t_first = min(known.t_first, t)
+                    if repaired and topic in (tp.ACCEL, tp.IMU):
+                        _stretch(known.late, t)
+                elif topic is tp.NOTE:
+                    _note(known, topic, estimator, t, message)
+                known.latest.setdefault((topic.name, estimator), Latest(message, 0.0, t))
+            for key, ring in shadow.rings.items():
+                if key in known.rings:
+                    known.rings[key].merge(ring.rows())
+                else:
+                    known.rings[key] = ring
+
     def _put_device(self, topic: tp.Topic, name: str, estimator: str, message: Message, arrived: float) -> None:
         utc_ns = message.header.utc_ns
         known = self.devices.get(name)
@@ -158,6 +207,8 @@ class Store:
             t = 0.0
         known.run = message.header.run or known.run
         known.latest[topic.name, estimator] = Latest(message, arrived, t)
+        if topic is tp.NOTE:
+            _note(known, topic, estimator, t, message)
         if row is not None:
             row(known, topic, estimator, t, message)
             known.t_newest = max(known.t_newest, t)
@@ -173,6 +224,21 @@ def _ring(device: Device, topic: tp.Topic, estimator: str, columns: int, rate: f
 def _sigmas(covariance: list[float]) -> list[float]:
     """Standard deviations of a row-major 3 x 3 covariance; NaN where there is none."""
     return list(np.sqrt(np.maximum(covariance[0::4], 0.0))) if len(covariance) == 9 else [np.nan] * 3
+
+
+def _stretch(late: list[list[float]], t: float) -> None:
+    """Add a moment to a list of stretches."""
+    for stretch in reversed(late[-20:]):
+        if stretch[0] - LATE_JOIN_S <= t <= stretch[1] + LATE_JOIN_S:
+            stretch[0], stretch[1] = min(stretch[0], t), max(stretch[1], t)
+            return
+    late.append([t, t])
+    del late[:-100]
+
+
+def _note(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.Note) -> None:
+    at = (m.at_utc_ns - device.utc0_ns) * 1e-9 if m.at_utc_ns else t
+    device.marks = [*device.marks, (at, m.text)][-MARKS:]
 
 
 def _three(values) -> list[float]:

@@ -12,7 +12,7 @@ from dashboard.scene.scene import LAYERS, Choice, SceneView
 from dashboard.scene.store import Device, Store
 from messages import gyrofree_pb2 as pb
 
-WINDOWS = {"10 s": 10.0, "30 s": 30.0, "60 s": 60.0, "5 min": 300.0}
+WINDOWS = {"10 s": 10.0, "30 s": 30.0, "60 s": 60.0, "5 min": 300.0, "10 min": 600.0}
 TRACK_S = 0.2  # trajectories grow five times a second
 
 
@@ -77,7 +77,7 @@ class View:
                 self._pause(False)  # the frozen window belongs to a time axis that is gone
             self._generation = device.generation
             t1 = device.t_newest if self._paused_at is None else self._paused_at
-            t0 = max(t1 - self._window_s, 0.0)
+            t0 = max(t1 - self._window_s, device.t_first)
             snapshot = Snapshot(self._store, device, t0, max(t1, t0 + 1.0), now, self._choice.dark)
             if not self._page_chosen:
                 self._open(PAGES.index(Position) if device.is_vehicle else 0)

@@ -52,7 +52,9 @@ class Panel:
 
     def show(self, key: str, title: str, unit: str, curves: Sequence[Curve], s: Snapshot, **options) -> None:
         """Draw a chart for the window of the snapshot."""
-        self.chart(key, title, unit, **options).show(curves, s.t0, s.t1, s.dark)
+        self.chart(key, title, unit, **options).show(
+            curves, s.t0, s.t1, s.dark, late=s.device.late, marks=[at for at, _ in s.device.marks]
+        )
 
     def html(self, content: str, handle: viser.GuiHtmlHandle | None) -> viser.GuiHtmlHandle:
         """Set an HTML element's content when it changed; make it at first use."""
