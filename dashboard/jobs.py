@@ -76,8 +76,8 @@ class Jobs:
             self._jobs[number] = job
             while len(self._jobs) > KEPT and next(iter(self._jobs.values())).ended is not None:
                 shutil.rmtree(self._jobs.popitem(last=False)[1].out, ignore_errors=True)
-        work = threading.Thread(target=self._run, args=(job, list(arguments), accept), name=f"job {number}", daemon=True)
-        work.start()
+        work = (job, list(arguments), accept)
+        threading.Thread(target=self._run, args=work, name=f"job {number}", daemon=True).start()
         return job
 
     def get(self, number: int) -> Job | None:

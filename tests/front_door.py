@@ -23,6 +23,7 @@ from dashboard.users import issue_link_token, write_private
 from sessions.catalogue import Catalogue
 
 PASSWORDS = {"vera": "looks only 1", "otto": "operates 22", "anna": "administers 3"}
+SERVICES = ("watch", "recorder", "replay", "jobs", "open_widgets")
 ROLES = {"vera": "viewer", "otto": "operator", "anna": "admin"}
 
 
@@ -51,7 +52,7 @@ class Door:
     """A served Front; `ahead` moves the clock of sign-ins forward, s."""
 
     def __init__(self, folder: Path, port: int, scene: bool = True, **options: Any) -> None:
-        services = {key: options.pop(key) for key in ("watch", "recorder", "replay", "open_widgets") if key in options}
+        services = {key: options.pop(key) for key in SERVICES if key in options}
         self.settings = DashboardSettings(
             port=port, users=folder / "users.json", sessions_root=folder / "sessions", **options
         )

@@ -4,7 +4,7 @@ The model of the plateaus, by weighted least squares over all of them:
 
     indicated_k = bias + scale_factor * reference_k + residual_k                                     (R-1)
     linearity   = max_k |residual_k| / full_scale * 1e6 ppm,  full_scale = max_k |reference_k|       (R-2)
-    asymmetry   = (SF+ - SF-) / mean(SF+, SF-) * 1e6 ppm, SF of each direction with (R-1) and the common bias  (R-3)
+    asymmetry   = (SF+ - SF-) / mean(SF+, SF-) * 1e6 ppm, from one fit with a slope for each direction     (R-3)
     cross-axis  = slope of omega_x, omega_y over the reference                                       (R-4)
 
 Standard errors of means are of batch means (0.5 s), since an estimate's errors are correlated in time.
@@ -104,18 +104,17 @@ def scale_factor(found: list[Plateau]) -> ScaleFactor | None:
         bias=float(bias),
         bias_sigma=float(np.sqrt(inverse[0, 0]) * spread),
         linearity_ppm=float(np.abs(residual).max() / np.abs(levels).max() * 1e6),
-        asymmetry_ppm=_asymmetry(levels, indicated - bias),
+        asymmetry_ppm=_asymmetry(levels, indicated, sigma),
         cross_axis=cross,
         residual=residual,
     )
 
 
-def _asymmetry(levels: Array, indicated: Array) -> float | None:
-    """(R-3); None unless the table turned both ways."""
-    slopes = []
-    for sign in (1.0, -1.0):
-        at = sign * levels > np.radians(5.0)
-        if not at.any():
-            return None
-        slopes.append(float((levels[at] @ indicated[at]) / (levels[at] @ levels[at])))
-    return (slopes[0] - slopes[1]) / (0.5 * (slopes[0] + slopes[1])) * 1e6
+def _asymmetry(levels: Array, indicated: Array, sigma: Array) -> float | None:
+    """(R-3) from indicated = bias + s w + c |w|: SF+ = s + c, SF- = s - c; None where three levels do not tell."""
+    design = np.column_stack([np.ones_like(levels), levels, np.abs(levels)]) / sigma[:, None]
+    both = levels.max() > np.radians(5.0) and levels.min() < -np.radians(5.0)
+    if not both or np.linalg.matrix_rank(design, tol=1e-6 * np.abs(design).max()) < 3:
+        return None
+    _, slope, uneven = np.linalg.lstsq(design, indicated / sigma, rcond=None)[0]
+    return float(2.0 * uneven / slope * 1e6)
