@@ -55,6 +55,6 @@ def test_every_deviation_says_why():
 @needs("clang-tidy")
 def test_clang_tidy_is_clean():
     done = subprocess.run(
-        ["clang-tidy", "--quiet", *FILES, "--", "--target=arm-none-eabi", "-mcpu=cortex-m3", "-mthumb", "-ffreestanding",
-         "-std=c99", *INCLUDES], cwd=FIRMWARE, capture_output=True, text=True, timeout=250)
+        ["clang-tidy", "--quiet", *FILES, "--", "--target=arm-none-eabi", "-mcpu=cortex-m3", "-mthumb",
+         "-ffreestanding", "-std=c99", *INCLUDES], cwd=FIRMWARE, capture_output=True, text=True, timeout=250)
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-500:]
