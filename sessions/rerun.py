@@ -4,6 +4,7 @@ The new session stands beside the old one, so that both can be reported, compare
 receive time of the input they follow from.
 """
 
+import shutil
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -60,18 +61,24 @@ def write_session(
     """
     check_id(session)
     store: SessionStore | None = None
-    for log_ns, key, payload in rows:
+    try:
+        for log_ns, key, payload in rows:
+            if store is None:
+                store = _open(root, session, log_ns, note, configuration)
+            store.add(log_ns, key, payload)
+            if store.messages % 2000 == 0:
+                store.flush()
+                if store.error:
+                    raise SessionError(store.error)
         if store is None:
-            store = _open(root, session, log_ns, note, configuration)
-        store.add(log_ns, key, payload)
-        if store.messages % 2000 == 0:
-            store.flush()
-            if store.error:
-                raise SessionError(store.error)
-    if store is None:
-        raise SessionError(f"session {session}: no message to write")
-    if not store.close():
-        raise SessionError(store.error)
+            raise SessionError(f"session {session}: no message to write")
+        if not store.close():
+            raise SessionError(store.error)
+    except BaseException:
+        if store is not None:  # half a session would look like one that a crash cut off
+            store.close()
+            shutil.rmtree(store.folder, ignore_errors=True)
+        raise
     return store.folder
 
 
