@@ -517,7 +517,7 @@ class AttitudeEstimate(_message.Message):
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., for_sequence: _Optional[int] = ..., for_index: _Optional[int] = ..., q_nb: _Optional[_Iterable[float]] = ..., inclination_sigma_rad: _Optional[float] = ..., bias_omega_b_radps: _Optional[_Iterable[float]] = ..., resting: _Optional[bool] = ..., heading_known: _Optional[bool] = ...) -> None: ...
 
 class AxisHealth(_message.Message):
-    __slots__ = ("header", "layout", "axes", "chi2", "dof", "message")
+    __slots__ = ("header", "layout", "axes", "chi2", "dof", "message", "scale_m")
     class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATE_GOOD: _ClassVar[AxisHealth.State]
@@ -539,7 +539,7 @@ class AxisHealth(_message.Message):
     STATE_STALE: AxisHealth.State
     STATE_SUSPECT: AxisHealth.State
     class Axis(_message.Message):
-        __slots__ = ("name", "state", "excluded", "residual_mps2", "residual_sigma_mps2", "since_utc_ns", "text")
+        __slots__ = ("name", "state", "excluded", "residual_mps2", "residual_sigma_mps2", "since_utc_ns", "text", "position_b_m", "direction_b")
         NAME_FIELD_NUMBER: _ClassVar[int]
         STATE_FIELD_NUMBER: _ClassVar[int]
         EXCLUDED_FIELD_NUMBER: _ClassVar[int]
@@ -547,6 +547,8 @@ class AxisHealth(_message.Message):
         RESIDUAL_SIGMA_MPS2_FIELD_NUMBER: _ClassVar[int]
         SINCE_UTC_NS_FIELD_NUMBER: _ClassVar[int]
         TEXT_FIELD_NUMBER: _ClassVar[int]
+        POSITION_B_M_FIELD_NUMBER: _ClassVar[int]
+        DIRECTION_B_FIELD_NUMBER: _ClassVar[int]
         name: str
         state: AxisHealth.State
         excluded: bool
@@ -554,20 +556,24 @@ class AxisHealth(_message.Message):
         residual_sigma_mps2: float
         since_utc_ns: int
         text: str
-        def __init__(self, name: _Optional[str] = ..., state: _Optional[_Union[AxisHealth.State, str]] = ..., excluded: _Optional[bool] = ..., residual_mps2: _Optional[float] = ..., residual_sigma_mps2: _Optional[float] = ..., since_utc_ns: _Optional[int] = ..., text: _Optional[str] = ...) -> None: ...
+        position_b_m: _containers.RepeatedScalarFieldContainer[float]
+        direction_b: _containers.RepeatedScalarFieldContainer[float]
+        def __init__(self, name: _Optional[str] = ..., state: _Optional[_Union[AxisHealth.State, str]] = ..., excluded: _Optional[bool] = ..., residual_mps2: _Optional[float] = ..., residual_sigma_mps2: _Optional[float] = ..., since_utc_ns: _Optional[int] = ..., text: _Optional[str] = ..., position_b_m: _Optional[_Iterable[float]] = ..., direction_b: _Optional[_Iterable[float]] = ...) -> None: ...
     HEADER_FIELD_NUMBER: _ClassVar[int]
     LAYOUT_FIELD_NUMBER: _ClassVar[int]
     AXES_FIELD_NUMBER: _ClassVar[int]
     CHI2_FIELD_NUMBER: _ClassVar[int]
     DOF_FIELD_NUMBER: _ClassVar[int]
     MESSAGE_FIELD_NUMBER: _ClassVar[int]
+    SCALE_M_FIELD_NUMBER: _ClassVar[int]
     header: Header
     layout: str
     axes: _containers.RepeatedCompositeFieldContainer[AxisHealth.Axis]
     chi2: float
     dof: int
     message: str
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., layout: _Optional[str] = ..., axes: _Optional[_Iterable[_Union[AxisHealth.Axis, _Mapping]]] = ..., chi2: _Optional[float] = ..., dof: _Optional[int] = ..., message: _Optional[str] = ...) -> None: ...
+    scale_m: float
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., layout: _Optional[str] = ..., axes: _Optional[_Iterable[_Union[AxisHealth.Axis, _Mapping]]] = ..., chi2: _Optional[float] = ..., dof: _Optional[int] = ..., message: _Optional[str] = ..., scale_m: _Optional[float] = ...) -> None: ...
 
 class CalibrationStatus(_message.Message):
     __slots__ = ("header", "state", "instruction", "progress", "poses", "bias_sigma_mps2", "scale_sigma", "good_enough", "residual_mps2", "card", "message", "next_up_b")
