@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable
 from importlib import metadata
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from google.protobuf.message import Message
@@ -17,6 +18,7 @@ from google.protobuf.message import Message
 from estimator import convert
 from estimator.attitude.board import AttitudeBoard
 from estimator.attitude.filters import ATTITUDES
+from estimator.calibration.card import Card, CardError, read_card
 from estimator.ins.board import NavBoard
 from estimator.ins.navigation import NAVIGATORS, Correction, Mode, NavigatorConfig
 from estimator.rate.board import RateBoard, WrongAxes
@@ -62,6 +64,8 @@ class Pipeline:
         for layout in (settings.layout, *settings.layouts.values()):
             if layout.file:  # a wrong file is refused at the start, not at the first sample
                 make_layout(layout)
+        for path in filter(None, (settings.calibration, *settings.calibrations.values())):
+            load_card(path)
         self._settings = settings
         self._clock = clock
         self._boards: dict[str, RateBoard] = {}
@@ -82,12 +86,12 @@ class Pipeline:
         device = batch.header.device
         board = self._boards.get(device)
         if board is None:
-            layout = make_layout(self._settings.layout_of(device))
-            board = RateBoard(device, layout, self._settings.rate, self._settings.rate_limit_hz)
-            self._boards[device] = board
+            board = self._boards[device] = self._board(device)
         started = self._clock()
         try:
-            states = board.feed(batch.header.epoch, batch.first_index, batch.period_s, samples.t_s, samples.values)
+            states = board.feed(
+                batch.header.epoch, batch.first_index, batch.period_s, samples.t_s, samples.values, batch.stale_mask
+            )
         except WrongAxes as error:
             raise convert.BadMessage(str(error)) from None
         self._cost.add(device, self._clock() - started, len(samples.t_s))
@@ -95,15 +99,31 @@ class Pipeline:
         out = []
         for row, index, name, state in ((o.row, o.index, o.estimator, o.state) for o in states):
             header = convert.sample_header(batch.header, row * batch.period_s)
-            out.append(Output(RATE, device, name, convert.rate_message(header, batch, index, name, state)))
+            rate = convert.rate_message(header, batch, index, name, state)
+            rate.calibration = "" if board.card is None else board.card.id
+            out.append(Output(RATE, device, name, rate))
             if index % pose_step == pose_step - 1:
                 pose = convert.pose_message(header, name, NO_TRANSLATION, state.q_nb)
                 out.append(Output(POSE, device, name, pose))
+        if self._new_second(device, "axes", AXES.rate * samples.t_s[-1]):
+            header = convert.sample_header(batch.header, (len(samples.t_s) - 1) * batch.period_s)
+            axes = convert.axes_message(header, board.layout, board.health, float(samples.t_s[-1]))
+            out.append(Output(AXES, device, "", axes))
         if self._new_second(device, "accel", samples.t_s[-1]):
             header = convert.sample_header(batch.header, (len(samples.t_s) - 1) * batch.period_s)
             for name in self._settings.rate:
                 out.append(Output(ESTIMATOR, device, name, self._rate_status(header, board, name)))
         return out
+
+    def _board(self, device: str) -> RateBoard:
+        """Rate estimators of a device, with its calibration card; raises convert.BadMessage for another layout's."""
+        path = self._settings.card_of(device)
+        card = load_card(path) if path is not None else None
+        layout = make_layout(self._settings.layout_of(device))
+        try:
+            return RateBoard(device, layout, self._settings.rate, self._settings.rate_limit_hz, card)
+        except CardError as error:
+            raise convert.BadMessage(f"{device}: {error}") from None
 
     def on_imu(self, batch: pb.ImuBatch) -> list[Output]:
         """Solutions, poses, corrections that became due and, once per second of data, the health of each filter."""
@@ -232,6 +252,14 @@ def check_names(key: str, names: list[str], known: dict[str, Any]) -> None:
     for name in names:
         if name not in known:
             raise UnknownEstimator(f"[estimator] {key}: no estimator {name!r}; want some of {', '.join(known)}")
+
+
+def load_card(path: Path) -> Card:
+    """A calibration card; raises UnknownEstimator for a file that is none or cannot be read."""
+    try:
+        return read_card(path)
+    except (CardError, OSError) as error:
+        raise UnknownEstimator(f"[estimator] calibration: {error}") from None
 
 
 def make_layout(settings: LayoutSettings) -> Any:

@@ -44,6 +44,9 @@ class EstimatorSettings(BaseModel):
     attitudes: list[str] = Field(default_factory=lambda: ["vqf", "tilt-vector", "tilt-published"])  # tilt of six axes
     layout: LayoutSettings = LayoutSettings()  # of a device that layouts does not name
     layouts: dict[str, LayoutSettings] = Field(default_factory=dict)  # by device name
+    calibration: Path | None = None  # calibration card of a device that calibrations does not name
+    calibrations: dict[str, Path] = Field(default_factory=dict)  # calibration cards by device name
+    cards: Path = Path("var/cards")  # folder that a guided calibration saves its cards to
     vehicle: VehicleSettings = VehicleSettings()  # of a device that vehicles does not name
     vehicles: dict[str, VehicleSettings] = Field(default_factory=dict)  # by device name
     use_every_fix: int = Field(default=1, ge=1, le=1000)  # n: filters get one fix in n, the others only score them
@@ -57,6 +60,10 @@ class EstimatorSettings(BaseModel):
     def layout_of(self, device: str) -> LayoutSettings:
         """Accelerometer layout of a device."""
         return self.layouts.get(device, self.layout)
+
+    def card_of(self, device: str) -> Path | None:
+        """Calibration card of a device."""
+        return self.calibrations.get(device, self.calibration)
 
     def vehicle_of(self, device: str) -> VehicleSettings:
         """Vehicle of a device."""

@@ -31,35 +31,55 @@ class RateOutput:
 class RateBoard:
     """Feeds batches to every estimator; tells them of gaps, starts them anew after a reboot."""
 
-    def __init__(self, device: str, layout: Any, names: list[str], rate_limit_hz: float) -> None:
-        """Names are keys of estimator.rate.ESTIMATORS."""
+    def __init__(
+        self, device: str, layout: Any, names: list[str], rate_limit_hz: float, card: Any | None = None
+    ) -> None:
+        """Names are keys of estimator.rate.ESTIMATORS; card: calibration card of the device, or None.
+
+        Raises CardError for the card of another layout.
+        """
         from estimator.rate.estimators import ESTIMATORS  # here: loads only where accelerometers are
 
         self.device = device
-        self.layout = layout
+        self.card = card
+        self.wiring = layout  # which column of the board is which axis
+        self.layout = layout if card is None else card.layout(layout)
         self.stream = Stream()
         self.last: dict[str, Any] = {}  # newest RateState by estimator
         self._make = {name: ESTIMATORS[name] for name in names}
         self._limit = rate_limit_hz
         self._estimators: dict[str, Any] = {}
         self._last_t: float | None = None
+        self._period_s = 0.01
+        self.health: Any = None  # estimator.rate.health.HealthMonitor
+        self._mask = 0  # axes that the estimators were told to leave out
 
     def _start(self, reason: str) -> None:
+        from estimator.rate.health import HealthMonitor  # here: it compiles
+
         if reason:
             log.warning("%s: %s: rate estimators start anew", self.device, reason)
         self._estimators = {name: make(self.layout) for name, make in self._make.items()}
+        self.health, self._mask = HealthMonitor(self.layout, self._period_s), 0
 
-    def feed(self, epoch: int, first_index: int, period_s: float, t_s: Array, f_axis: Array) -> list[RateOutput]:
-        """Step through a batch: times (n,) in s of the board's clock, axis readings (n, axes) in m/s^2.
+    def feed(
+        self, epoch: int, first_index: int, period_s: float, t_s: Array, f_axis: Array, stale: int = 0
+    ) -> list[RateOutput]:
+        """Step through a batch: times (n,) in s of the board's clock, its columns (n, columns) in m/s^2.
 
-        Raises WrongAxes.
+        Bit k of `stale`: column k was not fresh. Raises WrongAxes.
         """
-        axes = len(self.layout.theta_b)
+        axes = self.wiring.columns
         if f_axis.shape[1] != axes:
             raise WrongAxes(
                 f"{self.device}: batches of {f_axis.shape[1]} axes, layout {self.layout.name} has {axes}: "
                 f"name the right one in [estimator] layouts"
             )
+        f_axis = self.wiring.read(f_axis)
+        stale = sum((stale >> column & 1) << k for k, column in enumerate(self.wiring.channels)) if stale else 0
+        if self.card is not None:
+            f_axis = self.card.correct(f_axis)
+        self._period_s = period_s
         admission = self.stream.admit(epoch, first_index, len(t_s))
         if admission.restart or not self._estimators:
             self._start(admission.reason)
@@ -70,6 +90,7 @@ class RateBoard:
                             self.stream.gaps)  # fmt: skip
             for estimator in self._estimators.values():
                 estimator.skip(admission.missing)
+            self.health.skip(admission.missing)
         if self._last_t is not None and not t_s[0] > self._last_t:
             self._start(f"board clock went from {self._last_t:.6f} s to {t_s[0]:.6f} s")
         self._last_t = float(t_s[-1])
@@ -77,8 +98,22 @@ class RateBoard:
         out = []
         for row in range(len(t_s)):
             index = first_index + row
+            self.health.step(float(t_s[row]), f_axis[row], stale)
+            self._exclude(self.health.mask)
             for name, estimator in self._estimators.items():
                 state = self.last[name] = estimator.step(index, float(t_s[row]), f_axis[row])
                 if index % step == step - 1:
                     out.append(RateOutput(row, index, name, state))
         return out
+
+    def _exclude(self, mask: int) -> None:
+        """Tell the estimators when the axes they may use have changed; one that cannot do without says so itself."""
+        if mask == self._mask:
+            return
+        names = [name for k, name in enumerate(self.wiring.axis_names) if mask >> k & 1]
+        log.warning("%s: axes not used: %s", self.device, ", ".join(names) or "none, all are good again")
+        self._mask = mask
+        for estimator in self._estimators.values():
+            exclude = getattr(estimator, "exclude", None)
+            if exclude is not None:
+                exclude(mask)
