@@ -152,6 +152,32 @@ def attitude_message(header: pb.Header, batch: pb.ImuBatch, index: int, name: st
     )
 
 
+def axes_message(header: pb.Header, layout: Any, monitor: Any, now_s: float) -> pb.AxisHealth:
+    """HealthMonitor as published; header is for the sample at now_s (s, board's clock)."""
+    newest = monitor.newest
+    message = pb.AxisHealth(
+        header=header,
+        layout=layout.name,
+        chi2=float(newest.nis),
+        dof=max(0, int(newest.degrees) - 6),
+        message=monitor.message,
+        scale_m=layout.scale_m,
+    )
+    for i, fault in enumerate(monitor.faults):
+        message.axes.add(
+            name=layout.axis_names[i],
+            state=int(fault.state),
+            excluded=fault.excluded,
+            residual_mps2=float(newest.residual[i]),
+            residual_sigma_mps2=float(newest.sigma[i]),
+            since_utc_ns=header.utc_ns + round((fault.since_s - now_s) * 1e9),
+            text=fault.text,
+            position_b_m=as_list(layout.r_b[i]),
+            direction_b=as_list(layout.theta_b[i]),
+        )
+    return message
+
+
 def pose_message(header: pb.Header, name: str, p_n_m: Iterable[float], q_nb: Iterable[float]) -> FrameTransform:
     """Body against n as any viewer draws it: parent <device>/n, child <device>/<estimator>."""
     message = FrameTransform(parent_frame_id=f"{header.device}/n", child_frame_id=f"{header.device}/{name}")

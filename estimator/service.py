@@ -21,17 +21,32 @@ from estimator.attitude.filters import ATTITUDES
 from estimator.calibration.card import Card, CardError, read_card
 from estimator.ins.board import NavBoard
 from estimator.ins.navigation import NAVIGATORS, Correction, Mode, NavigatorConfig
+from estimator.orders import CalibrationDesk
 from estimator.rate.board import RateBoard, WrongAxes
 from estimator.settings import EstimatorSettings, LayoutSettings
 from estimator.stream import Stream, every
 from messages import gyrofree_pb2 as pb
 from messages.bus import BusSettings
-from messages.topics import ACCEL, ATTITUDE, ESTIMATOR, GNSS, IMU, INNOVATION, NAV, POSE, RATE, Topic
+from messages.topics import (
+    ACCEL,
+    ATTITUDE,
+    AXES,
+    CALIBRATION,
+    ESTIMATOR,
+    GNSS,
+    IMU,
+    INNOVATION,
+    NAV,
+    POSE,
+    RATE,
+    TACHO,
+    Topic,
+)
 
 log = logging.getLogger(__name__)
 
 POSE_HZ = 20.0
-INPUTS = (ACCEL, IMU, GNSS)
+INPUTS = (ACCEL, IMU, GNSS, TACHO)
 NO_TRANSLATION = (0.0, 0.0, 0.0)  # a cube on its table turns and stays
 STATES = {
     Mode.WAITING: "waiting for samples",
@@ -72,13 +87,27 @@ class Pipeline:
         self._vehicles: dict[str, NavBoard] = {}
         self._attitudes: dict[str, AttitudeBoard] = {}
         self._clock_offset: dict[str, float] = {}
+        self._desk = CalibrationDesk(settings.cards)
         self._cost = _Cost()
         self._second: dict[tuple[str, str], int] = {}
 
     def on(self, topic: Topic, message: Message) -> list[Output]:
         """Take one message of any topic; raises convert.BadMessage for one that cannot be used."""
-        handler = {ACCEL: self.on_accel, IMU: self.on_imu, GNSS: self.on_gnss}.get(topic)
+        handler = {ACCEL: self.on_accel, IMU: self.on_imu, GNSS: self.on_gnss, TACHO: self.on_tacho}.get(topic)
         return handler(message) if handler else []
+
+    def order(self, command: pb.EstimatorCommand) -> tuple[pb.Reply, list[Output]]:
+        """Do what a person asked the estimator of a device for; never raises for an order that cannot be followed."""
+        device, before = command.device, self._desk.used.get(command.device)
+        reply, status = self._desk.order(command, make_layout(self._settings.layout_of(device)))
+        if self._desk.used.get(device) is not before or command.action == pb.EstimatorCommand.ACTION_USE_CARD:
+            self._boards.pop(device, None)  # the estimators begin anew with the other card
+        return reply, [] if status is None else [Output(CALIBRATION, device, "", status)]
+
+    def on_tacho(self, message: pb.TachoRate) -> list[Output]:
+        """A report of the tachometer: table runs of a guided calibration need it."""
+        self._desk.tacho(message)
+        return []
 
     def on_accel(self, batch: pb.AccelBatch) -> list[Output]:
         """Rate estimates, poses and, once per second of data, the health of each estimator."""
@@ -113,12 +142,16 @@ class Pipeline:
             header = convert.sample_header(batch.header, (len(samples.t_s) - 1) * batch.period_s)
             for name in self._settings.rate:
                 out.append(Output(ESTIMATOR, device, name, self._rate_status(header, board, name)))
+        status = self._desk.feed(batch, samples, board.nominal)
+        if status is not None:
+            out.append(Output(CALIBRATION, device, "", status))
         return out
 
     def _board(self, device: str) -> RateBoard:
         """Rate estimators of a device, with its calibration card; raises convert.BadMessage for another layout's."""
         path = self._settings.card_of(device)
         card = load_card(path) if path is not None else None
+        card = self._desk.used.get(device, card)
         layout = make_layout(self._settings.layout_of(device))
         try:
             return RateBoard(device, layout, self._settings.rate, self._settings.rate_limit_hz, card)
