@@ -13,6 +13,7 @@ COPY gateway gateway
 COPY estimator estimator
 COPY sessions sessions
 COPY dashboard dashboard
+COPY emulator emulator
 COPY gyrofree gyrofree
 # Editable, as `make setup` does it: what runs is the folders above, with their templates and sub-packages.
 RUN pip install --no-deps --no-build-isolation --editable .
