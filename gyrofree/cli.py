@@ -69,6 +69,10 @@ def demo(
     bus_port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the Zenoh router.")] = 7447,
     folder: Annotated[Path, typer.Option(help="Where journal, recordings and users are kept.")] = Path("var/demo"),
     record: Annotated[bool, typer.Option(help="Record from the start.")] = True,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(help="With --source table: spoil an axis, as a21:stuck@12, a13:swapped=a21@12 (docs/layouts.md)."),
+    ] = None,
 ) -> None:
     """Start router, gateway, estimator, recorder, dashboard and a board, and print one URL.
 
@@ -77,7 +81,8 @@ def demo(
     from gyrofree import demo as demonstration
 
     if source == "table":
-        board, device, layout = ["simulate"], "cube", "cube"
+        _faults(fault)  # a wrong one is said here, not in the board's log
+        board, device, layout = ["simulate", *(w for f in fault or () for w in ("--fault", f))], "cube", "cube"
     elif source == "emulated":
         cli_board.check()
         board, device, layout = ["board", "--emulate", "--speed", str(speed)], "cube", "cube"
@@ -92,6 +97,19 @@ def demo(
     demonstration.run(
         demonstration.Plan(folder.absolute(), board, device, layout, port, bus_port, record=record, time_scale=scale)
     )
+
+
+def _faults(texts: list[str] | None) -> tuple:
+    """Faults of the cube's axes; one that cannot be ends the command."""
+    if not texts:
+        return ()
+    from estimator.layouts.layout import CUBE
+    from estimator.simulation.faults import FaultError, parse
+
+    try:
+        return tuple(parse(text, CUBE(0.05).axis_names) for text in texts)
+    except FaultError as error:
+        raise fail(str(error), CONFIG) from None
 
 
 def _check_log(path: Path, gnss: Path | None = None) -> str:
@@ -188,6 +206,10 @@ def simulate(
     seed: Annotated[int, typer.Option(help="Seed of biases, scale errors and noise.")] = 1,
     device: Annotated[str, typer.Option(help="Device name under which the truth is published.")] = "cube",
     once: Annotated[bool, typer.Option(help="End after one run of the profile.")] = False,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(help="Spoil an axis, as a21:stuck@12, a13:biased=0.8@12-20, a13:swapped=a21@12 (docs/layouts.md)."),
+    ] = None,
     csv: Annotated[
         Path | None, typer.Option(help="Be no board: write one run with its truth to this CSV, for `gyrofree run`.")
     ] = None,
@@ -203,6 +225,7 @@ def simulate(
     settings = settings_of(config)
     from estimator.simulation.profiles import named
 
+    faults = _faults(fault)
     try:
         profile_name = named(profile).name
         if csv is not None:
@@ -216,7 +239,7 @@ def simulate(
     def body(stop: threading.Event) -> None:
         from gyrofree import simulate as simulator
 
-        simulator.run(simulator.Options(link, tcp, profile_name, seed, device, once), settings.bus, stop)
+        simulator.run(simulator.Options(link, tcp, profile_name, seed, device, once, faults), settings.bus, stop)
 
     run_service(body, verbose)
 

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from pynmeagps import GET, NMEAMessage
 
+from estimator.simulation.faults import AxisFault, Faults
 from estimator.simulation.table import BLOCK, TableTest, Truth
 from gateway.board_link import PtyLink, TcpLink
 from gateway.virtual_board import SIMULATED, BoardAccel, BoardBytes, BoardPulse, Item, VirtualBoard
@@ -44,6 +45,7 @@ class Options:
     seed: int
     device: str
     once: bool
+    faults: tuple[AxisFault, ...] = ()  # of single axes, in every run of the profile
 
 
 class TruthPublisher:
@@ -121,10 +123,10 @@ def _receiver(seed: int) -> Iterator[BoardBytes]:
         yield BoardBytes(number * GPS_PERIOD + 0.005, sentences(noise, datetime.datetime.now(datetime.UTC)))
 
 
-def _table(test: TableTest, truths: TruthPublisher) -> Iterator[Item]:
+def _table(test: TableTest, truths: TruthPublisher, faults: Faults) -> Iterator[Item]:
     """Samples and pulses in time order; the truth leaves as its sample does."""
     for number in itertools.count():
-        block = test.block(number)
+        block = faults.into(test.block(number))
         end = block.t_s[-1] + test.period_s
         pulses = iter(test.pulses(float(block.t_s[0]), float(end)))
         pulse = next(pulses, None)
@@ -150,7 +152,7 @@ def run(options: Options, bus: BusSettings, stop: threading.Event) -> None:
     try:
         for run_number in itertools.count():
             test = TableTest(seed=options.seed, profile=options.profile, run=run_number)
-            _one_run(test, link, truths, (first + run_number) & 0xFF, options.seed, stop)
+            _one_run(test, link, truths, (first + run_number) & 0xFF, options, stop)
             if options.once or stop.is_set():
                 return
     finally:
@@ -158,12 +160,12 @@ def run(options: Options, bus: BusSettings, stop: threading.Event) -> None:
 
 
 def _one_run(
-    test: TableTest, link: PtyLink | TcpLink, truths: TruthPublisher, epoch: int, seed: int, stop: threading.Event
+    test: TableTest, link: PtyLink | TcpLink, truths: TruthPublisher, epoch: int, options: Options, stop: threading.Event
 ) -> None:
     """One test: the board boots on the still table, and the estimators begin as the published test did."""
     truths.begin(epoch)
     board = VirtualBoard(link, SIMULATED, epoch=epoch, firmware="simulated table")
-    items = heapq.merge(_table(test, truths), _receiver(seed), key=lambda item: item.t_s)
+    items = heapq.merge(_table(test, truths, Faults(options.faults)), _receiver(options.seed), key=lambda item: item.t_s)
     started = time.monotonic()
     board.run(itertools.takewhile(lambda item: item.t_s < test.profile.seconds, items), stop, wait_for_reader=True)
     log.info("run ended: %d samples, %d frames built, %d dropped", board.samples, board.built, board.dropped)
