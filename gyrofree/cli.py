@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from gyrofree import cli_board, cli_calibrate, cli_handover, cli_layout, cli_run, cli_sessions, cli_users
-from gyrofree.cli_options import AsJson, Config, Speed, Verbose, settings_of
+from gyrofree.cli_options import AsJson, Config, Fault, Speed, Verbose, faults_of, settings_of
 from gyrofree.config import ConfigError
 from gyrofree.process import EXIT_CONFIG as CONFIG
 from gyrofree.process import EXIT_FAILED, fail, run_service
@@ -69,10 +69,7 @@ def demo(
     bus_port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the Zenoh router.")] = 7447,
     folder: Annotated[Path, typer.Option(help="Where journal, recordings and users are kept.")] = Path("var/demo"),
     record: Annotated[bool, typer.Option(help="Record from the start.")] = True,
-    fault: Annotated[
-        list[str] | None,
-        typer.Option(help="With --source table: spoil an axis, as a21:stuck@12, a13:swapped=a21@12 (docs/layouts.md)."),
-    ] = None,
+    fault: Fault = None,
 ) -> None:
     """Start router, gateway, estimator, recorder, dashboard and a board, and print one URL.
 
@@ -81,7 +78,7 @@ def demo(
     from gyrofree import demo as demonstration
 
     if source == "table":
-        _faults(fault)  # a wrong one is said here, not in the board's log
+        faults_of(fault)  # a wrong one is said here, not in the board's log
         board, device, layout = ["simulate", *(w for f in fault or () for w in ("--fault", f))], "cube", "cube"
     elif source == "emulated":
         cli_board.check()
@@ -97,19 +94,6 @@ def demo(
     demonstration.run(
         demonstration.Plan(folder.absolute(), board, device, layout, port, bus_port, record=record, time_scale=scale)
     )
-
-
-def _faults(texts: list[str] | None) -> tuple:
-    """Faults of the cube's axes; one that cannot be ends the command."""
-    if not texts:
-        return ()
-    from estimator.layouts.layout import CUBE
-    from estimator.simulation.faults import FaultError, parse
-
-    try:
-        return tuple(parse(text, CUBE(0.05).axis_names) for text in texts)
-    except FaultError as error:
-        raise fail(str(error), CONFIG) from None
 
 
 def _check_log(path: Path, gnss: Path | None = None) -> str:
@@ -206,10 +190,7 @@ def simulate(
     seed: Annotated[int, typer.Option(help="Seed of biases, scale errors and noise.")] = 1,
     device: Annotated[str, typer.Option(help="Device name under which the truth is published.")] = "cube",
     once: Annotated[bool, typer.Option(help="End after one run of the profile.")] = False,
-    fault: Annotated[
-        list[str] | None,
-        typer.Option(help="Spoil an axis, as a21:stuck@12, a13:biased=0.8@12-20, a13:swapped=a21@12 (docs/layouts.md)."),
-    ] = None,
+    fault: Fault = None,
     csv: Annotated[
         Path | None, typer.Option(help="Be no board: write one run with its truth to this CSV, for `gyrofree run`.")
     ] = None,
@@ -225,7 +206,7 @@ def simulate(
     settings = settings_of(config)
     from estimator.simulation.profiles import named
 
-    faults = _faults(fault)
+    faults = faults_of(fault)
     try:
         profile_name = named(profile).name
         if csv is not None:

@@ -30,3 +30,22 @@ def settings_of(path: Path | None) -> Settings:
 def show_table(table: Table) -> None:
     """On standard output; wide where that is a file or a pipe, which has no width of its own."""
     Console(file=sys.stdout, width=None if sys.stdout.isatty() else 160).print(table)
+
+
+Fault = Annotated[
+    list[str] | None,
+    typer.Option(help="Spoil an axis of the simulated cube, as a21:stuck@12 or a13:swapped=a21@12-20 (docs/layouts.md)."),
+]
+
+
+def faults_of(texts: list[str] | None) -> tuple:
+    """Faults of the simulated cube's axes; one that cannot be ends the command."""
+    if not texts:
+        return ()
+    from estimator.layouts.layout import CUBE
+    from estimator.simulation.faults import FaultError, parse
+
+    try:
+        return tuple(parse(text, CUBE(0.05).axis_names) for text in texts)
+    except FaultError as error:
+        raise fail(str(error), EXIT_CONFIG) from None

@@ -160,12 +160,18 @@ def run(options: Options, bus: BusSettings, stop: threading.Event) -> None:
 
 
 def _one_run(
-    test: TableTest, link: PtyLink | TcpLink, truths: TruthPublisher, epoch: int, options: Options, stop: threading.Event
+    test: TableTest,
+    link: PtyLink | TcpLink,
+    truths: TruthPublisher,
+    epoch: int,
+    options: Options,
+    stop: threading.Event,
 ) -> None:
     """One test: the board boots on the still table, and the estimators begin as the published test did."""
     truths.begin(epoch)
     board = VirtualBoard(link, SIMULATED, epoch=epoch, firmware="simulated table")
-    items = heapq.merge(_table(test, truths, Faults(options.faults)), _receiver(options.seed), key=lambda item: item.t_s)
+    table = _table(test, truths, Faults(options.faults))
+    items = heapq.merge(table, _receiver(options.seed), key=lambda item: item.t_s)
     started = time.monotonic()
     board.run(itertools.takewhile(lambda item: item.t_s < test.profile.seconds, items), stop, wait_for_reader=True)
     log.info("run ended: %d samples, %d frames built, %d dropped", board.samples, board.built, board.dropped)
