@@ -34,7 +34,7 @@ def show_table(table: Table) -> None:
 
 Fault = Annotated[
     list[str] | None,
-    typer.Option(help="Spoil an axis of the simulated cube, as a21:stuck@12 or a13:swapped=a21@12-20 (docs/layouts.md)."),
+    typer.Option(help="Spoil an axis of the simulated cube, as a21:stuck@12 or a13:swapped=a21@12-20."),
 ]
 
 
