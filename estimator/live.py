@@ -14,8 +14,11 @@ import queue
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from google.protobuf.message import DecodeError
 
 from estimator import convert
 from estimator.service import INPUTS, Output, Pipeline
@@ -36,6 +39,15 @@ BACKLOG = 20_000  # messages; more than a minute of a full-rate board, then the 
 SAVE_S = 2.0
 RESUME_S = 600.0  # an older state is of another measurement
 STATE = "state.pickle"
+CONTROL = "estimator-control"
+
+
+@dataclass(frozen=True)
+class Order:
+    """A person's order, and where the answer goes."""
+
+    command: pb.EstimatorCommand
+    answer: Callable[[pb.Reply], None]
 
 
 class Worker:
@@ -70,6 +82,10 @@ class Worker:
         """Called on the asker's thread: what a gateway kept."""
         self._queue.put((question, reply))
 
+    def order(self, command: pb.EstimatorCommand, answer: Callable[[pb.Reply], None]) -> None:
+        """Called on the bus's thread: what a person asks for, done between two samples."""
+        self._queue.put(Order(command, answer))
+
     def finish(self) -> None:
         """Ask the worker to end after what is queued now."""
         self._queue.put(None)
@@ -78,6 +94,12 @@ class Worker:
         """The worker: until finish(). An unexpected error sets `stop`: run() raises it, the supervisor starts anew."""
         try:
             while (item := self._queue.get()) is not None:
+                if isinstance(item, Order):
+                    reply, outputs = self.pipeline.order(item.command)
+                    for output in outputs:
+                        self._put(output)
+                    item.answer(reply)
+                    continue
                 ready = self.mender.take(item) if isinstance(item, Arrival) else self.mender.answer(*item)
                 for arrival in ready:
                     self._handle(arrival)
@@ -163,9 +185,12 @@ def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) ->
         answering = [declare(session, bus.prefix, "*", ESTIMATES, spool)] if spool is not None else []
         # One subscriber for all topics: each has a thread of its own, and a fix must not overtake its samples.
         subscriber = session.declare_subscriber(f"{bus.prefix}/*/*", _on(worker))
+        key = f"{bus.prefix}/*/{CONTROL}"
+        orders = session.declare_queryable(key, lambda query: take_order(query, worker))
         log.info("estimating: rate %s; navigation %s", ", ".join(settings.rate), ", ".join(settings.navigators))
         stop.wait()
         subscriber.undeclare()
+        orders.undeclare()
         worker.finish()
         thread.join(timeout=3.0)
         for queryable in answering:
@@ -219,6 +244,18 @@ def _version() -> str:
     for path in sorted(Path(__file__).parent.rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
+
+
+def take_order(query: Any, worker: Worker) -> None:
+    """An EstimatorCommand on <prefix>/<device>/estimator-control; the Reply follows when it has been done."""
+    command, key = pb.EstimatorCommand(), str(query.key_expr)
+    try:
+        command.ParseFromString(query.payload.to_bytes() if query.payload else b"")
+    except DecodeError as error:
+        query.reply_err(f"{CONTROL}: {error}; want an EstimatorCommand".encode())
+        return
+    command.device = key.split("/")[1]
+    worker.order(command, lambda reply: query.reply(key, reply.SerializeToString()))
 
 
 def _on(worker: Worker) -> Callable[[Any], None]:

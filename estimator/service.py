@@ -142,7 +142,7 @@ class Pipeline:
             header = convert.sample_header(batch.header, (len(samples.t_s) - 1) * batch.period_s)
             for name in self._settings.rate:
                 out.append(Output(ESTIMATOR, device, name, self._rate_status(header, board, name)))
-        status = self._desk.feed(batch, samples, board.nominal)
+        status = self._desk.feed(batch, samples, board.wiring)
         if status is not None:
             out.append(Output(CALIBRATION, device, "", status))
         return out
