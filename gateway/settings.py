@@ -4,6 +4,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from gateway.analogue import AnalogueSettings
 from messages.topics import NAME
 
 
@@ -20,6 +21,7 @@ class DeviceSettings(BaseModel):
     gnss_baud: int = Field(default=38400, ge=1200, le=4_000_000)  # bits per second
     gnss_latency_s: float = Field(default=0.0, ge=0.0, le=2.0)  # shortest delay from time of fix to arrival, s
     tacho_pulses_per_rev: int = Field(default=360, ge=1, le=1_000_000)  # rising edges per turn of the table
+    analogue: AnalogueSettings = AnalogueSettings()  # of a board with analogue sensors (ADC frames)
     time_scale: float = Field(default=1.0, gt=0.0, le=1000.0)  # device s per host s; N for a log played at N x
 
     @field_validator("name")
