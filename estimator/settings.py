@@ -40,7 +40,7 @@ class EstimatorSettings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     rate: list[str] = Field(default_factory=lambda: ["products-ekf", "least-squares"])  # gyro-free rate estimators
-    navigators: list[str] = Field(default_factory=lambda: ["ekf"])  # INS/GNSS filters
+    navigators: list[str] = Field(default_factory=lambda: ["huber-nhc", "kf", "fpe-fuzzy"])  # the first leads
     attitudes: list[str] = Field(default_factory=lambda: ["vqf", "tilt-vector", "tilt-published"])  # tilt of six axes
     layout: LayoutSettings = LayoutSettings()  # of a device that layouts does not name
     layouts: dict[str, LayoutSettings] = Field(default_factory=dict)  # by device name

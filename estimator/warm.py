@@ -26,11 +26,10 @@ HERE = Path(__file__).resolve().parent
 
 def drop_stale(folder: Path = HERE) -> int:
     """Remove compiled functions that are older than a source of the folder; returns how many files went."""
-    newest = max(s.stat().st_mtime for s in folder.glob("*.py") if "@njit" in s.read_text(encoding="utf-8"))
-    stale = [f for f in (folder / "__pycache__").glob("*.nb[ic]") if f.stat().st_mtime < newest]
-    if not stale:
+    newest = max(s.stat().st_mtime for s in folder.rglob("*.py") if "@njit" in s.read_text(encoding="utf-8"))
+    everything = list(folder.rglob("__pycache__/*.nb[ic]"))
+    if all(f.stat().st_mtime >= newest for f in everything):
         return 0
-    everything = list((folder / "__pycache__").glob("*.nb[ic]"))
     for file in everything:
         file.unlink(missing_ok=True)
     return len(everything)
@@ -74,8 +73,8 @@ def _warm_attitudes() -> None:
 
 
 def _warm_navigators() -> None:
-    for make in NAVIGATORS.values():
-        navigator = make()
+    for name in ("kf", "huber-nhc", "fpe-fuzzy", "mhe-robust"):  # the compiled code is the same for all others
+        navigator = NAVIGATORS[name]()
         f, w = np.array([0.0, 0.0, -9.8]), np.zeros(3)
         for k in range(1200):
             t = 0.01 * k

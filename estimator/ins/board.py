@@ -1,7 +1,6 @@
 """All navigation filters of one six-axis board, side by side on the same samples and fixes."""
 
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,7 +34,7 @@ class NavBoard:
         self.device = device
         self.stream = Stream()
         self.navigators: dict[str, Any] = {}
-        self._make: dict[str, Callable[[], Any]] = {name: lambda n=name: NAVIGATORS[n](config) for name in names}
+        self._config, self._names = config, names  # no closures: a process that goes on after a crash pickles this
         self._limit = limit_hz
 
     def feed(
@@ -46,7 +45,7 @@ class NavBoard:
         if admission.restart or not self.navigators:
             if admission.reason:
                 log.warning("%s: %s: navigation starts anew", self.device, admission.reason)
-            self.navigators = {name: make() for name, make in self._make.items()}
+            self.navigators = {name: NAVIGATORS[name](self._config) for name in self._names}
         elif admission.missing and worth_a_line(self.stream.gaps):
             log.warning("%s: %d samples missing before %d (gap %d)", self.device, admission.missing, first_index,
                         self.stream.gaps)  # fmt: skip

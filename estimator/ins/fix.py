@@ -6,6 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from estimator.ins.update import (
+    F_GEO,
+    F_HAS_V,
+    F_HAS_YAW,
+    F_SIGMA,
+    F_T,
+    F_TIMING,
+    F_V,
+    F_WITHHELD,
+    F_YAW,
+    FIX_COLUMNS,
+)
+
 Array = NDArray[np.float64]
 
 NONE, AUTONOMOUS, DIFFERENTIAL, RTK_FLOAT, RTK_FIXED, DEAD_RECKONING = range(6)  # GnssFix.Quality of the bus
@@ -34,6 +47,8 @@ class Fix:
     sigma_v: Array | None = None  # (3,) m/s, with v_n
     withheld: bool = False  # only to score the filter with
     key: int = 0  # whatever the caller needs to know it by
+    yaw: float | None = None  # rad, heading by two antennas
+    sigma_yaw: float = 0.01  # rad, with yaw
 
     def due(self, settle: float) -> float:
         """When it is used, s."""
@@ -44,10 +59,6 @@ class Fix:
         v = self.v_n if self.v_n is not None else np.zeros(3)
         return np.array([self.latitude, self.longitude, self.height, *v])
 
-    def rows(self) -> slice:
-        """Rows of the measurement that this fix has."""
-        return slice(0, 6 if self.v_n is not None else 3)
-
 
 @dataclass(frozen=True)
 class FixSettings:
@@ -55,6 +66,7 @@ class FixSettings:
 
     floor_p: tuple[float, float, float] = (0.02, 0.02, 0.03)  # m: no fix is better, whatever its receiver says
     floor_v: tuple[float, float, float] = (0.1, 0.1, 0.15)  # m/s: a receiver's velocity lags in turns
+    floor_yaw: float = 0.005  # rad, of a heading by two antennas
     timing: float = 0.002  # s, of the fix's time against the samples' clock: counts with the speed
     false_alarm: float = 1e-6  # chance that the NIS gate refuses a good fix of a filter whose model is right
     readmit_after: int = 5  # rejections in a row after which the filter, not the receiver, is taken to be wrong
@@ -89,13 +101,17 @@ def typical_sigma(quality: int) -> tuple[Array, Array]:
     return np.array(position), np.array(velocity)
 
 
-def fix_noise(fix: Fix, settings: FixSettings) -> Array:
-    """R (6, 6), or (3, 3) without velocity: the receiver's sigma, floored, and timing error along the way (E-31)."""
-    p = np.maximum(fix.sigma_p, settings.floor_p)
-    if fix.v_n is None:
-        return np.diag(p**2)
-    v = np.maximum(fix.sigma_v, settings.floor_v)
-    R = np.diag(np.concatenate([p, v]) ** 2)
-    way = np.array([fix.v_n[0], fix.v_n[1], -fix.v_n[2]]) * settings.timing
-    R[:3, :3] += np.outer(way, way)
-    return R
+def fix_row(fix: Fix, settings: FixSettings) -> Array:
+    """A row (FIX_COLUMNS,) of the table that the compiled filters read, see update: numbers and floored sigmas (E-31)."""
+    row = np.zeros(FIX_COLUMNS)
+    row[F_T] = fix.t
+    row[F_GEO : F_GEO + 3] = fix.latitude, fix.longitude, fix.height
+    row[F_SIGMA : F_SIGMA + 3] = np.maximum(fix.sigma_p, settings.floor_p)
+    if fix.v_n is not None:
+        row[F_V : F_V + 3] = fix.v_n
+        row[F_SIGMA + 3 : F_SIGMA + 6] = np.maximum(fix.sigma_v, settings.floor_v)
+        row[F_HAS_V] = 1.0
+    if fix.yaw is not None:
+        row[F_YAW], row[F_SIGMA + 6], row[F_HAS_YAW] = fix.yaw, max(fix.sigma_yaw, settings.floor_yaw), 1.0
+    row[F_WITHHELD], row[F_TIMING] = float(fix.withheld), settings.timing
+    return row

@@ -1,46 +1,44 @@
-"""Navigation from samples and fixes: alignment, then a filter that applies every fix at the fix's own time.
+"""Navigation from samples and fixes, live: alignment, then a filter that applies every fix at the fix's own time.
 
-A fix arrives after the samples of its instant. The navigator keeps the last two seconds of samples with a snapshot
-of the filter every 0.1 s, goes back to the fix, corrects there and runs forward again. When a fix is used depends on
-times in the data only (its arrival plus `settle`), not on which message the bus delivered first.
+A fix arrives after the samples of its instant. The navigator keeps the filter as it was after the last fix used (or two
+seconds ago) beside the newest state, goes back to it, corrects there and runs forward again. When a fix is used depends
+on times in the data only (its arrival plus `settle`), not on which message the bus delivered first.
 """
 
 import logging
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from enum import IntEnum
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.ins import ekf as ins_ekf
+from estimator.ins import estimate as est
 from estimator.ins.alignment import Alignment, AlignmentSettings, Start
 from estimator.ins.earth import ned_between
-from estimator.ins.error_model import DP, STATES, ImuNoise, fix_residual
-from estimator.ins.fix import Fix, FixSettings, fix_noise
-from estimator.ins.history import History
+from estimator.ins.error_model import DP, ImuNoise
+from estimator.ins.filters import FILTERS, FilterConfig, filter_of
+from estimator.ins.fix import Fix, FixSettings, fix_row
+from estimator.ins.history import LATEST, History
+from estimator.ins.leg import Leg, copy_leg, current_covariance, new_leg, reset
+from estimator.ins.mechanise import AXLE, TIME
+from estimator.ins.solution import (
+    INNOVATIONS,
+    WITHHELD,
+    Correction,
+    HorizonChoice,
+    Mode,
+    Solution,
+    correction_of,
+    nothing_compared,
+)
 from estimator.ins.strapdown import BA, BG, LAT, LON, C, H, V, dcm_to_quaternion, exp
 
 log = logging.getLogger(__name__)
 
 Array = NDArray[np.float64]
 
-INNOVATIONS = ("position N m", "position E m", "height m", "velocity N m/s", "velocity E m/s", "velocity D m/s")
-
-
-ALIGNED = [0, 1, 2, 9, 10, 11, 12, 13, 14]  # error states of Start.P
 FUTURE = 10.0  # s; a fix further ahead of the newest sample than this is not waited for
-WITHHELD = "withheld to score the filter"
-
-
-class Mode(IntEnum):
-    """As NavSolution.Mode of the bus contract."""
-
-    WAITING = 0
-    LEVELLING = 1
-    COURSE = 2
-    NAVIGATING = 3
 
 
 @dataclass(frozen=True)
@@ -61,72 +59,63 @@ class NavigatorConfig:
     longest_gap: float = 0.3  # s without samples that the filter bridges; after more the heading is found again
 
 
-@dataclass(frozen=True)
-class Correction:
-    """What one fix said, and what was done with it."""
-
-    fix: Fix
-    values: Array  # (m,) computed - measured: position NE and height m, v_n m/s; empty when nothing could be compared
-    sigma: Array  # (m,) of values as the filter expects them
-    nis: float
-    accepted: bool
-    error_ned: Array  # (3,) computed - measured position of the antenna, m, before the correction; may be empty
-    reason: str = ""  # why it was not accepted
-    yaw: float = math.nan  # heading at the fix before the correction, rad
-
-
-def nothing_compared(fix: Fix) -> Correction:
-    """A fix taken while there is no prediction to compare it with."""
-    return Correction(fix, np.empty(0), np.empty(0), 0.0, True, np.empty(0))
-
-
-@dataclass(frozen=True)
-class Solution:
-    """Where we are, at time t of the samples' clock."""
-
-    t: float
-    mode: Mode
-    latitude: float  # rad
-    longitude: float  # rad
-    height: float  # m
-    p_ned: Array  # (3,) m from origin
-    v_n: Array  # (3,) m/s
-    q_nb: Array  # (4,)
-    bias_f_b: Array  # (3,) m/s^2
-    bias_omega_b: Array  # (3,) rad/s
-    sigma: Array  # (15,) in the order of the error state, see ins_error
-    position_covariance: Array  # (3, 3) NED m^2
-    origin: tuple[float, float, float]  # rad, rad, m: the first fix
-    fix_age: float  # s since the last fix used; infinite before the first
-    alignment: str = ""  # for people: what the alignment does or waits for, or how it ended
+def first_leg(config: NavigatorConfig, chosen: FilterConfig, start: Start, fix: Fix) -> Leg:
+    """The filter at the fix that ended the alignment: attitude from there, position and velocity of the fix."""
+    c, m = config, chosen.model(config.imu)
+    leg = new_leg(m.n)
+    x = leg.x
+    x[LAT], x[LON], x[H] = fix.latitude, fix.longitude, fix.height
+    x[V] = fix.v_n
+    x[C] = start.C_nb.ravel()
+    x[BG], x[BA] = start.bias_gyro, start.bias_accel
+    if chosen.constraints.car:
+        x[AXLE] = chosen.constraints.axle
+    antenna = np.zeros(m.n)
+    antenna[DP] = (start.C_nb @ np.array(c.lever_arm_b)) * (1.0, 1.0, -1.0)
+    reset(x, antenna, m)
+    sigma_p = np.minimum(c.sigma_p, np.maximum(3.0 * fix.sigma_p, 0.1))
+    sigma_v = np.maximum(c.sigma_v, fix.sigma_v)
+    tilt, yaw, ba, bg = c.sigma_tilt, c.sigma_yaw, c.sigma_bias_accel, c.sigma_bias_gyro
+    sigma = np.concatenate([[tilt, tilt, yaw], sigma_v, sigma_p, [ba] * 3, [bg] * 3, chosen.extra_sigma()])
+    leg.P[:] = np.diag(np.square(sigma))
+    if start.P is not None:
+        places = np.r_[0:3, 9:15]
+        leg.P[np.ix_(places, places)] = start.P
+    leg.acc[TIME] = fix.t
+    return leg
 
 
-class Navigator(Protocol):
-    """What every navigation filter offers to the pipeline."""
+class Navigator:
+    """Alignment, then the filter of a name of FILTERS, on samples that come one by one."""
 
-    def imu(self, t: float, f_b: Array, omega_b: Array) -> list[Correction]: ...
-    def fix(self, fix: Fix) -> None: ...
-    def solution(self) -> Solution: ...
-
-
-class EkfNavigator:
-    """Levelling, course alignment and the 15-state error-state Kalman filter."""
-
-    def __init__(self, config: NavigatorConfig = NavigatorConfig()) -> None:
-        self.config = config
+    def __init__(self, config: NavigatorConfig = NavigatorConfig(), chosen: FilterConfig = FILTERS["kf"]) -> None:
+        self.config, self.filter = config, chosen
+        self.model = chosen.model(config.imu)
+        self.settings = chosen.settings(config.fix, config.lever_arm_b)
         self.mode = Mode.WAITING
-        self.counts = {"used": 0, "rejected": 0, "withheld": 0, "late": 0, "ahead": 0, "readmitted": 0}
-        self._align = Alignment(config.alignment)
-        self._work = ins_ekf.Workspace(config.imu)
+        self.counts = {"used": 0, "rejected": 0, "withheld": 0, "late": 0, "ahead": 0, "readmitted": 0, "doubted": 0}
+        self.horizon: HorizonChoice | None = None
+        self.align = Alignment(config.alignment)
         self._history = History()
         self._pending: list[Fix] = []
-        self._state: ins_ekf.InsState | None = None
+        self._memory: est.Memory | None = None
+        self._anchor, self._head = new_leg(self.model.n), new_leg(self.model.n)
+        self._anchor_next = self._head_next = 0
+        self._scratch = np.zeros((3, self.model.n, self.model.n))
+        self._row = np.empty(est.OUT)
+        self._how = ""
         self._last_fix: Fix | None = None
         self._last_used = -math.inf
-        self._rejected_in_row = 0
-        self._aligned = ""  # how navigation began
         self._origin: tuple[float, float, float] | None = None
-        self._lever = np.array(config.lever_arm_b)
+
+    @property
+    def x(self) -> Array:
+        """Nominal state at the newest sample, see mechanise; meaningless before navigation."""
+        return self._head.x
+
+    def covariance(self) -> Array:
+        """(n, n) at the newest sample."""
+        return current_covariance(self._head, self.model)
 
     # -- input -------------------------------------------------------------------------------------------------
 
@@ -137,12 +126,14 @@ class EkfNavigator:
             return []  # a clock that stands or runs back moves nothing; the stream's bookkeeping tells of it
         if last is not None and t - last > self.config.longest_gap:
             self._after_gap(t - last)
-        self._history.append(t, f_b, omega_b)
-        if self._state is not None:
-            self._history.advance(self._state, math.inf, self._work)
+        dropped = self._history.append(t, f_b, omega_b)
+        self._anchor_next, self._head_next = self._anchor_next - dropped, self._head_next - dropped
+        if self._memory is not None:
+            self._advance_head()
+            self._advance_anchor(t - LATEST)
         else:
-            self._align.imu(t, f_b, omega_b)
-            self.mode = Mode.COURSE if self._align.levelled else Mode.LEVELLING
+            self.align.imu(t, f_b, omega_b)
+            self.mode = Mode.COURSE if self.align.levelled else Mode.LEVELLING
         corrections = []
         while self._pending and self._pending[0].due(self.config.settle) <= t:
             corrections.append(self._use(self._pending.pop(0)))
@@ -157,14 +148,27 @@ class EkfNavigator:
         self._pending.append(fix)
         self._pending.sort(key=lambda f: f.due(self.config.settle))
 
+    def _run(self, leg: Leg, start: int, stop: int, until: float) -> int:
+        h = self._history
+        return est.run_to(leg, self.model, self.settings.rules, self._scratch, h.t, h.f, h.w, start, stop, until)
+
+    def _advance_head(self) -> None:
+        self._head_next = self._run(self._head, self._head_next, self._history.count, math.inf)
+
+    def _advance_anchor(self, until: float) -> None:
+        """Bring the anchor within reach: fixes older than `until` come too late. A second at a time, for speed."""
+        if self._anchor.acc[TIME] < until - 1.0:
+            stop = self._history.after(until)
+            self._anchor_next = self._run(self._anchor, self._anchor_next, stop, math.inf)
+
     def _after_gap(self, length: float) -> None:
         log.warning("%.2f s without samples: heading must be found again", length)
-        if self._state is not None:
-            self._align.C = self._state.x[C].reshape(3, 3).copy()
-            self._align.gyro_bias = self._state.x[BG].copy()
-            self._align.levelled = True  # roughly: what turned during the gap is in sigma_tilt of the next start
-            self._state = None
-        self.mode = Mode.COURSE if self._align.levelled else Mode.LEVELLING
+        if self._memory is not None:
+            self.align.C = self._head.x[C].reshape(3, 3).copy()
+            self.align.gyro_bias = self._head.x[BG].copy()
+            self.align.levelled = True  # roughly: what turned during the gap is in sigma_tilt of the next start
+            self._memory = None
+        self.mode = Mode.COURSE if self.align.levelled else Mode.LEVELLING
         self._history.clear()
 
     # -- fixes -------------------------------------------------------------------------------------------------
@@ -175,44 +179,36 @@ class EkfNavigator:
             return self._refuse(nothing_compared(fix), "rejected", reason)
         if self._origin is None:
             self._origin = (fix.latitude, fix.longitude, fix.height)
-        if self._state is None:
+        if self._memory is None:
             return self._start(fix)
-        then = self._history.state_at(fix.t, self._work)
-        if then is None:
+        if fix.t < self._anchor.acc[TIME] - 1e-9:
             age = self._history.newest - fix.t
             return self._refuse(nothing_compared(fix), "late", f"{age:.2f} s old: before the last one used, or too old")
-        state, k = then
-        ins_ekf.close(state, self._work)
-        P = ins_ekf.covariance(state.P, state.Phi, state.Q)
-        y, H_full = np.empty(6), np.empty((6, STATES))
-        fix_residual(state.x, self._history.rate(k), self._lever, fix.vector(), y, H_full)
-        rows = fix.rows()
-        y, H_rows, R = y[rows], H_full[rows], fix_noise(fix, self.config.fix)
-        return self._judge(fix, state, k, P, y, H_rows, R)
-
-    def _judge(
-        self, fix: Fix, state: ins_ekf.InsState, k: int, P: Array, y: Array, H_rows: Array, R: Array
-    ) -> Correction:
-        K, S, nis = ins_ekf.gain(P, y, H_rows, R)
-        yaw = math.atan2(state.x[9], state.x[6])
-        said = Correction(fix, y, np.sqrt(np.diag(S)), nis, True, np.array([y[0], y[1], -y[2]]), yaw=yaw)
-        if fix.withheld:
-            return self._refuse(said, "withheld", WITHHELD)
-        if nis > self.config.fix.gate(len(y)):
-            self._rejected_in_row += 1
-            if self._rejected_in_row < self.config.fix.readmit_after:
-                return self._refuse(said, "rejected", f"NIS {nis:.0f} of {len(y)}")
-            P, factor = ins_ekf.consistent(P, y, H_rows, R, len(y))
-            log.warning("%d fixes in a row rejected: covariance times %g, fix taken", self._rejected_in_row, factor)
-            self.counts["readmitted"] += 1
-            K = ins_ekf.gain(P, y, H_rows, R)[0]
-        self._rejected_in_row = 0
-        ins_ekf.correct(state, P, y, H_rows, R, K)
-        self._history.restart(state, k)
-        self._history.advance(state, math.inf, self._work)
-        self._state = state
+        h, trial = self._history, self._memory.trial
+        stop = max(self._anchor_next, h.after(fix.t))
+        copy_leg(self._anchor, trial)
+        k = self._run(trial, self._anchor_next, stop, math.inf)
+        self._run(trial, k, min(k + 1, h.count), fix.t)
+        rate = h.w[min(k, h.count - 1)]
+        row = fix_row(fix, self.config.fix)
+        status = est.take(trial, self.model, self.settings, self._memory, row, rate, self._row)
+        said = correction_of(fix, self._row)
+        if status in (est.REJECTED, est.WITHHELD):
+            return self._refuse(said, "rejected" if status == est.REJECTED else "withheld", said.reason)
+        self._count(status)
+        self.horizon = said.horizon
+        copy_leg(trial, self._anchor)
+        copy_leg(trial, self._head)
+        self._anchor_next = self._head_next = k
+        self._advance_head()
         self._took(fix)
         return said
+
+    def _count(self, status: int) -> None:
+        if status == est.READMITTED:
+            log.warning("%d fixes in a row rejected: covariance raised, fix taken", self.config.fix.readmit_after)
+            self.counts["readmitted"] += 1
+        self.counts["doubted"] += status == est.DOUBTED
 
     def _took(self, fix: Fix) -> None:
         self._last_fix = fix
@@ -224,66 +220,53 @@ class EkfNavigator:
         return replace(said, accepted=False, reason=reason)
 
     def _start(self, fix: Fix) -> Correction:
-        """Before navigation: watch the speed, and start once the course gives the heading."""
+        """Before navigation: watch the speed, and start once the alignment knows the heading."""
         if fix.withheld:
             return self._refuse(nothing_compared(fix), "withheld", WITHHELD)
         if fix.v_n is None:
             self._took(fix)
             return replace(nothing_compared(fix), reason="aligning: no velocity in the fix")
-        self._align.fix(fix.t, fix.v_n, fix.sigma_v)
-        k = self._history.first_after(fix.t)
-        start = None if k is None else self._align.start(self._attitude_at(fix.t, k), fix.v_n)
+        self.align.fix(fix.t, fix.v_n, fix.sigma_v)
+        start = self.align.start(self._attitude_at(fix.t), fix.v_n) if self._history.reaches(fix.t) else None
         if start is not None:
-            self._state = self._first_state(fix, start)
-            self._history.restart(self._state, k)
-            self._history.advance(self._state, math.inf, self._work)
-            self.mode = Mode.NAVIGATING
-            self._aligned = start.how
-            log.info("%s; course %.1f deg at %.1f m/s: navigating", start.how,
-                     math.degrees(math.atan2(fix.v_n[1], fix.v_n[0])), math.hypot(fix.v_n[0], fix.v_n[1]))  # fmt: skip
+            self.begin(start, fix)
+            self._head_next = self._anchor_next = self._history.after(fix.t)
+            self._advance_head()
+            log.info("%s: navigating", start.how)
         self._took(fix)
         return replace(nothing_compared(fix), reason="aligning")
 
-    def _attitude_at(self, t: float, k: int) -> Array:
-        """Alignment's C at time t, sample k the first after it: the newest one turned back by the gyro."""
-        C_nb = self._align.C
-        for dt, w in self._history.back_to(t, k):
-            C_nb = C_nb @ exp(-(w - self._align.gyro_bias) * dt)
-        return C_nb
+    def begin(self, start: Start, fix: Fix) -> None:
+        """Start the filter at a fix."""
+        copy_leg(first_leg(self.config, self.filter, start, fix), self._anchor)
+        copy_leg(self._anchor, self._head)
+        still_f = float(np.linalg.norm(self.align.mean_f)) if self.align.levelled else 9.80665
+        self._memory = self.filter.memory(self.model.n, self._anchor.P, still_f)
+        self._how = start.how
+        self.mode = Mode.NAVIGATING
 
-    def _first_state(self, fix: Fix, start: Start) -> ins_ekf.InsState:
-        c = self.config
-        s = ins_ekf.InsState()
-        s.x[LAT], s.x[LON], s.x[H] = fix.latitude, fix.longitude, fix.height
-        s.x[V] = fix.v_n
-        s.x[C], s.x[BA], s.x[BG] = start.C_nb.ravel(), start.bias_accel, start.bias_gyro
-        antenna = np.zeros(STATES)
-        antenna[6:9] = (start.C_nb @ self._lever) * (1.0, 1.0, -1.0)
-        ins_ekf.reset(s.x, antenna)
-        sigma_p = np.minimum(c.sigma_p, np.maximum(3.0 * fix.sigma_p, 0.1))
-        sigma_v = np.maximum(c.sigma_v, fix.sigma_v)
-        tilt, yaw, ba, bg = c.sigma_tilt, c.sigma_yaw, c.sigma_bias_accel, c.sigma_bias_gyro
-        s.P = np.diag(np.square(np.concatenate([[tilt, tilt, yaw], sigma_v, sigma_p, [ba] * 3, [bg] * 3])))
-        if start.P is not None:
-            s.P[np.ix_(ALIGNED, ALIGNED)] = start.P
-        s.acc[ins_ekf.ACC_TIME] = fix.t
-        return s
+    def _attitude_at(self, t: float) -> Array:
+        """Alignment's C at time t: the newest one turned back by the gyro."""
+        h, C_nb = self._history, self.align.C
+        for i in range(h.count - 1, h.after(t) - 1, -1):
+            begin = max(t, h.t[i - 1]) if i else t
+            C_nb = C_nb @ exp(-(h.w[i] - self.align.gyro_bias) * (h.t[i] - begin))
+        return C_nb
 
     # -- output ------------------------------------------------------------------------------------------------
 
     def solution(self) -> Solution:
         """The newest sample's solution; before navigation the last fix, with sigmas that say so."""
         t = self._history.newest or 0.0
-        if self._state is None:
+        if self._memory is None:
             return self._waiting_solution(t)
-        x = self._state.x
-        P = ins_ekf.current_covariance(self._state, self._work)
+        x, P = self._head.x, self.covariance()
         down = np.array([1.0, 1.0, -1.0])  # the error state counts height up
         return Solution(
             t, self.mode, float(x[LAT]), float(x[LON]), float(x[H]),
             np.array(ned_between(*self._origin, x[LAT], x[LON], x[H])),
-            x[V].copy(), dcm_to_quaternion(x[C].reshape(3, 3)), x[BA].copy(), x[BG].copy(), np.sqrt(np.diag(P)),
-            P[DP, DP] * np.outer(down, down), self._origin, t - self._last_used, self._aligned,
+            x[V].copy(), dcm_to_quaternion(x[C].reshape(3, 3)), x[BA].copy(), x[BG].copy(), np.sqrt(np.diag(P)[:15]),
+            P[DP, DP] * np.outer(down, down), self._origin, t - self._last_used, self.horizon, self._how,
         )  # fmt: skip
 
     def _waiting_solution(self, t: float) -> Solution:
@@ -295,15 +278,21 @@ class EkfNavigator:
             if fix.v_n is not None:
                 v, sigma_v = fix.v_n, fix.sigma_v + 2.0 * age  # 2 m/s^2: how fast a car changes its mind
             sigma_p = sigma_p + (np.abs(v) + 1.0) * age
-        tilt = c.sigma_tilt if self._align.levelled else math.pi
+        tilt = c.sigma_tilt if self.align.levelled else math.pi
         sigma = np.concatenate(
             [[tilt, tilt, math.pi], sigma_v, sigma_p, [c.sigma_bias_accel] * 3, [c.sigma_bias_gyro] * 3]
         )
         origin = self._origin or (0.0, 0.0, 0.0)
         return Solution(
-            t, self.mode, *where, np.array(ned_between(*origin, *where)), v, dcm_to_quaternion(self._align.C),
-            np.zeros(3), self._align.gyro_bias, sigma, np.diag(sigma_p**2), origin, age, self._align.text,
+            t, self.mode, *where, np.array(ned_between(*origin, *where)), v, dcm_to_quaternion(self.align.C),
+            np.zeros(3), self.align.gyro_bias, sigma, np.diag(sigma_p**2), origin, age, None, self.align.text,
         )  # fmt: skip
 
 
-NAVIGATORS = {"ekf": EkfNavigator}
+def _maker(name: str) -> Callable[..., Navigator]:
+    return lambda config=NavigatorConfig(): Navigator(config, filter_of(name))
+
+
+NAVIGATORS: dict[str, Callable[..., Navigator]] = {name: _maker(name) for name in FILTERS}
+
+__all__ = ["INNOVATIONS", "NAVIGATORS", "Correction", "Mode", "Navigator", "NavigatorConfig", "Solution", "first_leg"]

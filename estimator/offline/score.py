@@ -57,7 +57,7 @@ def _fix(row: dict[str, float], key: int, withheld: bool) -> Fix:
 
 
 def score_drive(
-    imu_csv: Path, gnss_csv: Path, every: int = 4, estimator: str = "ekf", config: NavigatorConfig | None = None
+    imu_csv: Path, gnss_csv: Path, every: int = 4, estimator: str = "huber-nhc", config: NavigatorConfig | None = None
 ) -> dict[str, Any]:
     """Errors at the RTK fixes the filter never saw, from 20 s after navigation began.
 

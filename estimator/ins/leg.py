@@ -1,0 +1,345 @@
+"""From fix to fix: the nominal state, and Phi and Q of the error since the last measurement. E-27 to E-29, E-31, E-34.
+
+The error state has n = 15 numbers and, where a filter asks for them, further ones at its end (see Model). All but the
+first nine (attitude, velocity, position) only decay.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from estimator.ins.arrays import copy1, copy2, fill2, identity
+from estimator.ins.earth import OMEGA, radii
+from estimator.ins.error_model import ImuNoise
+from estimator.ins.mechanise import (
+    ACC,
+    F1,
+    INTERVAL,
+    LENGTH,
+    M1,
+    M2,
+    NOMINAL,
+    S1,
+    S2,
+    SINCE,
+    TICK,
+    TICK_LENGTH,
+    TIME,
+    U1,
+    U2,
+    W1,
+    mechanise,
+)
+from estimator.ins.strapdown import orthonormalise
+
+Array = NDArray[np.float64]
+
+CORE = 15
+MOVING = 9  # rows of Phi that are more than a decay
+RING = 16  # ticks remembered: 1.6 s
+R_TIME, R_LENGTH, R_V, R_F, R_W = 0, 1, 2, 5, 8  # ring columns: t, T, v_n at its end, integrals of f and w
+RING_COLUMNS = 11
+
+
+class Model(NamedTuple):
+    """What the error state consists of; integers below 0 mean that a filter does without these states."""
+
+    n: int
+    noise: Array  # (n,) diagonal of G
+    decay: Array  # (n - 9,) 1/s
+    place: Array  # (n - 9,) where in the nominal state, int64
+    sign: Array  # (n - 9,) +1 where the estimated error is added to the nominal, -1 where it is taken off
+    scale: int  # first of six scale factors
+    lag: int  # first of two latencies
+    car: int  # first of three of a car: mounting pitch, yaw, distance to the rear axle
+
+
+class Leg(NamedTuple):
+    """Everything that changes between two fixes."""
+
+    x: Array  # (NOMINAL,)
+    P: Array  # (n, n) just after the last measurement
+    Phi: Array  # (n, n) since then, closed intervals
+    Q: Array  # (n, n)
+    acc: Array  # (ACC,)
+    ring: Array  # (RING, RING_COLUMNS) the last ticks, newest last
+    work: Array  # (5, n, n) scratch
+
+
+def make_model(noise: ImuNoise, scale: bool = False, lag: bool = False, car: bool = False) -> Model:
+    """The states of a filter; options as in FilterConfig."""
+    base = noise.vector()
+    density, decay = [*base[:CORE]], [base[15]] * 3 + [base[16]] * 3
+    place, sign = list(range(15, 21)), [1.0] * 6
+    first = [-1, -1, -1]
+    for k, (wanted, more) in enumerate(((scale, range(21, 27)), (lag, (27, 28)), (car, (29, 30, 31)))):
+        if wanted:
+            first[k] = len(density)
+            place += more
+            sign += [1.0 if k == 0 else -1.0] * len(more)
+            density += [0.0] * len(more)
+            decay += [0.0] * len(more)
+    return Model(
+        len(density), np.array(density), np.array(decay), np.array(place), np.array(sign), first[0], first[1], first[2]
+    )
+
+
+def new_leg(n: int) -> Leg:
+    """A leg with everything zero and unit covariance."""
+    return Leg(
+        np.zeros(NOMINAL), np.eye(n), np.eye(n), np.zeros((n, n)), np.zeros(ACC), np.zeros((RING, RING_COLUMNS)),
+        np.zeros((5, n, n)),
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def copy_leg(source: Leg, target: Leg) -> None:
+    """target := source, without taking memory."""
+    copy1(source.x, target.x)
+    copy2(source.P, target.P)
+    copy2(source.Phi, target.Phi)
+    copy2(source.Q, target.Q)
+    copy1(source.acc, target.acc)
+    copy2(source.ring, target.ring)
+
+
+@njit(cache=True)
+def _earth_terms(leg: Leg, T: float, E: Array) -> None:
+    """E (9, 9) := T times the terms of F that are there because the Earth is round and turns (E-27)."""
+    x, acc = leg.x, leg.acc
+    inv_n, inv_e, s, c, t = acc[26] * T, acc[27] * T, acc[23], acc[24], acc[25]
+    vN, vE, vD = x[3], x[4], x[5]
+    Os, Oc = OMEGA * s * T, OMEGA * c * T
+    e0, e1, e2 = vE * inv_e, -vN * inv_n, -vE * t * inv_e
+    w0, w1, w2 = Oc + e0, e1, -Os + e2
+    rn, re = acc[26], acc[27]
+    E[0, 1], E[0, 2], E[1, 0], E[1, 2], E[2, 0], E[2, 1] = w2, -w1, -w2, w0, w1, -w0
+    E[0, 4], E[1, 3], E[2, 4] = inv_e, -inv_n, -t * inv_e
+    E[0, 6], E[0, 8] = -Os * rn, -e0 * re
+    E[1, 8] = -e1 * rn
+    E[2, 6], E[2, 8] = (-Oc - e0 / (c * c)) * rn, -e2 * re
+    E[3, 3], E[3, 4], E[3, 5] = vD * inv_n, -2.0 * Os - 2.0 * e0 * t, vN * inv_n
+    E[4, 3], E[4, 4], E[4, 5] = 2.0 * Os + e0 * t, (vD + vN * t) * inv_e, 2.0 * Oc + e0
+    E[5, 3], E[5, 4] = 2.0 * e1, -2.0 * Oc - 2.0 * e0
+    E[3, 6] = (-2.0 * Oc * vE - vE * e0 / (c * c)) * rn
+    E[3, 8] = e1 * vD * rn + e0 * vE * re * t
+    E[4, 6] = (2.0 * (Oc * vN - Os * vD) + vN * e0 / (c * c)) * rn
+    E[4, 8] = -e0 * (vD + vN * t) * re
+    E[5, 6] = 2.0 * Os * vE * rn
+    E[5, 8] = e0 * vE * re - e1 * vN * rn - 2.0 * T * acc[28] * np.sqrt(rn * re)
+    E[6, 6], E[6, 8] = -vD * inv_n, -vN * inv_n
+    E[7, 6], E[7, 7], E[7, 8] = vE * t * inv_n, -vD * inv_e - vN * t * inv_e, -e0
+
+
+@njit(cache=True)
+def _transition(leg: Leg, m: Model, T: float, d: Array, Top: Array) -> None:
+    """Upper rows (9, n) of Phi over the interval: the integrals of a flat Earth exactly, the round one's to (E-28)."""
+    acc, n = leg.acc, m.n
+    main, E = leg.work[0], leg.work[1]
+    identity(main)
+    up = -1.0  # the third row of position counts height up
+    for a in range(2):
+        row, s = 3 + 3 * a, (S1 if a == 0 else S2)
+        sign = 1.0 if a == 0 else up
+        s0, s1, s2 = acc[s], acc[s + 1], acc[s + 2]
+        main[row, 1], main[row, 2] = -s2, s1
+        main[row + 1, 0], main[row + 1, 2] = s2, -s0
+        main[row + 2, 0], main[row + 2, 1] = -s1 * sign, s0 * sign
+    main[6, 3], main[7, 4], main[8, 5] = T, T, up * T
+    for i in range(3):
+        sign = up if i == 2 else 1.0
+        for j in range(3):
+            k = 3 * i + j
+            accel = 0.5 * (1.0 + d[9 + j])
+            gyro = 0.5 * (1.0 + d[12 + j])
+            main[i, 12 + j] = -acc[U1 + k] * gyro
+            main[3 + i, 9 + j] = acc[U1 + k] * accel
+            main[3 + i, 12 + j] = -acc[M1 + k] * gyro
+            main[6 + i, 9 + j] = sign * acc[U2 + k] * accel
+            main[6 + i, 12 + j] = -sign * acc[M2 + k] * gyro
+            if m.scale >= 0:  # the reading hardly changes against C: its mean over the interval
+                f, w = acc[F1 + j] / T, acc[W1 + j] / T
+                main[i, m.scale + 3 + j] = -acc[U1 + k] * w
+                main[3 + i, m.scale + j] = acc[U1 + k] * f
+                main[3 + i, m.scale + 3 + j] = -acc[M1 + k] * w
+                main[6 + i, m.scale + j] = sign * acc[U2 + k] * f
+                main[6 + i, m.scale + 3 + j] = -sign * acc[M2 + k] * w
+    fill2(E, 0.0)
+    _earth_terms(leg, 0.5 * T, E)
+    copy2(main, Top)
+    for i in range(MOVING):  # Phi = main + (E main + main E) T/2
+        for k in range(MOVING):
+            a = E[i, k]
+            if a != 0.0:
+                for j in range(n):
+                    Top[i, j] += a * main[k, j]
+                for j in range(MOVING):
+                    Top[j, k] += main[j, i] * a
+
+
+@njit(cache=True)
+def _fold(leg: Leg) -> None:
+    """Take the open tick into the integrals of the interval and into the ring."""
+    acc, x, ring = leg.acc, leg.x, leg.ring
+    T = acc[TICK_LENGTH]
+    if T <= 0.0:
+        return
+    half = np.empty(9)
+    for k in range(9):
+        half[k] = acc[U1 + k] + 0.5 * acc[3 + k]
+    f0, f1, f2 = acc[0], acc[1], acc[2]
+    for j in range(3):
+        a, b, c = half[j], half[3 + j], half[6 + j]
+        for i, step in ((0, f1 * c - f2 * b), (1, f2 * a - f0 * c), (2, f0 * b - f1 * a)):
+            k = 3 * i + j
+            acc[M2 + k] += T * (acc[M1 + k] + 0.5 * step)
+            acc[M1 + k] += step
+    for k in range(9):
+        acc[U2 + k] += T * half[k]
+        acc[U1 + k] += acc[3 + k]
+    for i in range(3):
+        acc[S2 + i] += T * (acc[S1 + i] + 0.5 * acc[i])
+        acc[S1 + i] += acc[i]
+        acc[F1 + i] += acc[12 + i]
+        acc[W1 + i] += acc[15 + i]
+    for k in range(RING - 1):
+        for j in range(RING_COLUMNS):
+            ring[k, j] = ring[k + 1, j]
+    k = RING - 1
+    ring[k, R_TIME], ring[k, R_LENGTH] = acc[TIME], T
+    for i in range(3):
+        ring[k, R_V + i] = x[3 + i]
+        ring[k, R_F + i], ring[k, R_W + i] = acc[12 + i], acc[15 + i]
+    acc[SINCE] += T
+    acc[LENGTH] += T
+    for k in range(19):
+        acc[k] = 0.0
+
+
+@njit(cache=True)
+def close(leg: Leg, m: Model) -> None:
+    """Close the open interval: Phi and Q reach the time of x (E-28)."""
+    _fold(leg)
+    acc, n = leg.acc, m.n
+    T = acc[LENGTH]
+    if T <= 0.0:
+        return
+    Top, scratch = leg.work[2], leg.work[3]
+    d = np.empty(n)  # decay over T
+    for j in range(MOVING, n):
+        z = -m.decay[j - MOVING] * T
+        d[j] = 1.0 + z * (1.0 + z * (0.5 + z / 6.0))
+    _transition(leg, m, T, d, Top)
+    for j in range(MOVING, n):
+        Top[j, j] = d[j]
+    # Phi_i (Q + T/2 G) Phi_i^T + T/2 G is the trapezoid with one product less
+    Q = leg.Q
+    for i in range(n):
+        Q[i, i] += 0.5 * T * m.noise[i]
+    np.dot(Top, Q, scratch)
+    np.dot(scratch, Top.T, Q)
+    for i in range(n):
+        for j in range(i):
+            Q[j, i] = Q[i, j]
+        Q[i, i] += 0.5 * T * m.noise[i]
+    np.dot(Top, leg.Phi, scratch)
+    copy2(scratch, leg.Phi)
+    orthonormalise(leg.x)
+    for k in range(S1, ACC):
+        acc[k] = 0.0
+
+
+@njit(cache=True)
+def run_leg(leg: Leg, m: Model, t: Array, f: Array, w: Array, start: int, stop: int, until: float, every: float) -> int:
+    """Mechanise and close intervals as far as `until`, sample `stop`, or until `every` s passed since a constraint.
+
+    Returns the first sample not used up. The caller looks at acc[SINCE] to see whether a constraint is due.
+    """
+    k = start
+    while k < stop:
+        k = mechanise(leg.x, leg.acc, t, f, w, k, stop, until)
+        if leg.acc[TICK_LENGTH] >= TICK - 1e-6:
+            _fold(leg)
+            if leg.acc[LENGTH] >= INTERVAL - 1e-6:
+                close(leg, m)
+            if leg.acc[SINCE] >= every - 1e-6:
+                return k
+        if k < stop and t[k] > until and leg.acc[TIME] >= until:
+            return k
+    return k
+
+
+@njit(cache=True)
+def carry(P: Array, Phi: Array, Q: Array, factor: float, scratch: Array, out: Array) -> None:
+    """out := factor Phi P Phi^T + Q (E-31), symmetric; out and scratch (n, n) are neither P nor Q."""
+    np.dot(Phi, P, scratch)
+    np.dot(scratch, Phi.T, out)
+    for i in range(P.shape[0]):
+        for j in range(i + 1):
+            out[i, j] = factor * out[i, j] + Q[i, j]
+            out[j, i] = out[i, j]
+
+
+@njit(cache=True)
+def reset(x: Array, c: Array, m: Model) -> None:
+    """Take the estimated error c (n,) out of the nominal x: closed loop (E-34)."""
+    L, h = x[0], x[2]
+    R_N, R_E = radii(L)
+    x[0] = L - c[6] / (R_N + h)
+    x[1] -= c[7] / ((R_E + h) * np.cos(L))
+    x[2] = h - c[8]
+    for i in range(3):
+        x[3 + i] -= c[3 + i]
+    for j in range(m.n - MOVING):
+        x[m.place[j]] += m.sign[j] * c[MOVING + j]
+    R = _exp(c)
+    for j in range(6, 9):
+        a, b, d = x[j], x[j + 3], x[j + 6]
+        for i in range(3):
+            x[3 * i + j] = R[i, 0] * a + R[i, 1] * b + R[i, 2] * d
+
+
+@njit(cache=True)
+def _exp(v: Array) -> Array:
+    """Rotation matrix of a rotation vector (3,)."""
+    a2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
+    if a2 < 1e-8:
+        s, k = 1.0 - a2 / 6.0, 0.5 - a2 / 24.0
+    else:
+        angle = np.sqrt(a2)
+        s, k = np.sin(angle) / angle, (1.0 - np.cos(angle)) / a2
+    R = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            R[i, j] = k * v[i] * v[j]
+        R[i, i] += 1.0 - k * a2
+    R[0, 1] -= s * v[2]
+    R[1, 0] += s * v[2]
+    R[0, 2] += s * v[1]
+    R[2, 0] -= s * v[1]
+    R[1, 2] -= s * v[0]
+    R[2, 1] += s * v[0]
+    return R
+
+
+@njit(cache=True)
+def correct(leg: Leg, m: Model, c: Array) -> None:
+    """Apply the estimate c (n,) and start a new leg; the ring's velocities are corrected with it."""
+    reset(leg.x, c, m)
+    identity(leg.Phi)
+    fill2(leg.Q, 0.0)
+    for k in range(RING):
+        for i in range(3):
+            leg.ring[k, R_V + i] -= c[3 + i]
+
+
+def current_covariance(leg: Leg, m: Model) -> Array:
+    """P (n, n) at the time of the leg's state, which stays as it is."""
+    trial = new_leg(m.n)
+    copy_leg(leg, trial)
+    close(trial, m)
+    out = np.empty((m.n, m.n))
+    carry(trial.P, trial.Phi, trial.Q, 1.0, trial.work[3], out)
+    return out
