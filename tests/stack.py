@@ -73,7 +73,10 @@ class RunningDemo:
         """Processes of the services by the command they run."""
         found = {}
         for process in psutil.Process(self.process.pid).children(recursive=True):
-            words = process.cmdline()
+            try:
+                words = process.cmdline()
+            except psutil.Error:
+                continue  # it has just ended
             if "gyrofree" in words:
                 found[words[words.index("gyrofree") + 1]] = process
         return found
