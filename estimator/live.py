@@ -255,6 +255,9 @@ def take_order(query: Any, worker: Worker) -> None:
         query.reply_err(f"{CONTROL}: {error}; want an EstimatorCommand".encode())
         return
     command.device = key.split("/")[1]
+    if "*" in key:
+        query.reply_err(f"{CONTROL}: an order is for one device, not for {command.device}".encode())
+        return
     worker.order(command, lambda reply: query.reply(key, reply.SerializeToString()))
 
 
