@@ -20,6 +20,7 @@ from estimator.simulation.drive_path import RATE, Truth, drive_truth, radii
 Array = NDArray[np.float64]
 
 DEG = math.pi / 180.0
+SAID_P, SAID_V = (1.6, 1.6, 3.2), (0.1, 0.1, 0.2)  # m, m/s: what such a receiver says of itself, 1 sigma N E U
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ class SimulatedDrive:
     """Samples, fixes and the truth behind them. Has what estimator.offline.score.Drive has, and more."""
 
     imu: Array  # (n, 7): t s, specific force m/s^2, rate rad/s; each row for the interval that ends at t
-    fixes: list[Fix]  # outages are left out
+    fixes: list[Fix]  # those inside outages are withheld
     truth: Truth  # row k at sample k, row 0 before the first sample
     accel_bias: Array  # (n, 3) m/s^2, as it was
     gyro_bias: Array  # (n, 3) rad/s
@@ -133,7 +134,8 @@ def simulate(
     truth = drive_truth(seed, seconds, still, climb)
     imu, accel_bias, gyro_bias = _imu(np.random.default_rng([seed, 11]), truth, condition.sensors)
     fixes, gross = _fixes(np.random.default_rng([seed, 12]), truth, condition.sensors, np.array(lever_arm_b))
-    fixes = [f for f in fixes if not any(a <= f.t < a + length for a, length in condition.outages)]
+    hidden = [any(a <= f.t < a + length for a, length in condition.outages) for f in fixes]
+    fixes = [replace(f, withheld=out) for f, out in zip(fixes, hidden, strict=True)]
     return SimulatedDrive(imu, fixes, truth, accel_bias, gyro_bias, lever_arm_b, gross)
 
 
@@ -177,11 +179,7 @@ def _shake(draw: np.random.Generator, speed: Array, moving: float, still: float)
 
 def _fixes(draw: np.random.Generator, truth: Truth, s: Sensors, lever: Array) -> tuple[list[Fix], tuple[int, ...]]:
     rows = np.arange(RATE, len(truth.t), RATE)  # every second from 1 s
-    n = len(rows)
-    error = gauss_markov(draw, n, np.array(s.fix_wander), s.fix_tau) + draw.normal(size=(n, 3)) * s.fix_white
-    v_error = draw.normal(size=(n, 3)) * s.fix_velocity
-    gross = _gross(draw, n, s)
-    error, v_error = error + gross[:, :3], v_error + gross[:, 3:]
+    error, gross = fix_errors(draw, len(rows), s)
     then = rows - round(s.latency * RATE)
     arm_n = truth.C_nb[then] @ lever
     arm_v = np.einsum("tij,tj->ti", truth.C_nb[then], np.cross(truth.omega_ib_b[then], lever))
@@ -191,14 +189,21 @@ def _fixes(draw: np.random.Generator, truth: Truth, s: Sensors, lever: Array) ->
         (normal + truth.height[then]) * np.cos(truth.latitude[then])
     )
     height = truth.height[then] + error[:, 2] - arm_n[:, 2]
-    v_n = truth.v_n[then] + arm_v + v_error
-    sigma_p, sigma_v = np.array([1.6, 1.6, 3.2]), np.array([0.1, 0.1, 0.2])  # as such a receiver would say of itself
+    v_n = truth.v_n[then] + arm_v + error[:, 3:]
     fixes = [
         Fix(float(truth.t[k]), float(truth.t[k]), float(latitude[i]), float(longitude[i]), float(height[i]),
-            AUTONOMOUS, sigma_p, v_n[i], sigma_v, key=i)
+            AUTONOMOUS, np.array(SAID_P), v_n[i], np.array(SAID_V), key=i)
         for i, k in enumerate(rows)
     ]  # fmt: skip
-    return fixes, tuple(np.flatnonzero(gross.any(axis=1)).tolist())
+    return fixes, gross
+
+
+def fix_errors(draw: np.random.Generator, n: int, s: Sensors) -> tuple[Array, tuple[int, ...]]:
+    """Errors (n, 6) of consecutive fixes, 1 s apart: N E U m, v_n m/s; and which have a gross one."""
+    position = gauss_markov(draw, n, np.array(s.fix_wander), s.fix_tau) + draw.normal(size=(n, 3)) * s.fix_white
+    error = np.column_stack([position, draw.normal(size=(n, 3)) * s.fix_velocity])
+    gross = _gross(draw, n, s)
+    return error + gross, tuple(np.flatnonzero(gross.any(axis=1)).tolist())
 
 
 def _gross(draw: np.random.Generator, n: int, s: Sensors) -> Array:
