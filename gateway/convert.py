@@ -9,6 +9,8 @@ from messages import gyrofree_pb2 as pb
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, CGPM 1901
 ADXL345_SCALE = 3.9e-3 * STANDARD_GRAVITY  # m/s^2 per count, full resolution, data sheet rev. G; before HELLO has come
+READS_IN_TURN = {0, 3}  # board ids of the LPC1768 cube, real and emulated
+READ_S = 17e-6  # one sensor: five SPI frames of 16 bits at 4.8 MHz, and the chip select
 NO_VERTICAL = 100.0  # m, sigma of a height that is above sea level because the geoid's height is not known
 
 SOURCES = {
@@ -41,6 +43,33 @@ def specific_force(counts: list[int], scales: list[float]) -> list[float]:
     """(n x axes) counts, flat, to m/s^2 along each sensor axis."""
     axes = len(scales)
     return [count * scales[i % axes] for i, count in enumerate(counts)]
+
+
+def read_offsets(hello: Hello | None, sensors: int = 4) -> list[float]:
+    """s after the sample's instant that each axis is read; empty where all are read at once.
+
+    The LPC1768 board reads the sensors of one SPI bus one after the other, both buses at the same time.
+    """
+    if hello is None or hello.board_id not in READS_IN_TURN:
+        return []
+    buses = [sensor.bus for sensor in hello.sensors[:sensors]]
+    return [buses[:k].count(bus) * READ_S for k, bus in enumerate(buses) for _ in range(3)]
+
+
+def at_the_instant(rows: list[float], before: list[float] | None, offsets: list[float], period_s: float) -> list[float]:
+    """Rows (n x axes, flat) that were read offsets after their instants, interpolated back towards the row before.
+
+    before: the last row before these, as read; None: the first row stays as it was read.
+    """
+    axes, back = len(offsets), [offset / period_s for offset in offsets]
+    earlier = (before if before is not None else rows[:axes]) + rows[:-axes]
+    return [now - back[i % axes] * (now - then) for i, (now, then) in enumerate(zip(rows, earlier, strict=True))]
+
+
+def stale_axes(stale_mask: int, sensor_mask: int, sensors: int = 4) -> int:
+    """Wire masks, one bit per sensor, as one bit per axis: not fresh, or of a sensor that does not answer."""
+    bad = stale_mask | ~sensor_mask
+    return sum(0b111 << 3 * k for k in range(sensors) if bad >> k & 1)
 
 
 def imu_si(frame: Imu6) -> tuple[list[float], list[float]]:

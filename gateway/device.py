@@ -10,17 +10,21 @@ import queue
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 
 from google.protobuf.message import Message
 
 from firmware_protocol.codec import Deframer, Frame
-from firmware_protocol.frames import Acc12, Gps, Hello, Imu6, Status, Tacho
+from firmware_protocol.frames import Acc12, Ack, Gps, Hello, Imu6, Pps, Status, Tacho
 from firmware_protocol.ledger import Ledger
 from gateway import convert
 from gateway.batch import Batch, Index, Joiner
 from gateway.clock import DeviceClock
+from gateway.faults import SKEW_WINDOW_S, FaultWatch
 from gateway.gnss_link import GnssLink
 from gateway.link_report import LinkReport
+from gateway.orders import Orders
+from gateway.pps import PpsClock
 from gateway.reader import Chunk, Reader
 from gateway.settings import DeviceSettings, GatewaySettings
 from gateway.tacho import Tachometer
@@ -37,6 +41,7 @@ log = logging.getLogger(__name__)
 TACHO_EVERY_US = 50_000  # 20 Hz
 JOIN_WAIT_S = 0.01  # samples held back for joining wait no longer than this for the next frame
 STATUS_EVERY_S = 1.0
+PPS_ENOUGH_S = 3.0  # of pulses, until they are believed about the clock
 
 Put = Callable[[Topic, str, Message], None]
 
@@ -63,6 +68,9 @@ class DeviceLink:
         self.clock = DeviceClock(time_scale=device.time_scale)
         self.tacho = Tachometer(device.tacho_pulses_per_rev)
         self.gnss = GnssLink(device.gnss_latency_s)
+        self.pps = PpsClock()
+        self.faults = FaultWatch()
+        self.orders = Orders(device.name, lambda data: self.readers[0].write(data))
         self.report = LinkReport(self)
         self.hello: Hello | None = None
         self.status: Status | None = None
@@ -74,6 +82,7 @@ class DeviceLink:
         self._flags = 0
         self._tacho_said_us = 0
         self._index: dict[type, Index] = {}
+        self._last_row: list[float] | None = None  # specific force of the newest sample, as read
         self._joiner: dict[type, Joiner] = {Acc12: Joiner(), Imu6: Joiner()}
 
     def run(self, stop: threading.Event) -> None:
@@ -87,6 +96,7 @@ class DeviceLink:
         finally:
             for reader in self.readers:
                 reader.close()
+            self.orders.close()
             self.journal.close()
             self.spool.close()
 
@@ -96,13 +106,16 @@ class DeviceLink:
             left = due - time.monotonic()
             if left <= 0:
                 self._follow_wall_clock()
+                self.look(self.readers[0].connected, time.monotonic_ns())
                 if self._put is not None:
                     self._publish(LINK, self.report.message(), int(time.time_ns()))
                 due = max(due + STATUS_EVERY_S, time.monotonic())
                 continue
+            self.orders.step(time.monotonic())
             held = any(joiner.waiting for joiner in self._joiner.values())
+            hurry = held or self.orders.waiting
             try:
-                chunk = self.queue.get(timeout=min(left, JOIN_WAIT_S) if held else left)
+                chunk = self.queue.get(timeout=min(left, JOIN_WAIT_S) if hurry else left)
             except queue.Empty:
                 if held:
                     self._send_held()
@@ -122,8 +135,28 @@ class DeviceLink:
         """Let `run` look at its stop event now."""
         self.queue.put(None)
 
+    def order(self, command: pb.BoardCommand) -> "Future[pb.Reply]":
+        """Send a command to the board; the answer comes after its ACK. Any thread may call this."""
+        log.info("%s: %s orders %s %d", self.name, command.user or "somebody", command.name, command.value)
+        answer = self.orders.ask(command.name, None if command.ask else command.value)
+        self.wake()
+        return answer
+
+    def look(self, connected: bool, now_ns: int) -> None:
+        """Once a second: faults that only the line shows, and the news of them."""
+        by_pulses = self.pps.span_s >= PPS_ENOUGH_S
+        skew = self.pps.skew_ppm if by_pulses else self.clock.skew_ppm
+        window = SKEW_WINDOW_S if by_pulses else self.clock.span_s
+        self.faults.line(connected, skew, window, now_ns * 1e-9, now_ns + self.wall_offset_ns)
+        if self.faults.news():
+            self._publish_board(now_ns, self.clock.device_us(now_ns))
+
     def take(self, chunk: Chunk) -> None:
-        """One read of one port."""
+        """One read of one port; an empty one says that it was opened."""
+        if not chunk.data:
+            if chunk.channel == BOARD:
+                self.orders.ask("hello")  # who is there should not take ten seconds to learn
+            return
         if chunk.channel == GNSS:
             self._take_gnss(chunk.data, self.clock.device_us(chunk.monotonic_ns), chunk.monotonic_ns)
             return
@@ -135,14 +168,17 @@ class DeviceLink:
 
     def _take_frame(self, frame: Frame, received_ns: int) -> None:
         if frame.epoch != self._epoch or self.ledger.reboots != self._reboots:
-            self._restart(frame.epoch)
+            self._restart(frame.epoch, received_ns)
         self._flags = frame.flags
+        self.faults.heard(received_ns * 1e-9, received_ns + self.wall_offset_ns)
         if not self.clock.started:  # later only from frames that leave with their last datum
             self.clock.add(frame.t_us, received_ns)
         match frame.payload:
             case Acc12() | Imu6() as payload if payload.counts:
                 last_us = frame.t_us + (len(payload.counts) - 1) * payload.period_ns // 1000
                 self.clock.add(last_us, received_ns)
+                if isinstance(payload, Acc12):
+                    self.faults.samples(payload, received_ns * 1e-9, received_ns + self.wall_offset_ns)
                 self._take_samples(frame, payload, received_ns)
                 self._take_tacho_time(last_us)
             case Tacho() as payload:
@@ -150,26 +186,45 @@ class DeviceLink:
                 self.tacho.add(times, bool(payload.edge & 2), bool(payload.edge & 4))
             case Gps() as payload:
                 self._take_gnss(payload.data, frame.t_us, None)
+            case Pps() as payload:
+                self.pps.add(frame.t_us, payload.fraction_ns)
+            case Ack() as payload:
+                self.orders.take(payload)
             case Hello() | Status() as payload:
                 self.clock.add(frame.t_us, received_ns)
                 if isinstance(payload, Hello):
                     self.hello = payload
+                    self.faults.hello(payload)
                 else:
                     self.status = payload
-                self._publish(BOARD_TOPIC, convert.board_info(self.hello, self.status), None, frame.t_us)
+                    self.faults.status(payload, received_ns * 1e-9, received_ns + self.wall_offset_ns)
+                self._publish_board(received_ns, frame.t_us)
                 self._take_tacho_time(frame.t_us)
+        if self.faults.news():
+            self._publish_board(received_ns, frame.t_us)
 
-    def _restart(self, epoch: int) -> None:
+    def _publish_board(self, now_ns: int, device_us: int) -> None:
+        """What the board says of itself, and what is wrong with it."""
+        info = convert.board_info(self.hello, self.status)
+        info.faults.extend(self.faults.messages(now_ns * 1e-9))
+        if self.pps.pulses:
+            info.status["pps_taken"], info.status["pps_rejected"] = self.pps.pulses, self.pps.rejected
+        self._publish(BOARD_TOPIC, info, None, device_us)
+
+    def _restart(self, epoch: int, received_ns: int) -> None:
         """The board has booted: its clock and counters begin again."""
         if self._epoch is not None:
-            log.warning("%s: the board restarted (boot %d -> %d)", self.name, self._epoch, epoch)
+            text = f"the board restarted (boot {self._epoch} -> {epoch})"
+            log.warning("%s: %s", self.name, text)
+            self.faults.rebooted(received_ns * 1e-9, received_ns + self.wall_offset_ns, text)
         self._send_held()
         self.hello = self.status = None  # until the next HELLO only the frames' own flags say what they come from
         self._epoch, self._reboots = epoch, self.ledger.reboots
         self.clock.reset()
+        self.pps.reset()
         self.tacho.reset()
         self.gnss.restart()
-        self._index = {Acc12: Index(), Imu6: Index()}
+        self._index, self._last_row = {Acc12: Index(), Imu6: Index()}, None
         self._tacho_said_us = 0
 
     def _take_samples(self, frame: Frame, payload: Acc12 | Imu6, received_ns: int) -> None:
@@ -180,12 +235,21 @@ class DeviceLink:
             return  # nor held back for joining with live ones
         batch = Batch(first, frame.t_us, payload.period_ns, n, lost, frame.seq, received_ns, frame.flags)
         if isinstance(payload, Acc12):
-            batch.stale_mask = payload.stale_mask
-            counts = [count for row in payload.counts for count in row]
-            batch.columns = (counts, convert.specific_force(counts, convert.axis_scales(self.hello)))
+            batch.stale_mask = convert.stale_axes(payload.stale_mask, payload.sensor_mask)
+            batch.columns = self._accel_columns(payload, lost)
         else:
             batch.columns = convert.imu_si(payload)
         self._send(type(payload), self._joiner[type(payload)].add(batch))
+
+    def _accel_columns(self, payload: Acc12, lost: int) -> tuple[list[int], list[float]]:
+        """Counts as read, and specific force brought to the samples' instants."""
+        counts = [count for row in payload.counts for count in row]
+        force = convert.specific_force(counts, convert.axis_scales(self.hello))
+        before, self._last_row = None if lost else self._last_row, force[-12:]
+        offsets = convert.read_offsets(self.hello)
+        if offsets:
+            force = convert.at_the_instant(force, before, offsets, payload.period_ns * 1e-9)
+        return counts, force
 
     def _send(self, kind: type, batches: list[Batch]) -> None:
         for batch in batches:
@@ -199,8 +263,9 @@ class DeviceLink:
             first, second = batch.columns
             if kind is Acc12:
                 message = pb.AccelBatch(
-                    axes=len(first) // batch.n, counts=first, f_mps2=second, stale_mask=batch.stale_mask, **common
-                )
+                    axes=len(first) // batch.n, counts=first, f_mps2=second, stale_mask=batch.stale_mask,
+                    axis_offset_s=convert.read_offsets(self.hello), **common
+                )  # fmt: skip
                 self._publish(ACCEL, message, None, batch.device_us)
             else:
                 message = pb.ImuBatch(f_b_mps2=first, omega_ib_b_radps=second, **common)

@@ -57,6 +57,17 @@ class Port:
             raise PortEnd(f"{self.url}: read to its end")
         raise PortError(f"{self.url}: the other side closed it; waiting until it is back")
 
+    def write(self, data: bytes) -> None:
+        """Send to the board; raises PortError when the port cannot take it all at once, a file never can."""
+        if self._is_file:
+            raise PortError(f"{self.url}: is a file, nobody behind it takes commands")
+        try:
+            sent = os.write(self._fd, data)
+        except OSError as error:
+            raise PortError(f"{self.url}: cannot send ({os.strerror(error.errno or 0)})") from None
+        if sent < len(data):
+            raise PortError(f"{self.url}: took {sent} of {len(data)} bytes; the board does not read")
+
     def close(self) -> None:
         """Close; never raises."""
         try:

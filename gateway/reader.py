@@ -45,6 +45,7 @@ class Reader:
         self._channel = channel
         self._journal = journal
         self._out = out
+        self._port: Port | None = None
         self._stop = threading.Event()
         self._wake_out, self._wake_in = os.pipe()
         self._thread = threading.Thread(target=self._run, name=f"reader-{url}", daemon=True)
@@ -57,6 +58,13 @@ class Reader:
         self._thread.join()
         os.close(self._wake_in)
         os.close(self._wake_out)
+
+    def write(self, data: bytes) -> None:
+        """Send to the board; raises PortError when the port is not open or does not take it."""
+        port = self._port
+        if port is None:
+            raise PortError(self.message or f"{self.url}: not open")
+        port.write(data)
 
     def _run(self) -> None:
         retry_s = FIRST_RETRY_S
@@ -72,6 +80,8 @@ class Reader:
             self._opened += 1
             self.reconnects = self._opened - 1
             self.connected, self.message = True, ""
+            self._port = port
+            self._out.put(Chunk(self._channel, b"", time.monotonic_ns()))  # says that it is open
             log.info("%s: open", self.url)
             try:
                 self._read_until_lost(port)
@@ -82,7 +92,7 @@ class Reader:
                 self._say(str(error))
                 self._stop.wait(FIRST_RETRY_S)  # a port that opens and closes at once must not spin
             finally:
-                self.connected = False
+                self.connected, self._port = False, None
                 port.close()
 
     def _read_until_lost(self, port: Port) -> None:

@@ -10,14 +10,16 @@ import threading
 from concurrent.futures import Future
 
 import zenoh
+from google.protobuf.message import DecodeError
 
 from gateway.device import DeviceLink
 from gateway.identity import claim
 from gateway.settings import DeviceSettings, GatewaySettings
+from messages import gyrofree_pb2 as pb
 from messages.bus import BusSettings, BusUnavailable, Publishers, open_client
 from messages.history import declare
 from messages.journal import Journal, JournalBusy
-from messages.topics import GATEWAY, history_key
+from messages.topics import GATEWAY, control_key, history_key
 
 log = logging.getLogger(__name__)
 
@@ -142,10 +144,11 @@ def _publish(
     try:
         if mine is not None:
             link = mine.link
-            key = history_key(prefix, device.name)
+            key, control = history_key(prefix, device.name), control_key(prefix, device.name, "board-control")
             queryables = [
                 session.declare_queryable(key, lambda query: answer_history(query, key, link.journal)),
                 declare(session, prefix, device.name, GATEWAY, link.spool),
+                session.declare_queryable(control, lambda query: take_order(query, control, link)),
             ]
             mine.publishers.attach(session)
         stop.wait()
@@ -155,6 +158,18 @@ def _publish(
         for queryable in queryables:
             queryable.undeclare()
         token.undeclare()
+
+
+def take_order(query: zenoh.Query, key: str, link: DeviceLink) -> None:
+    """A BoardCommand for the board; the Reply follows its ACK, or says why there was none."""
+    command = pb.BoardCommand()
+    try:
+        command.ParseFromString(query.payload.to_bytes() if query.payload else b"")
+    except DecodeError as error:
+        query.reply_err(f"board-control: {error}; want a BoardCommand")
+        return
+    answer = link.order(command)
+    answer.add_done_callback(lambda done: query.reply(key, done.result().SerializeToString()))
 
 
 def answer_history(query: zenoh.Query, key: str, journal: Journal) -> None:

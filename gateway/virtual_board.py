@@ -13,8 +13,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
-from firmware_protocol.codec import FLAG_DROPPED, FLAG_SIMULATED, encode
-from firmware_protocol.frames import Acc12, Gps, Hello, Imu6, Payload, SensorInfo, Status, Tacho
+from firmware_protocol.codec import FLAG_DROPPED, FLAG_SIMULATED, Deframer, Frame, encode
+from firmware_protocol.frames import Acc12, Ack, Command, Gps, Hello, Imu6, Payload, SensorInfo, Status, Tacho
+from firmware_protocol.spec import SPEC
 
 log = logging.getLogger(__name__)
 
@@ -27,6 +28,8 @@ MAX_PULSES = 32
 GPS_BYTES = 400
 HELLO_EVERY_S = 10.0
 STATUS_EVERY_S = 1.0
+COMMANDS = {entry["id"]: entry["name"] for entry in SPEC.raw["command"]}
+UNKNOWN = next(entry["id"] for entry in SPEC.raw["result"] if entry["name"] == "unknown")
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +74,7 @@ class Link(Protocol):
     @property
     def connected(self) -> bool: ...
     def write(self, data: bytes) -> bool: ...
+    def read(self) -> bytes: ...
 
 
 class VirtualBoard:
@@ -104,6 +108,7 @@ class VirtualBoard:
         self._rows_type: type = Acc12
         self._waiting_pulses: list[BoardPulse] = []
         self._hello_s = self._status_s = float("-inf")
+        self._orders = Deframer()
 
     def run(
         self, items: Iterable[Item], stop: threading.Event, speed: float = 1.0, wait_for_reader: bool = False
@@ -127,6 +132,7 @@ class VirtualBoard:
             elif stop.is_set():
                 break
             self.take(item)
+            self._listen(item.t_s)
         self.finish()
 
     def take(self, item: Item) -> None:
@@ -167,6 +173,20 @@ class VirtualBoard:
         waiting = self._waiting_pulses
         if waiting and (len(waiting) >= MAX_PULSES or t_s - waiting[0].t_s >= TACHO_FRAME_S):
             self._send_pulses()
+
+    def _listen(self, t_s: float) -> None:
+        for event in self._orders.feed(self.link.read()):
+            if isinstance(event, Frame) and isinstance(event.payload, Command):
+                self._obey(event.payload, t_s)
+
+    def _obey(self, order: Command, t_s: float) -> None:
+        """It can say who it is and how it is; there is nothing to set on it."""
+        name = COMMANDS.get(order.command)
+        if name == "hello":
+            self._send(self._hello(), t_s)
+        elif name == "status":
+            self._send(self._status(), t_s)
+        self._send(Ack(order.command, order.token, 0 if name in ("hello", "status") else UNKNOWN), t_s)
 
     def _sample(self, frame_type: type, t_s: float, row: tuple[int, ...]) -> None:
         """A sample's index counts periods, so a gap in the items is a gap in the index."""

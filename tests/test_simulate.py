@@ -24,6 +24,9 @@ class Wire:
         self.data += data
         return True
 
+    def read(self):
+        return b""
+
     def close(self):
         pass
 
