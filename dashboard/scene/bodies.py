@@ -7,7 +7,7 @@ import numpy as np
 from viser import SceneApi
 
 from dashboard.scene import geometry as geo
-from dashboard.scene.palette import AXES, GREY, ORANGE, YELLOW, estimator_title, rgb
+from dashboard.scene.palette import GREY, ORANGE, YELLOW, estimator_title, rgb
 
 Nodes = dict[str, object]  # handles by name
 
@@ -79,32 +79,7 @@ def cube(scene: SceneApi, nodes: Nodes, body: str, colour: str, name: str, index
         font_screen_scale=0.8,
     )
     if main:
-        _sensors(scene, nodes, body)
         _rate_arrow(scene, nodes, body)
-
-
-def _sensors(scene: SceneApi, nodes: Nodes, body: str) -> None:
-    """Twelve arrows at their corners, drawn along each sensor's direction, with the axis' name at the tip."""
-    start, direction = geo.SENSORS_B, geo.DIRECTIONS_B
-    group = f"{body}/axes"
-    nodes[group] = scene.add_frame(group, show_axes=False)
-    colours = np.tile(np.array([rgb(c) for c in AXES], dtype=np.uint8), (4, 1))
-    scene.add_arrows(
-        f"{group}/arrows",
-        np.stack([start, start + 0.42 * direction], axis=1).astype(np.float32),
-        colours,
-        shaft_radius=0.022,
-        head_radius=0.055,
-        head_length=0.13,
-    )
-    for i in range(12):
-        scene.add_label(
-            f"{group}/a{i // 3 + 1}{i % 3 + 1}",
-            f"a{i // 3 + 1}{i % 3 + 1}",
-            position=tuple(start[i] + 0.5 * direction[i]),
-            anchor="center-center",
-            font_screen_scale=0.62,
-        )
 
 
 def _rate_arrow(scene: SceneApi, nodes: Nodes, body: str) -> None:

@@ -24,6 +24,7 @@ import viser
 
 from dashboard.scene import bodies, camera
 from dashboard.scene import geometry as geo
+from dashboard.scene.axis_arrows import AxisArrows
 from dashboard.scene.palette import FIX, REJECTED, estimator_colour, number, rgb, truth_colour
 from dashboard.scene.store import Device
 
@@ -53,6 +54,8 @@ class SceneView:
         self._sent: dict[str, tuple] = {}
         self._pieces: dict[str, int] = {}  # points of each track piece that the browser has
         self._thinned: dict[str, int] = {}
+        self._arrows: AxisArrows | None = None
+        self._shown = True  # False while a page has a scene of its own
         self._turning = False  # fast enough for an arrow
         self._scene.set_up_direction("+z")
         self._lights()
@@ -65,6 +68,12 @@ class SceneView:
             seen.up_direction = (0.0, 0.0, 1.0)
             seen.position, seen.look_at = position, look_at
 
+    def show(self, shown: bool) -> None:
+        """Hide the device's world while a page has a scene of its own."""
+        self._shown = shown
+        if "/world" in self._nodes:
+            self._nodes["/world"].visible = shown
+
     def forget(self) -> None:
         """Take everything away; the next update builds it again."""
         if "/world" in self._nodes:
@@ -74,6 +83,7 @@ class SceneView:
         self._pieces.clear()
         self._thinned.clear()
         self._built = ()
+        self._arrows = None
 
     def update(self, device: Device) -> None:
         """Poses from the newest messages. Call under the store's lock, 20 to 30 times a second."""
@@ -120,7 +130,7 @@ class SceneView:
 
     def _build(self, vehicle: bool, estimators: list[str], truth: bool) -> None:
         scene, dark = self._scene, self._choice.dark
-        self._nodes["/world"] = scene.add_frame("/world", show_axes=False, wxyz=geo.Q_DISPLAY_N)
+        self._nodes["/world"] = scene.add_frame("/world", show_axes=False, wxyz=geo.Q_DISPLAY_N, visible=self._shown)
         bodies.ground(scene, self._nodes, vehicle, dark)
         for index, name in enumerate(estimators):
             colour = estimator_colour(name, estimators)
@@ -134,6 +144,8 @@ class SceneView:
                 )
             else:
                 bodies.cube(scene, self._nodes, body, colour, name, index)
+                if index == 0:
+                    self._arrows = AxisArrows(scene, self._nodes, body)
         if not vehicle:
             bodies.table(scene, self._nodes, dark)
         if truth:
@@ -168,6 +180,9 @@ class SceneView:
             reference = geo.quaternion(truth.message.q_nb) or reference
             self._set("/world/truth", q=reference)
         self._set("/world/table", q=reference)
+        health = device.get("axes")
+        if self._arrows is not None and health is not None:
+            self._arrows.update(health.message)
         if estimators:
             self._update_rate_arrow(f"/world/estimate/{estimators[0]}/body/rate", device, estimators[0])
 

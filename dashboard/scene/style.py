@@ -6,7 +6,7 @@ viser puts an HTML element into the page as it is, so a style element there hold
 from pathlib import Path
 
 LEFT_WIDTH = 300.0  # px, of the summary on the left
-TABS = 10  # the chosen one of at most so many tabs can be marked
+TABS = 20  # the chosen one of at most so many tabs can be marked
 
 
 def css() -> str:

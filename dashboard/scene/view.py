@@ -139,7 +139,7 @@ class View:
         )
         add("Reset camera", hotkey="R").on_trigger(lambda _: self._reset_camera())
         for index, page in enumerate(PAGES):
-            turn = add(f"Page: {page.title}", hotkey=str(index + 1))
+            turn = add(f"Page: {page.title}", hotkey=str(index + 1) if index < 9 else None)
             turn.on_trigger(lambda _, index=index: self._choose_page(index))
 
     # --- what the person does -------------------------------------------------------------------------------------
@@ -181,7 +181,10 @@ class View:
 
     def _open(self, index: int) -> None:
         with self._lock:
+            if index != self._page:
+                self._pages[self._page].hide()
             self._page = index
+            self.scene.show(not self._pages[index].own_scene)
             self._marker.content = f'<span class="gf-tab gf-tab-{index}"></span>'
             for k, folder in enumerate(self._folders):
                 if folder.visible != (k == index):

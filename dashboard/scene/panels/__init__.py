@@ -6,12 +6,25 @@ from dashboard.scene.panels.axes import Axes
 from dashboard.scene.panels.base import Panel, Snapshot
 from dashboard.scene.panels.devices import Devices
 from dashboard.scene.panels.errors import Errors
+from dashboard.scene.panels.health import Health
 from dashboard.scene.panels.innovations import Innovations
+from dashboard.scene.panels.layout import LayoutBench
 from dashboard.scene.panels.link import Link
 from dashboard.scene.panels.position import Position
 from dashboard.scene.panels.rates import Rates
 from dashboard.scene.panels.record import Record
 
-PAGES: tuple[type[Panel], ...] = (Rates, Axes, Acceleration, Angle, Position, Errors, Innovations, Link)
+PAGES: tuple[type[Panel], ...] = (
+    Rates,
+    Axes,
+    Acceleration,
+    Angle,
+    Position,
+    Errors,
+    Innovations,
+    Link,
+    Health,
+    LayoutBench,
+)
 
 __all__ = ["PAGES", "Devices", "Panel", "Position", "Record", "Snapshot"]

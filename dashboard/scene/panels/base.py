@@ -37,6 +37,7 @@ class Panel:
     """A page of charts and tables in a folder of one client's GUI; update() is called only while it is visible."""
 
     title = ""
+    own_scene = False  # True: the page shows something else than the device in 3-D
 
     def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
         self.client, self.folder = client, folder
@@ -68,6 +69,9 @@ class Panel:
     def update(self, s: Snapshot) -> None:
         """Bring the page to the state of the snapshot."""
         raise NotImplementedError
+
+    def hide(self) -> None:
+        """Another page was opened."""
 
 
 def estimator_curve(
