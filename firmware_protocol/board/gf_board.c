@@ -148,19 +148,18 @@ static void flush(gf_board_t *b) {
 }
 
 static void frame_sample(gf_board_t *b, const gf_sample_t *sample) {
-  const uint64_t t_us = to_us(b, sample->ticks);
   /* the rows of a frame lie on one grid and have one set of sensors */
   if (sample->index != b->next_index || sample->alive != b->acc_alive) {
     flush(b);
   }
   if (b->acc.n == 0u) {
-    gf_acc12_begin(&b->acc, t_us, sample->index, b->period_ns, sample->alive);
+    gf_acc12_begin(&b->acc, to_us(b, sample->ticks), sample->index, b->period_ns, sample->alive);
     b->acc_alive = sample->alive;
   }
   (void)gf_acc12_row(&b->acc, sample->counts, sample->stale);
   if (b->adc_mask != 0u) {
     if (b->adc.n == 0u) {
-      gf_adc_begin(&b->adc, t_us, sample->index, b->period_ns, b->adc_mask, GF_ANALOG_VREF_MV);
+      gf_adc_begin(&b->adc, to_us(b, sample->ticks), sample->index, b->period_ns, b->adc_mask, GF_ANALOG_VREF_MV);
     }
     (void)gf_adc_row(&b->adc, sample->analog);
   }
