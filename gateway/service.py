@@ -24,7 +24,7 @@ from messages.topics import GATEWAY, control_key, history_key
 log = logging.getLogger(__name__)
 
 HISTORY_BYTES = 4 << 20  # of records in one reply; who wants more asks on from where it ended
-BUSY_RETRY_S = 2.0  # a journal that another gateway has is asked for again after so long
+BUSY_RETRY_S = 0.2  # a journal that another gateway has is asked for again after so long
 
 
 def run(settings: GatewaySettings, bus: BusSettings, stop: threading.Event) -> None:

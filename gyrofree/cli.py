@@ -126,12 +126,14 @@ def gateway(config: Config = None, verbose: Verbose = False) -> None:
     """Read the boards of [[gateway.devices]], journal every byte, publish samples."""
     settings = settings_of(config)
 
-    def body(stop: threading.Event) -> None:
-        from gateway import service
+    from gateway import service
+    from gyrofree.guardian import guard, leave_when_alone
 
+    def body(stop: threading.Event) -> None:
+        leave_when_alone(stop)
         service.run(settings.gateway, settings.bus, stop)
 
-    run_service(body, verbose)
+    guard(lambda: run_service(body, verbose))
 
 
 @app.command()

@@ -78,7 +78,8 @@ class RunningDemo:
             except psutil.Error:
                 continue  # it has just ended
             if "gyrofree" in words:
-                found[words[words.index("gyrofree") + 1]] = process
+                name = words[words.index("gyrofree") + 1]  # of a guarded service the child, which is younger
+                found[name] = max(process, found.get(name, process), key=lambda p: p.pid)
         return found
 
     def __exit__(self, *_: object) -> None:
