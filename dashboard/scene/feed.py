@@ -62,6 +62,19 @@ class Feed:
                 return pb.RecorderStatus.FromString(reply.ok.payload.to_bytes())
         raise ConnectionError("the recorder does not answer: is `gyrofree record` running?")
 
+    def estimator(self, command: pb.EstimatorCommand, timeout_s: float = 20.0) -> pb.Reply:
+        """Give the estimator of a device an order and return its answer; raises ConnectionError without one.
+
+        A fit takes seconds, and the order waits for the samples before it.
+        """
+        if self._session is None:
+            raise ConnectionError("no connection to the router yet")
+        key = tp.control_key(self._settings.prefix, command.device, "estimator-control")
+        for reply in self._session.get(key, payload=command.SerializeToString(), timeout=timeout_s):
+            if reply.ok is not None:
+                return pb.Reply.FromString(reply.ok.payload.to_bytes())
+        raise ConnectionError("the estimator does not answer: is `gyrofree estimator` running?")
+
     def stop(self) -> None:
         """Close the session and wait for the thread."""
         self._stop.set()

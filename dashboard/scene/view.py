@@ -44,8 +44,9 @@ class View:
 
     @property
     def own_uuids(self) -> frozenset[str]:
-        """Inputs that change nothing but this browser's own view: all except the recorder's."""
-        return frozenset(self._client.gui._gui_input_handle_from_uuid) - self._record.uuids
+        """Inputs that change nothing but this browser's own view: all except the recorder's and those of orders."""
+        orders = frozenset().union(*(page.uuids for page in self._pages))
+        return frozenset(self._client.gui._gui_input_handle_from_uuid) - self._record.uuids - orders
 
     # --- ticks ----------------------------------------------------------------------------------------------------
 
@@ -124,6 +125,8 @@ class View:
             tabs.on_click(lambda _: self._choose_page([page.title for page in PAGES].index(tabs.value)))
             self._folders = [gui.add_folder(None, visible=False) for _ in PAGES]
         self._pages = [page(self._client, folder) for page, folder in zip(PAGES, self._folders, strict=True)]
+        for page in self._pages:
+            page.feed = self._feed
         panel.dock_right()
         panel.set_width(470)
         self._open(0)

@@ -4,6 +4,7 @@ from dashboard.scene.panels.acceleration import Acceleration
 from dashboard.scene.panels.angle import Angle
 from dashboard.scene.panels.axes import Axes
 from dashboard.scene.panels.base import Panel, Snapshot
+from dashboard.scene.panels.calibration import Calibration
 from dashboard.scene.panels.devices import Devices
 from dashboard.scene.panels.errors import Errors
 from dashboard.scene.panels.health import Health
@@ -25,6 +26,7 @@ PAGES: tuple[type[Panel], ...] = (
     Link,
     Health,
     LayoutBench,
+    Calibration,
 )
 
 __all__ = ["PAGES", "Devices", "Panel", "Position", "Record", "Snapshot"]

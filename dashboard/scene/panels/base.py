@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import viser
@@ -37,6 +38,7 @@ class Panel:
     """A page of charts and tables in a folder of one client's GUI; update() is called only while it is visible."""
 
     title = ""
+    feed: Any = None  # dashboard.scene.feed.Feed, set by the view: how a panel gives orders
     own_scene = False  # True: the page shows something else than the device in 3-D
 
     def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
@@ -65,6 +67,11 @@ class Panel:
         if handle.content != content:
             handle.content = content
         return handle
+
+    @property
+    def uuids(self) -> frozenset[str]:
+        """Inputs that do more than change this browser's own view: a viewer may not use them."""
+        return frozenset()
 
     def update(self, s: Snapshot) -> None:
         """Bring the page to the state of the snapshot."""
