@@ -22,6 +22,7 @@ class Batch:
     flags: int
     stale_mask: int = 0
     columns: tuple[list, ...] = field(default_factory=tuple)  # equal in kind from batch to batch
+    kind: tuple = ()  # what else must be the same for two batches to be joined
 
     def follows(self, next_one: "Batch") -> bool:
         """True when the next one continues this without gap or change."""
@@ -30,6 +31,7 @@ class Batch:
             and next_one.first_index == self.first_index + self.n
             and next_one.period_ns == self.period_ns
             and next_one.flags == self.flags
+            and next_one.kind == self.kind
         )
 
     def extend(self, next_one: "Batch") -> None:

@@ -15,9 +15,9 @@ from concurrent.futures import Future
 from google.protobuf.message import Message
 
 from firmware_protocol.codec import Deframer, Frame
-from firmware_protocol.frames import Acc12, Ack, Gps, Hello, Imu6, Pps, Status, Tacho
+from firmware_protocol.frames import Acc12, Ack, Adc, Gps, Hello, Imu6, Pps, Status, Tacho
 from firmware_protocol.ledger import Ledger
-from gateway import convert
+from gateway import convert, samples
 from gateway.batch import Batch, Index, Joiner
 from gateway.clock import DeviceClock
 from gateway.faults import SKEW_WINDOW_S, FaultWatch
@@ -32,9 +32,9 @@ from messages import gyrofree_pb2 as pb
 from messages.journal import Journal
 from messages.journal_file import BOARD, GNSS
 from messages.spool import Spool
-from messages.topics import ACCEL, IMU, LINK, LOCATION, TACHO, Topic
 from messages.topics import BOARD as BOARD_TOPIC
 from messages.topics import GNSS as GNSS_TOPIC
+from messages.topics import LINK, LOCATION, TACHO, Topic
 
 log = logging.getLogger(__name__)
 
@@ -82,8 +82,9 @@ class DeviceLink:
         self._flags = 0
         self._tacho_said_us = 0
         self._index: dict[type, Index] = {}
+        self._lacking: list[int] = []  # inputs that an analogue board does not send though settings want them
         self._last_row: list[float] | None = None  # specific force of the newest sample, as read
-        self._joiner: dict[type, Joiner] = {Acc12: Joiner(), Imu6: Joiner()}
+        self._joiner: dict[type, Joiner] = {kind: Joiner() for kind in samples.KINDS}
 
     def run(self, stop: threading.Event) -> None:
         """Open the ports, journal, count, and publish once live, until `stop` is set."""
@@ -174,7 +175,7 @@ class DeviceLink:
         if not self.clock.started:  # later only from frames that leave with their last datum
             self.clock.add(frame.t_us, received_ns)
         match frame.payload:
-            case Acc12() | Imu6() as payload if payload.counts:
+            case Acc12() | Imu6() | Adc() as payload if payload.counts:
                 last_us = frame.t_us + (len(payload.counts) - 1) * payload.period_ns // 1000
                 self.clock.add(last_us, received_ns)
                 if isinstance(payload, Acc12):
@@ -224,10 +225,10 @@ class DeviceLink:
         self.pps.reset()
         self.tacho.reset()
         self.gnss.restart()
-        self._index, self._last_row = {Acc12: Index(), Imu6: Index()}, None
+        self._index, self._last_row = {kind: Index() for kind in samples.KINDS}, None
         self._tacho_said_us = 0
 
-    def _take_samples(self, frame: Frame, payload: Acc12 | Imu6, received_ns: int) -> None:
+    def _take_samples(self, frame: Frame, payload: samples.Samples, received_ns: int) -> None:
         n = len(payload.counts)
         self.report.samples += n
         first, lost = self._index[type(payload)].take(payload.first_index, n)
@@ -237,8 +238,14 @@ class DeviceLink:
         if isinstance(payload, Acc12):
             batch.stale_mask = convert.stale_axes(payload.stale_mask, payload.sensor_mask)
             batch.columns = self._accel_columns(payload, lost)
-        else:
+        elif isinstance(payload, Imu6):
             batch.columns = convert.imu_si(payload)
+        else:
+            batch.kind = samples.adc_kind(payload, self.device.analogue)
+            batch.columns, lacking = samples.adc_columns(payload, self.device.analogue)
+            if lacking and lacking != self._lacking:
+                log.warning("%s: no counts of inputs %s: see [gateway.devices.analogue]", self.name, lacking)
+            self._lacking = lacking
         self._send(type(payload), self._joiner[type(payload)].add(batch))
 
     def _accel_columns(self, payload: Acc12, lost: int) -> tuple[list[int], list[float]]:
@@ -253,23 +260,8 @@ class DeviceLink:
 
     def _send(self, kind: type, batches: list[Batch]) -> None:
         for batch in batches:
-            common = dict(
-                first_index=batch.first_index,
-                period_s=batch.period_ns * 1e-9,
-                lost_samples=batch.lost,
-                frame_sequence=batch.frame_sequence,
-                received_ns=batch.received_ns,
-            )
-            first, second = batch.columns
-            if kind is Acc12:
-                message = pb.AccelBatch(
-                    axes=len(first) // batch.n, counts=first, f_mps2=second, stale_mask=batch.stale_mask,
-                    axis_offset_s=convert.read_offsets(self.hello), **common
-                )  # fmt: skip
-                self._publish(ACCEL, message, None, batch.device_us)
-            else:
-                message = pb.ImuBatch(f_b_mps2=first, omega_ib_b_radps=second, **common)
-                self._publish(IMU, message, None, batch.device_us)
+            for topic, message in samples.messages_of(kind, batch, self.hello):
+                self._publish(topic, message, None, batch.device_us)
             self.report.latency_ns.append(time.monotonic_ns() - batch.received_ns)
 
     def _send_held(self) -> None:
