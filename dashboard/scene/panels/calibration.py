@@ -13,7 +13,7 @@ log = logging.getLogger(__name__)
 
 MG = 1e3 / 9.80665  # mg per m/s^2
 GONE_S = 3.0  # s without a word of a running calibration
-CAMERA = np.array([0.80, -0.52, 0.33])  # where the picture is seen from, in the frame whose z is up
+CAMERA = np.array([0.80, -0.52, 0.50])  # where the picture is seen from, in the frame whose z is up
 ACTION = pb.EstimatorCommand
 STATE = pb.CalibrationStatus
 STATES = {
@@ -145,7 +145,7 @@ def upright(up_b: np.ndarray) -> np.ndarray:
 
 
 def facing(up_b: np.ndarray, camera: np.ndarray) -> np.ndarray:
-    """As upright(), turned about the vertical until the faces that point up are all seen well."""
+    """As upright(), turned about the vertical until as much as can be is seen of the faces that point up."""
     faces = [np.sign(up_b[k]) * np.eye(3)[k] for k in range(3) if abs(up_b[k]) > 0.3]
     first = upright(up_b)
 
@@ -153,7 +153,10 @@ def facing(up_b: np.ndarray, camera: np.ndarray) -> np.ndarray:
         c, s = np.cos(k * np.pi / 12.0), np.sin(k * np.pi / 12.0)
         return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ first
 
-    return turned(max(range(24), key=lambda k: round(min(float(turned(k) @ face @ camera) for face in faces), 6)))
+    def seen(k: int) -> float:
+        return round(sum(np.sqrt(max(float(turned(k) @ face @ camera), 0.0)) for face in faces), 6)
+
+    return turned(max(range(24), key=seen))
 
 
 def picture(up_b: np.ndarray, dark: bool) -> str:
@@ -188,8 +191,8 @@ def picture(up_b: np.ndarray, dark: bool) -> str:
     x, tip = 206.0, 40.0
     parts.append(
         f'<path d="M{x},150 V{tip + 12} M{x - 8},{tip + 14} L{x},{tip} L{x + 8},{tip + 14}" fill="none" '
-        f'stroke="{line}" stroke-width="4" stroke-linecap="round"/><text x="{x}" y="172" text-anchor="middle" font-size="13" '
-        f'fill="{line}">up</text>'
+        f'stroke="{line}" stroke-width="4" stroke-linecap="round"/>'
+        f'<text x="{x}" y="172" text-anchor="middle" font-size="13" fill="{line}">up</text>'
     )
     return (
         '<svg class="gf-pose" viewBox="0 0 230 210" width="230" height="210" role="img" '
