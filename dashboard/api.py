@@ -88,6 +88,7 @@ class StartRecording(Strict):
 
 class StartReplay(Strict):
     speed: float = Field(default=1.0, ge=0.1, le=100.0)
+    t: float = Field(default=0.0, ge=0.0, le=1e7, description="begin at this second of it")
 
 
 class SessionOut(BaseModel):
@@ -240,13 +241,13 @@ def order_recorder(front: Front, action: int, user: str, name: str = "", note: s
     return recording_out(front).model_copy(update={"available": True} | _recorder_fields(status))
 
 
-def start_replay(front: Front, session: str, speed: float) -> RecordingOut:
+def start_replay(front: Front, session: str, speed: float, at_s: float = 0.0) -> RecordingOut:
     """Send a recording through the bus again; HTTP 503 where there is no replay, 409 when it cannot start."""
     path = file_of(front, session)
     if front.replay is None:
         raise HTTPException(503, f"this dashboard cannot replay; run `gyrofree replay {session}`")
     try:
-        front.replay.start(path, speed)
+        front.replay.start(path, speed, at_s)
     except ControlError as error:
         raise HTTPException(409, str(error)) from None
     return recording_out(front)
@@ -307,7 +308,7 @@ def download(request: Request, session: str, who: SignedIn) -> FileResponse:
 
 @routes.post("/sessions/{session}/replay", summary="Send it through the bus again (operator)")
 def replay(request: Request, session: str, body: StartReplay, who: Operator) -> RecordingOut:
-    return start_replay(front_of(request), session, body.speed)
+    return start_replay(front_of(request), session, body.speed, body.t)
 
 
 @routes.post("/replay/stop", summary="End the replay (operator)")

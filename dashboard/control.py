@@ -101,8 +101,8 @@ class RecorderControl:
 class Replay(Protocol):
     """How the pages start a replay through the bus; the composition root says how it is done."""
 
-    def start(self, path: Path, speed: float) -> None:
-        """Begin in the background; raises ControlError."""
+    def start(self, path: Path, speed: float, at_s: float = 0.0) -> None:
+        """Begin in the background, at this second of it; raises ControlError."""
 
     def stop(self) -> None:
         """End what runs."""
@@ -120,12 +120,13 @@ class ProcessReplay:
         self._process: subprocess.Popen | None = None
         self._path: Path | None = None
 
-    def start(self, path: Path, speed: float) -> None:
+    def start(self, path: Path, speed: float, at_s: float = 0.0) -> None:
         """Begin in the background; raises ControlError when one runs or the command cannot be started."""
         with self._lock:
             if self._alive():
                 raise ControlError("a replay runs already: stop it first")
             command = [*self._command, str(path), "--speed", f"{speed:g}"]
+            command += ["--at", f"{at_s:g}"] if at_s else []
             try:
                 self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
             except OSError as error:

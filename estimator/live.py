@@ -31,7 +31,7 @@ from messages.history import Asker, declare
 from messages.journal import JournalBusy
 from messages.mending import Arrival, Mender, Question
 from messages.spool import Spool
-from messages.topics import ESTIMATES, TopicError, parse
+from messages.topics import ESTIMATES, REPLAY_SUFFIX, TopicError, parse
 
 log = logging.getLogger(__name__)
 
@@ -267,7 +267,7 @@ def _on(worker: Worker) -> Callable[[Any], None]:
             address = parse(str(sample.key_expr))
         except TopicError:
             return
-        if address.topic in INPUTS:
+        if address.topic in INPUTS and not address.device.endswith(REPLAY_SUFFIX):  # a replay makes its own estimates
             payload = sample.payload.to_bytes()
             worker.offer(Arrival(address.topic, address.device, address.estimator, payload, time.time_ns()))
 

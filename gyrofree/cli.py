@@ -14,6 +14,7 @@ from rich.table import Table
 
 from gyrofree import cli_board, cli_calibrate, cli_handover, cli_layout, cli_run, cli_sessions, cli_users
 from gyrofree.cli_options import AsJson, Config, Fault, Speed, Verbose, faults_of, settings_of
+from gyrofree.cli_replay import replay
 from gyrofree.config import ConfigError
 from gyrofree.process import EXIT_CONFIG as CONFIG
 from gyrofree.process import EXIT_FAILED, fail, run_service
@@ -175,7 +176,8 @@ def dashboard(config: Config = None, verbose: Verbose = False) -> None:
         from dashboard.control import ProcessReplay
         from dashboard.jobs import Jobs
 
-        replayer = [sys.executable, "-m", "gyrofree", "replay"] + (["--config", str(config)] if config else [])
+        replayer = [sys.executable, "-m", "gyrofree", "replay", "--stay"]
+        replayer += ["--config", str(config)] if config else []
         jobs = Jobs([sys.executable, "-m", "gyrofree"])
         service.run(settings.dashboard, settings.bus, stop, replay=ProcessReplay(replayer), jobs=jobs)
 
@@ -267,33 +269,7 @@ def play(
     )
 
 
-@app.command()
-def replay(
-    session: Annotated[
-        str, typer.Argument(help="Id of a recording (`--list` shows them) or path of an MCAP file.")
-    ] = "",
-    speed: Speed = 1.0,
-    check: Annotated[
-        bool, typer.Option(help="Do not publish: run the estimators on it and compare bit for bit.")
-    ] = False,
-    listing: Annotated[bool, typer.Option("--list", help="List the recordings.")] = False,
-    as_json: AsJson = False,
-    config: Config = None,
-    verbose: Verbose = False,
-) -> None:
-    """Send a recording through the bus again, or prove that it reproduces its estimates."""
-    settings = settings_of(config)
-    from gyrofree import replay as player
-
-    if listing or not session:
-        return player.show_list(settings, as_json)
-    try:
-        path = player.find(settings, session)
-    except LookupError as error:
-        raise fail(str(error)) from None
-    if check:
-        raise typer.Exit(player.check(settings, path, as_json))
-    run_service(lambda stop: player.run(settings, path, speed, stop), verbose)
+app.command()(replay)
 
 
 @app.command()

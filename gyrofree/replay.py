@@ -4,14 +4,22 @@ import datetime
 import json
 import sys
 import threading
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from google.protobuf.message import DecodeError
 from rich.console import Console
 from rich.table import Table
 
 from gyrofree.config import Settings
+from messages import gyrofree_pb2 as pb
 from sessions.catalogue import Catalogue
+
+if TYPE_CHECKING:
+    import zenoh
+
+    from sessions.playback import Playback
 
 
 def find(settings: Settings, session: str) -> Path:
@@ -62,8 +70,56 @@ def check(settings: Settings, path: Path, as_json: bool) -> int:
     return 0 if result.identical else 1
 
 
-def run(settings: Settings, path: Path, speed: float, stop: threading.Event) -> None:
-    """Publish the recorded inputs at `speed` times real time."""
-    from sessions import replay
+@dataclass(frozen=True)
+class Options:
+    """How a recording is played."""
 
-    replay.run(path, settings.bus, stop, speed=speed)
+    speed: float = 1.0
+    at_s: float = 0.0  # begin at this second of it
+    paused: bool = False
+    stay: bool = False  # wait at the end for orders
+    rate: tuple[str, ...] = ()  # rate estimators instead of the configured ones
+    overlay: bool = False  # publish the recorded estimates beside the new ones
+
+
+def run(settings: Settings, path: Path, options: Options, stop: threading.Event) -> None:
+    """Play a recording on the bus and obey the orders on <prefix>/replay/control."""
+    from estimator.service import Pipeline
+    from messages.bus import Publishers, open_client
+    from messages.topics import REPLAY, replay_control_key
+    from sessions.playback import Playback
+    from sessions.replay import DRAIN_S, Outlet
+
+    estimator = settings.estimator
+    if options.rate:
+        estimator = estimator.model_copy(update={"rate": list(options.rate)})
+    Pipeline(estimator)  # names that do not exist are refused now
+    with open_client(settings.bus, stop) as session:
+        outlet, publishers = Outlet(session, settings.bus.prefix), Publishers(session, settings.bus.prefix)
+        playback = Playback(
+            path,
+            outlet.put,
+            lambda: Pipeline(estimator),
+            speed=options.speed,
+            at_s=options.at_s,
+            paused=options.paused,
+            show_recorded=options.overlay,
+        )
+        key = replay_control_key(settings.bus.prefix)
+        orders = session.declare_queryable(key, lambda query: _order(playback, key, query))
+        try:
+            playback.run(stop, lambda status: publishers.put(REPLAY, REPLAY.name, status), options.stay)
+            stop.wait(DRAIN_S)
+        finally:
+            orders.undeclare()
+
+
+def _order(playback: "Playback", key: str, query: "zenoh.Query") -> None:
+    """A query on the control key: a ReplayCommand in, a ReplayStatus out when it has been carried out."""
+    command = pb.ReplayCommand()
+    try:
+        command.ParseFromString(query.payload.to_bytes() if query.payload is not None else b"")
+    except DecodeError:
+        query.reply_err(b"the payload is no ReplayCommand")
+        return
+    playback.order(command, lambda status: query.reply(key, status.SerializeToString()))
