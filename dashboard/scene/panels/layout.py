@@ -36,8 +36,12 @@ class LayoutBench(Panel):
         self._dirty = True
         self._open = False
         self._table = None
-        gui = client.gui
-        with folder:
+        if client is not None:  # without a browser there are figures only
+            self._controls()
+
+    def _controls(self) -> None:
+        gui = self.client.gui
+        with self.folder:
             self._from = gui.add_dropdown("Start from", tuple(LAYOUTS), initial_value="cube", order=0.1)
             self._axis = gui.add_dropdown("Sensor", self._layout.axis_names, order=0.2)
             self._triad = gui.add_checkbox("Whole triad", True, order=0.3, hint="Move all axes that sit at one point")
@@ -57,9 +61,10 @@ class LayoutBench(Panel):
         if self._dirty or not self._nodes:
             self._dirty = False
             q = analyse(self._layout)
-            self._draw(q)
+            if self.client is not None:
+                self._draw(q)
             self._table = self.html(figures(q, self._cube), self._table)
-        if self._gizmo is None:
+        if self._gizmo is None and self.client is not None:
             self._place_gizmo()
 
     def hide(self) -> None:
