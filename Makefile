@@ -49,16 +49,7 @@ dev: .make/dev
 	@touch $@
 
 system-packages:
-	@missing=""; \
-	command -v chromium >/dev/null || missing="$$missing chromium fonts-dejavu-core"; \
-	command -v gcc >/dev/null || missing="$$missing gcc libc6-dev"; \
-	command -v arm-none-eabi-gcc >/dev/null || missing="$$missing gcc-arm-none-eabi"; \
-	command -v qemu-system-arm >/dev/null || missing="$$missing qemu-system-arm"; \
-	command -v clang >/dev/null || missing="$$missing clang libclang-rt-14-dev"; \
-	command -v clang-tidy >/dev/null || missing="$$missing clang-tidy"; \
-	command -v cppcheck >/dev/null || missing="$$missing cppcheck"; \
-	[ -z "$$missing" ] || if [ "$$(id -u)" = 0 ]; then apt-get update -q && apt-get install -y -q --no-install-recommends $$missing; \
-	else echo "The tests need Debian packages; run: sudo apt-get install$$missing"; exit 1; fi
+	@sh tests/system_packages.sh
 
 test: setup dev system-packages
 	$(BIN)/python -m pytest

@@ -73,7 +73,8 @@ def test_registers_are_where_the_vendor_says(svd, tmp_path):
         lines.append(f'_Static_assert({irq}_IRQ == {svd[irq].find("interrupt").findtext("value")}, "{irq}");')
     source = tmp_path / "check.c"
     source.write_text("\n".join(lines) + "\n")
-    subprocess.run(["arm-none-eabi-gcc", "-std=gnu11", "-mcpu=cortex-m3", "-mthumb", "-fsyntax-only", f"-I{PORT}",
+    subprocess.run(["arm-none-eabi-gcc", "-std=gnu11", "-mcpu=cortex-m3", "-mthumb", "-ffreestanding",
+                    "-fsyntax-only", f"-I{PORT}",
                     str(source)], check=True, timeout=60)
 
 

@@ -49,7 +49,8 @@ def report(language: str, seed: int, truth: Truth, frames: list[Frame], ledger: 
     print(json.dumps({
         "bench": "conformance", "language": language, "seed": seed, "frames": N_FRAMES, "damages": N_DAMAGES,
         "lost_counted": ledger.lost_frames, "lost_truly": N_FRAMES - len(frames),
-        "dropped_by_device": ledger.device_dropped, "bad_chunks": ledger.bad_chunks, "wrongly_accepted": wrong}), flush=True)
+        "dropped_by_device": ledger.device_dropped, "bad_chunks": ledger.bad_chunks,
+        "wrongly_accepted": wrong}), flush=True)
 
 
 def main() -> None:
