@@ -16,7 +16,14 @@ REJECTED = VERMILLION  # a fix the filter did not believe
 _ESTIMATORS = {"products-ekf": SKY, "least-squares": VERMILLION, "ekf": SKY}
 _FURTHER = (PURPLE, YELLOW, ORANGE, BLUE, VERMILLION, SKY)
 # Names for people; anything else is shown as it is called on the bus.
-_TITLES = {"products-ekf": "products filter", "least-squares": "least squares", "ekf": "INS/GNSS filter"}
+_TITLES = {
+    "products-ekf": "products filter",
+    "least-squares": "least squares",
+    "ekf": "INS/GNSS filter",
+    "vqf": "VQF",
+    "tilt-vector": "fixed weight, vector form",
+    "tilt-published": "fixed weight, published",
+}
 
 SOURCES = {
     pb.SOURCE_SIMULATED: ("SIMULATED", PURPLE),

@@ -12,6 +12,8 @@ import numpy as np
 from google.protobuf.message import Message
 
 from dashboard.scene.geometry import Track, ned_from_geodetic
+from dashboard.scene.ring import Ring
+from dashboard.scene.tilt import tilt_rows
 from messages import gyrofree_pb2 as pb
 from messages import topics as tp
 
@@ -21,50 +23,6 @@ MARKS = 200  # notes and marks of a device that are drawn
 STALE_S = 1.0  # a value older than this is greyed
 FIXES_REMEMBERED = 100  # until the filter has said whether it believes them
 SLOW_STALE_S = {"link": 3.0, "status": 3.0, "estimator": 3.0, "board": 30.0, "gnss": 2.5, "innovation": 10.0}
-
-
-class Ring:
-    """The newest `capacity` rows of a table whose first column is the time, s. Not locked: the store does that."""
-
-    def __init__(self, columns: int, capacity: int) -> None:
-        self._rows = np.full((capacity, columns + 1), np.nan)
-        self._next = 0
-        self.count = 0
-
-    def append(self, t: float, values: np.ndarray | list[float]) -> None:
-        """Add a row; missing values at its end stay NaN, too many are cut. A row not after the last is dropped."""
-        if self.count and t <= self._rows[self._next - 1, 0]:
-            return
-        row = self._rows[self._next]
-        width = min(len(values), len(row) - 1)
-        row[0], row[1 : width + 1], row[width + 1 :] = t, values[:width], np.nan
-        self._next = (self._next + 1) % len(self._rows)
-        self.count = min(self.count + 1, len(self._rows))
-
-    def merge(self, rows: np.ndarray) -> None:
-        """Take in older rows (n, columns + 1), time first, in any order; at an equal time what is there stays."""
-        held = self.rows()
-        both = np.concatenate([held, rows])
-        order = np.argsort(both[:, 0], kind="stable")
-        both = both[order]
-        keep = np.append(True, np.diff(both[:, 0]) > 1e-6)
-        both = both[keep][-len(self._rows) :]
-        self._rows[: len(both)] = both
-        self.count = len(both)
-        self._next = self.count % len(self._rows)
-
-    def rows(self) -> np.ndarray:
-        """All rows, oldest first, time in the first column."""
-        if self.count < len(self._rows):
-            return self._rows[: self.count]
-        return np.concatenate([self._rows[self._next :], self._rows[: self._next]])
-
-    def window(self, t0: float, t1: float) -> tuple[np.ndarray, np.ndarray]:
-        """Times (n,) and values (n, columns) of the rows with t0 <= t <= t1, oldest first, copied."""
-        rows = self.rows()
-        first, last = np.searchsorted(rows[:, 0], [t0, t1 + 1e-9])
-        chosen = rows[first:last].copy()
-        return chosen[:, 0], chosen[:, 1:]
 
 
 # Columns of the rings.
@@ -140,6 +98,7 @@ class Store:
         self.lock = threading.RLock()
         self.devices: dict[str, Device] = {}
         self.recorder: Latest | None = None
+        self.replay: Latest | None = None
         self.logs: list[tuple[float, str, str]] = []  # arrived, device, text
         self.dropped = 0  # messages the feed could not keep up with
 
@@ -159,6 +118,8 @@ class Store:
         with self.lock:
             if topic is tp.STATUS:
                 self.recorder = Latest(message, arrived, 0.0)
+            elif topic is tp.REPLAY:
+                self.replay = Latest(message, arrived, 0.0)
             elif topic is tp.LOG:
                 self.logs = [*self.logs[-49:], (arrived, device, message.message)]
             else:
@@ -325,4 +286,5 @@ _ROWS = {
     "nav": _nav,
     "gnss": _gnss,
     "innovation": _innovation,
+    **tilt_rows(_ring),
 }

@@ -4,6 +4,7 @@ from dashboard.scene.panels.acceleration import Acceleration
 from dashboard.scene.panels.angle import Angle
 from dashboard.scene.panels.axes import Axes
 from dashboard.scene.panels.base import Panel, Snapshot
+from dashboard.scene.panels.board import Board
 from dashboard.scene.panels.calibration import Calibration
 from dashboard.scene.panels.devices import Devices
 from dashboard.scene.panels.errors import Errors
@@ -14,6 +15,8 @@ from dashboard.scene.panels.link import Link
 from dashboard.scene.panels.position import Position
 from dashboard.scene.panels.rates import Rates
 from dashboard.scene.panels.record import Record
+from dashboard.scene.panels.tilt import Tilt
+from dashboard.scene.panels.timeline import Timeline
 
 PAGES: tuple[type[Panel], ...] = (
     Rates,
@@ -24,9 +27,11 @@ PAGES: tuple[type[Panel], ...] = (
     Errors,
     Innovations,
     Link,
+    Board,
     Health,
     LayoutBench,
     Calibration,
+    Tilt,
 )
 
-__all__ = ["PAGES", "Devices", "Panel", "Position", "Record", "Snapshot"]
+__all__ = ["PAGES", "Devices", "Panel", "Position", "Record", "Snapshot", "Timeline"]

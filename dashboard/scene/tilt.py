@@ -1,0 +1,76 @@
+"""Tilt for people: ring rows of attitude and analogue topics, roll and pitch, and an artificial horizon as SVG."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from messages import gyrofree_pb2 as pb
+
+TILT_ROLL, TILT_PITCH, TILT_BIAS = 0, 1, slice(2, 5)  # columns of an attitude ring
+ADC_CHANNELS = 8
+SKY, GROUND, LINE, PLANE = "#56B4E9", "#8a6d3b", "#ffffff", "#E69F00"
+
+
+def roll_pitch(q_nb: Any) -> tuple[float, float]:
+    """Roll and pitch in rad of q_nb (4,), w x y z."""
+    w, x, y, z = q_nb
+    return (
+        math.atan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+        math.asin(max(-1.0, min(1.0, 2.0 * (w * y - x * z)))),
+    )
+
+
+def between(q: Any, p: Any) -> float:
+    """Angle between the verticals of two attitudes, rad."""
+    down = [np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]) for w, x, y, z in (q, p)]
+    return math.atan2(float(np.linalg.norm(np.cross(*down))), float(np.dot(*down)))
+
+
+def tilt_rows(ring: Callable[..., Any]) -> dict[str, Callable[..., None]]:
+    """What the store does with messages of attitude and adc; ring is its maker of rings."""
+
+    def attitude(device: Any, topic: Any, estimator: str, t: float, m: pb.AttitudeEstimate) -> None:
+        if len(m.q_nb) == 4:
+            bias = list(m.bias_omega_b_radps) if len(m.bias_omega_b_radps) == 3 else [math.nan] * 3
+            ring(device, topic, estimator, 5).append(t, [*roll_pitch(m.q_nb), *bias])
+
+    def adc(device: Any, topic: Any, estimator: str, t: float, m: pb.AdcBatch) -> None:
+        if not 0 < m.channels <= ADC_CHANNELS or len(m.counts) % m.channels:
+            return
+        table = ring(device, topic, estimator, ADC_CHANNELS)
+        for i, row in enumerate(np.asarray(m.counts, dtype=float).reshape(-1, m.channels)):
+            table.append(t + i * m.period_s, row)
+
+    return {"attitude": attitude, "adc": adc}
+
+
+def horizon_svg(roll: float, pitch: float, stale: bool, size: int = 190) -> str:
+    """An artificial horizon: the aircraft's symbol stands, sky and ground move. Angles in rad."""
+    r, per_degree = size / 2.0, size / 90.0
+    lift = max(-89.0, min(89.0, math.degrees(pitch))) * per_degree
+    ladder = "".join(
+        f'<line x1="{-w}" x2="{w}" y1="{-d * per_degree:.1f}" y2="{-d * per_degree:.1f}" stroke="{LINE}"/>'
+        f'<text x="{w + 4}" y="{-d * per_degree + 3:.1f}" fill="{LINE}" font-size="9">{abs(d)}</text>'
+        for d in (-60, -45, -30, -20, -10, 10, 20, 30, 45, 60)
+        for w in ((22,) if d % 20 == 0 or abs(d) > 30 else (13,))
+    )
+    marks = "".join(
+        f'<line y1="{-r + 3:.1f}" y2="{-r + (11 if a % 30 else 15):.1f}" stroke="{LINE}" transform="rotate({a})"/>'
+        for a in (-60, -45, -30, -20, -10, 0, 10, 20, 30, 45, 60)
+    )
+    words = f"roll {math.degrees(roll):+.1f} degrees, pitch {math.degrees(pitch):+.1f} degrees"
+    return (
+        f'<svg class="gf-horizon{" gf-stale" if stale else ""}" role="img" aria-label="artificial horizon: {words}" '
+        f'width="{size}" height="{size}" viewBox="{-r} {-r} {size} {size}" style="display:block;margin:6px auto">'
+        f'<defs><clipPath id="gf-h"><circle r="{r - 2:.1f}"/></clipPath></defs><g clip-path="url(#gf-h)">'
+        f'<g transform="rotate({-math.degrees(roll):.2f}) translate(0 {lift:.2f})">'
+        f'<rect x="{-2 * r}" y="{-4 * r}" width="{4 * r}" height="{4 * r}" fill="{SKY}"/>'
+        f'<rect x="{-2 * r}" y="0" width="{4 * r}" height="{4 * r}" fill="{GROUND}"/>'
+        f'<line x1="{-2 * r}" x2="{2 * r}" stroke="{LINE}" stroke-width="2"/>{ladder}</g>'
+        f'<g transform="rotate({-math.degrees(roll):.2f})">{marks}</g></g>'
+        f'<path d="M0 {-r + 16:.1f} l-6 10 h12 z" fill="{PLANE}"/>'
+        f'<path d="M-52 0 h30 l6 8 M52 0 h-30 l-6 8" fill="none" stroke="{PLANE}" stroke-width="4"/>'
+        f'<circle r="3" fill="{PLANE}"/><circle r="{r - 2:.1f}" fill="none" stroke="#8C8C8C" stroke-width="2"/></svg>'
+    )
