@@ -75,6 +75,16 @@ class Feed:
                 return pb.Reply.FromString(reply.ok.payload.to_bytes())
         raise ConnectionError("the estimator does not answer: is `gyrofree estimator` running?")
 
+    def board(self, device: str, command: pb.BoardCommand, timeout_s: float = 8.0) -> pb.Reply:
+        """Give a board an order and return its answer; raises ConnectionError when its gateway does not answer."""
+        if self._session is None:
+            raise ConnectionError("no connection to the router yet")
+        key = tp.control_key(self._settings.prefix, device, "board-control")
+        for reply in self._session.get(key, payload=command.SerializeToString(), timeout=timeout_s):
+            if reply.ok is not None:
+                return pb.Reply.FromString(reply.ok.payload.to_bytes())
+        raise ConnectionError("the gateway does not answer: is `gyrofree gateway` running?")
+
     def stop(self) -> None:
         """Close the session and wait for the thread."""
         self._stop.set()

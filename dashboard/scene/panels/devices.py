@@ -102,6 +102,9 @@ class Devices(Panel):
         found = [s.device.get("link")] + [s.device.get("estimator", n) for n in s.device.estimators("estimator")]
         said = [latest.message.message for latest in found if latest is not None and latest.message.message]
         texts = [text for text in said if counts(text) is None]
+        board = s.device.get("board")
+        if board is not None and not s.stale("board"):
+            texts += [f"{fault.name}: {fault.text}" for fault in board.message.faults if fault.active]
         if s.store.dropped:
             texts.append(f"the dashboard could not keep up: {s.store.dropped} messages not shown")
         return "".join(f'<p class="gf-alert">{escape(text)}</p>' for text in texts)
