@@ -28,6 +28,7 @@ SENSOR_BUS = (0, 0, 1, 1)  # SSP of each sensor
 DIRECTION_PIN, DIRECTION_STRAP, EMULATED_STRAP = 1 << 2, 1 << 1, 1 << 0  # of port 2
 TACHO, PPS = 0, 1  # capture channels of TIMER2
 VREF = 3.3  # V, full scale of the converter
+STACK_TOP = RAM_SIZE - 32  # bytes from the start of RAM; the boot ROM has the rest
 PAINT = 0xC5C5C5C5  # what the image fills its stack with
 
 
@@ -137,9 +138,13 @@ class Board:
 
     def stack_used(self) -> int:
         """Bytes of stack ever touched, by the paint that the image puts there."""
-        words = struct.unpack(f"<{RAM_SIZE // 4}I", self.core.engine.read(RAM, RAM_SIZE))
-        painted = [i for i, word in enumerate(words) if word == PAINT]
-        return 4 * (len(words) - 8 - painted[-1] - 1) if painted else 0
+        words = struct.unpack(f"<{STACK_TOP // 4}I", self.core.engine.read(RAM, STACK_TOP))
+        longest = end = run = 0
+        for i, word in enumerate(words):  # locals that were never written leave paint inside the used part
+            run = run + 1 if word == PAINT else 0
+            if run > longest:
+                longest, end = run, i + 1
+        return STACK_TOP - 4 * end if longest else 0
 
     def _pins(self, port: int, old: int, new: int) -> None:
         changed = old ^ new

@@ -3,7 +3,7 @@
 from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
 
 from firmware_protocol.codec import FLAG_SIMULATED
-from firmware_protocol.frames import Hello, Imu6, Status
+from firmware_protocol.frames import Hello, Imu6, Status, field_names
 from gateway.gnss_fix import Fix
 from messages import gyrofree_pb2 as pb
 
@@ -83,7 +83,7 @@ def imu_si(frame: Imu6) -> tuple[list[float], list[float]]:
 def status_counters(status: Status | None) -> dict[str, int]:
     """STATUS as name -> value; arrays as name_0, name_1, ..."""
     counters: dict[str, int] = {}
-    for name in Status.__dataclass_fields__ if status else ():
+    for name in field_names(Status) if status else ():
         value = getattr(status, name)
         if isinstance(value, tuple):
             counters |= {f"{name}_{i}": v for i, v in enumerate(value)}

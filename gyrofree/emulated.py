@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 
 IMAGE = Path("build/firmware/gyrofree.bin")
 SLICE_S = 0.005  # s of emulated time between two looks at the line
-GIVE_UP_S = 0.5  # s behind the wall clock: this machine is too slow, the board's time lets go of it
+GIVE_UP_S = 3.0  # s behind the wall clock: this machine is too slow, emulated time lets go of it
 UTC0 = datetime.datetime(2026, 1, 1, tzinfo=datetime.UTC)  # the receiver's time when power comes
 ODR_TOLERANCE = 0.002  # one sigma of the sensors' own sampling clocks, of 1
 NMEA_DELAY_S = 0.08  # from the pulse to the first sentence
