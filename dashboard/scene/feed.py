@@ -39,6 +39,8 @@ class Feed:
         self._session: zenoh.Session | None = None
         self._received = self._taken = 0
         self._asker: Asker | None = None
+        self._publishers: busmod.Publishers | None = None  # of notes
+        self._run = time.time_ns()  # their sequences count since then
         self._mender = Mender(self._ask, hold=False)
         self._answers: deque = deque()
         self._known: set[str] = set()  # devices whose past was asked for
@@ -84,6 +86,25 @@ class Feed:
             if reply.ok is not None:
                 return pb.Reply.FromString(reply.ok.payload.to_bytes())
         raise ConnectionError("the gateway does not answer: is `gyrofree gateway` running?")
+
+    def replay(self, command: pb.ReplayCommand, timeout_s: float = 5.0) -> pb.ReplayStatus:
+        """Give the replay an order and return its answer; raises ConnectionError when there is none."""
+        if self._session is None:
+            raise ConnectionError("no connection to the router yet")
+        key = tp.replay_control_key(self._settings.prefix)
+        for reply in self._session.get(key, payload=command.SerializeToString(), timeout=timeout_s):
+            if reply.ok is not None:
+                return pb.ReplayStatus.FromString(reply.ok.payload.to_bytes())
+        raise ConnectionError("no replay answers: it has ended")
+
+    def note(self, device: str, note: pb.Note) -> None:
+        """Publish a remark, for the recording and for every chart; raises ConnectionError without a router."""
+        if not self.connected or self._session is None:
+            raise ConnectionError("no router")
+        if self._publishers is None:
+            self._publishers = busmod.Publishers(self._session, self._settings.prefix)
+        note.header.run = self._run
+        self._publishers.put(tp.NOTE, device, note)
 
     def stop(self) -> None:
         """Close the session and wait for the thread."""

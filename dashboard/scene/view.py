@@ -7,7 +7,7 @@ from collections.abc import Callable
 import viser
 
 from dashboard.scene.feed import Feed
-from dashboard.scene.panels import PAGES, Devices, Position, Record, Snapshot
+from dashboard.scene.panels import PAGES, Devices, Position, Record, Snapshot, Timeline
 from dashboard.scene.scene import LAYERS, Choice, SceneView
 from dashboard.scene.store import Device, Store
 from messages import gyrofree_pb2 as pb
@@ -41,12 +41,13 @@ class View:
         with client.atomic():
             self._build_left(on_record)
             self._build_right()
+            self._timeline = Timeline(client, feed, store, lambda: self._device_name)
 
     @property
     def own_uuids(self) -> frozenset[str]:
         """Inputs that change nothing but this browser's own view: all except the recorder's and those of orders."""
-        orders = frozenset().union(*(page.uuids for page in self._pages))
-        return frozenset(self._client.gui._gui_input_handle_from_uuid) - self._record.uuids - orders
+        orders = self._record.uuids.union(self._timeline.uuids, *(page.uuids for page in self._pages))
+        return frozenset(self._client.gui._gui_input_handle_from_uuid) - orders
 
     # --- ticks ----------------------------------------------------------------------------------------------------
 
@@ -67,6 +68,7 @@ class View:
         with self._lock, self._store.lock, self._client.atomic():
             now = time.monotonic()
             self._record.update(self._store.recorder, now)
+            self._timeline.update(now)
             self._update_chooser()
             device = self._device()
             if device is None:
