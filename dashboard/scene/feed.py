@@ -40,7 +40,7 @@ class Feed:
         self._received = self._taken = 0
         self._asker: Asker | None = None
         self._publishers: busmod.Publishers | None = None  # of notes
-        self._run = time.time_ns()  # their sequences count since then
+        self._since = time.time_ns()  # their sequences count since then
         self._mender = Mender(self._ask, hold=False)
         self._answers: deque = deque()
         self._known: set[str] = set()  # devices whose past was asked for
@@ -103,7 +103,7 @@ class Feed:
             raise ConnectionError("no router")
         if self._publishers is None:
             self._publishers = busmod.Publishers(self._session, self._settings.prefix)
-        note.header.run = self._run
+        note.header.run = self._since
         self._publishers.put(tp.NOTE, device, note)
 
     def stop(self) -> None:
