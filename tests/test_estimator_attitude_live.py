@@ -1,6 +1,9 @@
 """Attitude filters in the live path: what comes out of batches, over gaps, and twice from the same samples."""
 
+import pickle
+
 import numpy as np
+import pytest
 
 from estimator.attitude.board import AttitudeBoard
 from estimator.attitude.filters import ATTITUDES
@@ -53,6 +56,22 @@ def test_same_samples_same_bytes():
         return [o.message.SerializeToString(deterministic=True) for o in outputs if o.topic is ATTITUDE]
 
     assert once() == once() != []
+
+
+@pytest.mark.parametrize("samples", [0, 3, 150])
+@pytest.mark.parametrize("name", NAMES)
+def test_a_filter_goes_on_from_its_saved_state_to_the_bit(name, samples):
+    draw = np.random.default_rng(5)
+    f, w = draw.normal(size=(400, 3)) + [0.0, 0.0, -G], draw.normal(size=(400, 3)) * 0.3
+    whole = ATTITUDES[name](0.01)
+    for k in range(samples):
+        whole.step(f[k], w[k])
+    restored = pickle.loads(pickle.dumps(whole))
+    for k in range(samples, 400):
+        one, other = whole.step(f[k], w[k]), restored.step(f[k], w[k])
+        np.testing.assert_array_equal(one.q_nb, other.q_nb)
+        np.testing.assert_array_equal(one.bias_omega_b, other.bias_omega_b)
+        assert one.resting == other.resting
 
 
 def test_a_short_gap_is_bridged_and_a_long_one_starts_anew(caplog):

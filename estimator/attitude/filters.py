@@ -86,7 +86,18 @@ class VqfFilter:
 
     def __init__(self, period: float) -> None:
         """period in s between samples."""
+        self._period = period
         self._vqf = VQF(period)
+
+    def __getstate__(self) -> tuple[float, dict[str, object]]:
+        """For a process that goes on after a crash: all numbers of the compiled filter."""
+        return self._period, self._vqf.state
+
+    def __setstate__(self, saved: tuple[float, dict[str, object]]) -> None:
+        """Go on, to the bit, where __getstate__ was asked."""
+        self._period = saved[0]
+        self._vqf = VQF(self._period)
+        self._vqf.state = saved[1]
 
     def step(self, f_b: Array, omega_b: Array) -> AttitudeState:
         """See AttitudeFilter."""
