@@ -182,6 +182,6 @@ def figures(q: Quality, cube: Quality) -> str:
         ("ω by integration", pair(float(q.walk.max()) * DEG, float(cube.walk[0]) * DEG, 2, "°/√s")),
         ("ω at 180 °/s, filter", pair(float(q.sigma_rate.max()) * DEG, float(cube.sigma_rate.max()) * DEG, 2, "°/s")),
     ]
-    note = '<p class="gf-note">● seen ◐ weak ○ not seen alone. Orange: noise of ω′, the sphere of the cube is 0.35.</p>'
+    note = '<p class="gf-note">● seen ◐ weak ○ not seen alone. Orange: how noise of ω′ spreads over its directions.</p>'
     mixed = f'<p class="gf-note">Of the products only: {", ".join(q.mixtures)}</p>' if q.mixtures else ""
     return rows(items) + f"<p>{seen}</p>" + mixed + note
