@@ -16,6 +16,8 @@ from estimator.ins.alignment_motion import MotionSettings, MotionWindow
 from estimator.ins.fix import RTK_FIXED, Fix
 from estimator.ins.navigation import NAVIGATORS, Mode
 from estimator.rate.estimators import ESTIMATORS
+from estimator.rate.health import HealthMonitor
+from estimator.simulation.faults import AxisFault, Faults
 from estimator.simulation.table import TableTest
 
 log = logging.getLogger(__name__)
@@ -41,6 +43,7 @@ def warm() -> None:
     try:
         _warm_navigators()
         _warm_rates()
+        _warm_health()
         _warm_attitudes()
         _warm_alignment()
     finally:
@@ -70,6 +73,17 @@ def _warm_attitudes() -> None:
         attitude = make(0.01)
         for _ in range(2):
             attitude.step(np.array([0.0, 0.0, -9.8]), np.zeros(3))
+
+
+def _warm_health() -> None:
+    """Samples of a standstill, then with an axis off, so that the hypotheses compile too."""
+    test = TableTest()
+    monitor = HealthMonitor(test.layout)
+    spoilt = Faults([AxisFault(3, "biased", 4.0)]).into(test.block(0))
+    for t, readings in zip(spoilt.t_s, spoilt.readings, strict=True):
+        monitor.step(float(t), readings)
+    if not monitor.mask:
+        raise RuntimeError("the made-up fault was not found: warm.py does not fit health.py any more")
 
 
 def _warm_navigators() -> None:
