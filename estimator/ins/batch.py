@@ -126,10 +126,8 @@ def run_filters(
         raise ValueError(f"samples of shape {imu.shape}, want (n, 7): t, force (3), rate (3)")
     fallen = np.flatnonzero(np.diff(imu[:, 0]) <= 0.0)
     if len(fallen):
-        raise ValueError(
-            f"sample {fallen[0] + 2}: time {imu[fallen[0] + 1, 0]} s does not come after the one before it"
-        )
-    drive = _Drive(imu, fixes, config)
+        raise ValueError(f"sample {fallen[0] + 2}: time {imu[fallen[0] + 1, 0]} s is not after the one before it")
+    drive = Drive(imu, fixes, config)
     runs = {}
     for i, (name, filter_config) in enumerate(chosen.items()):
         if progress:
@@ -140,7 +138,7 @@ def run_filters(
     return runs
 
 
-class _Drive:
+class Drive:
     """The samples as the compiled code wants them, the fixes as a table, the alignment once it is known."""
 
     def __init__(self, imu: Array, fixes: Sequence[Fix], config: NavigatorConfig) -> None:
@@ -160,7 +158,7 @@ class _Drive:
         k = j = done = epochs = 0
         began, seconds, leg = math.inf, 0.0, None
         while k < len(self.t):
-            found = self._align(nav, k, j)
+            found = self.align(nav, k, j)
             if found is None:
                 break
             start, fix, j = found
@@ -185,7 +183,7 @@ class _Drive:
                 nav._after_gap(float(self.t[k] - self.t[k - 1]))
         return FilterRun(name, used, rows[:done].copy(), began, seconds, epochs, leg)
 
-    def _align(self, nav: Navigator, k: int, j: int) -> tuple[Start, Fix, int] | None:
+    def align(self, nav: Navigator, k: int, j: int) -> tuple[Start, Fix, int] | None:
         """Feed samples from k and fixes from j as the live path does until navigation can begin.
 
         Returns the start, its fix and the first fix after it; the first alignment is remembered, it is everybody's.

@@ -117,8 +117,8 @@ def constraint(leg: Leg, m: Model, r: Rules, y: Array, H: Array, R: Array) -> in
 
 
 @njit(cache=True)
-def constrain(leg: Leg, m: Model, r: Rules, scratch: Array) -> bool:
-    """Apply what holds now and start a new leg; scratch is (3, n, n). Returns whether anything held."""
+def constrain(leg: Leg, m: Model, r: Rules, scratch: Array, c: Array) -> bool:
+    """Apply what holds now, the estimate being c (n,), and start a new leg; scratch (3, n, n). False: nothing held."""
     leg.acc[SINCE] = 0.0
     H, y, R = np.empty((7, m.n)), np.empty(7), np.empty((7, 7))
     rows = constraint(leg, m, r, y, H, R)
@@ -128,7 +128,7 @@ def constrain(leg: Leg, m: Model, r: Rules, scratch: Array) -> bool:
     leg.acc[SINCE] = 0.0
     P = scratch[0]
     carry(leg.P, leg.Phi, leg.Q, 1.0, scratch[1], P)
-    PHt, S, G, u, c = np.empty((m.n, 7)), np.empty((7, 7)), np.empty((7, 7)), np.empty(7), np.empty(m.n)
+    PHt, S, G, u = np.empty((m.n, 7)), np.empty((7, 7)), np.empty((7, 7)), np.empty(7)
     innovate(P, y, H, R, rows, PHt, S)
     nis = factor(S, y, rows, G, u)
     if not nis >= 0.0:

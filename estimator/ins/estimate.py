@@ -67,6 +67,7 @@ class Memory(NamedTuple):
     counts: Array  # (2,) int64: refusals in a row, refusals and low weights in a row
     still_f: Array  # (1,) |mean f| at standstill, m/s^2
     scratch: Array  # (3, n, n)
+    last: Array  # (n,) the estimate that the last fix used was answered with
 
 
 @njit(cache=True)
@@ -78,7 +79,7 @@ def run_to(
     while k < stop:
         k = run_leg(leg, m, t, f, w, k, stop, until, rules.every)
         if leg.acc[SINCE] >= rules.every - 1e-6:
-            constrain(leg, m, rules, scratch)
+            constrain(leg, m, rules, scratch, scratch[2, 0])
             leg.acc[SINCE] = 0.0
         elif k < stop and t[k] > until and leg.acc[TIME] >= until:
             break
@@ -134,6 +135,7 @@ def take(leg: Leg, m: Model, s: Settings, mem: Memory, fix: Array, rate: Array, 
         _look_back(leg, m, s, mem, y, H, R, rows, P, c, out)
     copy2(P, leg.P)
     correct(leg, m, c)
+    copy1(c, mem.last)
     residual(leg, m, rate, s.lever, fix, y, H)
     for i in range(6):
         out[O_LEFT + i] = y[i] if i < 3 or fix[F_HAS_V] > 0.0 else math.nan
@@ -142,18 +144,9 @@ def take(leg: Leg, m: Model, s: Settings, mem: Memory, fix: Array, rate: Array, 
 
 @njit(cache=True)
 def _look_back(
-    leg: Leg,
-    m: Model,
-    s: Settings,
-    mem: Memory,
-    y: Array,
-    H: Array,
-    R: Array,
-    rows: int,
-    P: Array,
-    c: Array,
+    leg: Leg, m: Model, s: Settings, mem: Memory, y: Array, H: Array, R: Array, rows: int, P: Array, c: Array,
     out: Array,
-) -> None:
+) -> None:  # fmt: skip
     """Solve the horizon that ends with this fix: c (n,) and P (n, n)."""
     window = mem.window
     own = s.window == 2

@@ -51,7 +51,7 @@ class FilterConfig:
     arrival: Literal["p0", "mean", "kf"] = "mean"
     kappa: float = 4.0  # on the mean covariance
     mean_covariance: tuple[tuple[float, ...], ...] | None = (
-        None  # (n, n) of a calibration run; None: of this run so far
+        None  # (n, n) of a calibration run; None: this one's
     )
     literal: bool = False  # fuzzy inputs as read, not conditioned
     rules: fuzzy.FuzzyRules = fuzzy.FuzzyRules()
@@ -101,7 +101,7 @@ class FilterConfig:
         if self.mean_covariance is not None:
             window.mean[:] = np.array(self.mean_covariance)
             window.count[2] = -1  # given: nothing is summed up
-        return Memory(window, new_leg(n), np.zeros(2, np.int64), np.array([still_f]), np.zeros((3, n, n)))
+        return Memory(window, new_leg(n), np.zeros(2, np.int64), np.array([still_f]), np.zeros((3, n, n)), np.zeros(n))
 
 
 _CAR = Constraints(car=True, standstill=True)

@@ -102,7 +102,7 @@ def typical_sigma(quality: int) -> tuple[Array, Array]:
 
 
 def fix_row(fix: Fix, settings: FixSettings) -> Array:
-    """A row (FIX_COLUMNS,) of the table that the compiled filters read, see update: numbers and floored sigmas (E-31)."""
+    """A row (FIX_COLUMNS,) of the compiled filters' table, see update: numbers and floored sigmas (E-31)."""
     row = np.zeros(FIX_COLUMNS)
     row[F_T] = fix.t
     row[F_GEO : F_GEO + 3] = fix.latitude, fix.longitude, fix.height
