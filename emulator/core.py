@@ -130,7 +130,7 @@ class Core:
             return
         if code == 0 and self.engine.code_before(self._pc) == WFI:
             self.asleep = True
-        elif code == EXCEPTION and self._pc >= 0xFFFFFFE0:
+        elif code == EXCEPTION and self._pc >= 0xFFFFFFE0 and self.nvic.active:
             self._leave()
         else:
             frame = self.engine.frame()
