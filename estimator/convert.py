@@ -10,7 +10,8 @@ from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from numpy.typing import NDArray
 
 from estimator.ins.fix import Fix, typical_sigma
-from estimator.ins.navigation import INNOVATIONS, Correction, Solution
+from estimator.ins.fuzzy import MEMBERSHIPS, memberships
+from estimator.ins.solution import HEADING, INNOVATIONS, Correction, HorizonChoice, Solution
 from messages import gyrofree_pb2 as pb
 
 Array = NDArray[np.float64]
@@ -113,28 +114,31 @@ def sample_header(first: pb.Header, offset_s: float) -> pb.Header:
 
 def rate_message(header: pb.Header, batch: pb.AccelBatch, index: int, name: str, state: Any) -> pb.RateEstimate:
     """RateState as published."""
-    message = pb.RateEstimate(
+    return pb.RateEstimate(  # its arrays are float64: tolist() at once, this runs for every sample
         header=header,
         estimator=name,
         for_sequence=batch.header.sequence,
         for_index=index,
-        omega_ib_b_radps=as_list(state.omega_b),
-        omega_covariance=as_list(state.P),
-        alpha_b_radps2=as_list(state.alpha_b),
-        f_b_mps2=as_list(state.f_b),
-        q_nb=as_list(state.q_nb),
-        angle_z_rad=float(state.angle_z),
-        innovation=as_list(state.innovation),
-        innovation_sigma=as_list(state.innovation_sigma),
-        nis=float(state.nis),
-        nis_dof=int(state.nis_dof),
-        still=bool(state.still),
-        p_n_m=as_list(state.p_n),
-        v_n_mps=as_list(state.v_n),
-        bias=as_list(state.bias),
+        omega_ib_b_radps=state.omega_b.tolist(),
+        omega_covariance=state.P.ravel().tolist(),
+        alpha_b_radps2=state.alpha_b.tolist(),
+        f_b_mps2=state.f_b.tolist(),
+        q_nb=state.q_nb.tolist(),
+        angle_z_rad=state.angle_z,
+        innovation=state.innovation.tolist(),
+        innovation_sigma=state.innovation_sigma.tolist(),
+        nis=state.nis,
+        nis_dof=state.nis_dof,
+        still=state.still,
+        p_n_m=state.p_n.tolist(),
+        v_n_mps=state.v_n.tolist(),
+        bias=state.bias.tolist(),
+        innovation_unit=state.innovation_unit,
+        sight=state.sight,
+        sight_reason=state.sight_reason,
+        bound_sigma_radps=() if state.bound_sigma is None else state.bound_sigma.tolist(),
+        excluded_mask=state.excluded,
     )
-    message.innovation_unit = getattr(state, "innovation_unit", "")
-    return message
 
 
 def attitude_message(header: pb.Header, batch: pb.ImuBatch, index: int, name: str, state: Any) -> pb.AttitudeEstimate:
@@ -188,7 +192,9 @@ def pose_message(header: pb.Header, name: str, p_n_m: Iterable[float], q_nb: Ite
     return message
 
 
-def nav_message(header: pb.Header, batch: pb.ImuBatch, index: int, name: str, s: Solution) -> pb.NavSolution:
+def nav_message(
+    header: pb.Header, batch: pb.ImuBatch, index: int, name: str, s: Solution, muted: bool = False
+) -> pb.NavSolution:
     """Solution as published."""
     return pb.NavSolution(
         header=header,
@@ -210,8 +216,20 @@ def nav_message(header: pb.Header, batch: pb.ImuBatch, index: int, name: str, s:
         origin_longitude_deg=math.degrees(s.origin[1]),
         origin_height_m=s.origin[2],
         fix_age_s=s.fix_age,
+        horizon=None if s.horizon is None else horizon_message(s.horizon),
         alignment=s.alignment,
+        gnss_muted=muted,
     )
+
+
+def horizon_message(h: HorizonChoice) -> pb.Horizon:
+    """The horizon as published; a fixed one has no memberships."""
+    message = pb.Horizon(n=h.n, crisp=h.crisp)
+    if h.inputs is not None:
+        message.inputs[:] = h.inputs
+        message.membership_name[:] = MEMBERSHIPS
+        message.membership[:] = memberships(*h.inputs)
+    return message
 
 
 def innovation_message(header: pb.Header, name: str, c: Correction) -> pb.Innovation:
@@ -220,13 +238,16 @@ def innovation_message(header: pb.Header, name: str, c: Correction) -> pb.Innova
         header=header,
         estimator=name,
         for_sequence=c.fix.key,
-        name=INNOVATIONS[: len(c.values)],
+        name=[*INNOVATIONS[: len(c.values) // 3 * 3], *[HEADING] * (len(c.values) % 3)],
         value=as_list(c.values),
         sigma=as_list(c.sigma),
         nis=c.nis,
         dof=len(c.values),
         accepted=c.accepted,
         error_to_reference=as_list(c.error_ned) if c.fix.withheld else [],
+        reason=c.reason,
+        weight=c.weight,
+        prediction_error=as_list(c.prediction_error),
     )
 
 

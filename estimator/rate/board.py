@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.layouts.layout import GeometryError
 from estimator.stream import Stream, every, worth_a_line
 
 log = logging.getLogger(__name__)
@@ -114,6 +115,7 @@ class RateBoard:
         log.warning("%s: axes not used: %s", self.device, ", ".join(names) or "none, all are good again")
         self._mask = mask
         for estimator in self._estimators.values():
-            exclude = getattr(estimator, "exclude", None)
-            if exclude is not None:
-                exclude(mask)
+            try:
+                estimator.exclude(mask)
+            except GeometryError as error:
+                log.warning("%s: %s goes on with the axes it had: %s", self.device, estimator.name, error)

@@ -5,19 +5,17 @@ samples give the same bits. Frames and units as everywhere: b body, n north-east
 """
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimator.layouts.layout import Layout
-from estimator.rate import least_squares, products_ekf
-from estimator.rate import products_model as model
+from estimator.rate import least_squares, products_ekf, products_kernel, sight
+from estimator.rate import products_run as frame
 from estimator.rate.field import checked
 
 Array = NDArray[np.float64]
-
-LONGEST_GAP_S = 0.5  # s; after a longer one the rate is unknown and a standstill is needed
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +38,11 @@ class RateState:
     bias: Array  # equivalent biases: omega' rad/s^2 (3), p m/s^2 (3), and products (6) where estimated
     phase: str = ""  # for people: "finding biases: keep still", ...
     innovation_unit: str = ""
+    sight: tuple[int, int, int] = (0, 0, 0)  # of sight.VALID, AMBIGUOUS, BLIND, by component of omega
+    sight_reason: str = ""  # why a component is not valid
+    bound_sigma: Array | None = None  # rad/s, (3,), posterior Cramer-Rao bound along the estimate
+    excluded: int = 0  # bit k: axis k was not used
+    calibration: str = ""  # id of the calibration card that the readings were corrected by
 
 
 class RateEstimator(Protocol):
@@ -56,6 +59,13 @@ class RateEstimator(Protocol):
 
     def skip(self, n: int) -> None:
         """n samples are missing before the next one."""
+        ...
+
+    def exclude(self, mask: int) -> None:
+        """Go on without the axes whose bits are set; 0 takes all back. The axes in use are solved anew.
+
+        Raises GeometryError, and changes nothing, when the rest cannot see omega' and p.
+        """
         ...
 
 
@@ -86,117 +96,157 @@ class LeastSquaresRate:
 
     name = "least-squares"
 
-    def __init__(self, layout: Layout, config: least_squares.Config = least_squares.Config()) -> None:
+    def __init__(
+        self, layout: Layout, config: least_squares.Config = least_squares.Config(), calibration: str = ""
+    ) -> None:
         """Raises GeometryError when the layout cannot see angular acceleration and specific force."""
+        self.calibration = calibration
         self._core = least_squares.LeastSquares(layout, config)
         self._clock = _Clock()
 
     def step(self, index: int, t_s: float, f_axis: Array) -> RateState:
         """See RateEstimator.step."""
         core = self._core
-        core.step(f_axis, self._clock.advance(t_s))
-        y = core.state.y
+        f_axis = checked(core.layout, f_axis)
+        self._clock.advance(t_s)
+        core.step(t_s, f_axis)
+        m = core.memory
+        y, x, P = m["y"], m["x"], m["P"].copy()
+        waiting, spread = m["marks"][least_squares.SAMPLES] == 0, float(np.sqrt(P.diagonal().max()))
+        blind = spread > sight.BLIND_SIGMA and m["clock"][least_squares.MOVING_S] > 0.0
+        reason = f"integration only, now {spread * sight.DEG:.0f} deg/s uncertain" if blind else ""
         return RateState(
             omega_b=y[least_squares.OMEGA].copy(),
-            P=core.P.copy(),
-            alpha_b=core.alpha_b.copy(),
-            f_b=core.f_b.copy(),
+            P=P,
+            alpha_b=x[:3].copy(),
+            f_b=x[3:].copy(),
             q_nb=y[least_squares.Q_NB].copy(),
             angle_z=float(y[least_squares.ANGLE]),
             innovation=EMPTY,
             innovation_sigma=EMPTY,
             nis=0.0,
             nis_dof=0,
-            still=core.still,
+            still=bool(m["marks"][least_squares.STILL]),
             p_n=y[least_squares.P_N].copy(),
             v_n=y[least_squares.V_N].copy(),
-            bias=core.state.bias.copy(),
+            bias=m["bias"].copy(),
             phase=core.phase,
+            sight=(sight.BLIND,) * 3 if blind or waiting else (sight.VALID,) * 3,
+            sight_reason="no standstill yet: keep still" if waiting else reason,
+            excluded=core.excluded,
+            calibration=self.calibration,
         )
 
     def skip(self, n: int) -> None:
         """See RateEstimator.skip; the next step integrates over the gap with omega' linear across it."""
         self._core.gap()
 
+    def exclude(self, mask: int) -> None:
+        """See RateEstimator.exclude."""
+        self._core.exclude(mask)
+
 
 class ProductsRate:
     """Estimator "products-ekf": Kalman filter on the six products (products_ekf.py)."""
 
     name = "products-ekf"
+    method = "ekf"
 
-    def __init__(self, layout: Layout, config: products_ekf.Config = products_ekf.Config()) -> None:
-        """Raises GeometryError when the layout does not see the products of the rate."""
-        self._core = products_ekf.ProductsEkf(layout, config)
+    def __init__(
+        self, layout: Layout, config: products_ekf.Config = products_ekf.Config(), calibration: str = ""
+    ) -> None:
+        """Raises GeometryError when the layout does not see angular acceleration and specific force."""
+        self.core = products_ekf.ProductsFilter(layout, config, self.method)
+        self.calibration = calibration
         self._clock = _Clock()
-        self._dt = 0.01
+        self._unseen = config.unseen_rate**2 * np.eye(3)
 
     def step(self, index: int, t_s: float, f_axis: Array) -> RateState:
         """See RateEstimator.step."""
-        core = self._core
+        core = self.core
         f_axis = checked(core.layout, f_axis)
-        dt = self._clock.advance(t_s)
-        if dt is not None and dt > LONGEST_GAP_S:
-            core.restart()
-        elif dt is not None:
-            self._dt = dt
-        core.step(f_axis, self._dt)
-        return self._waiting(f_axis) if core.state is None else self._running(f_axis)
+        self._clock.advance(t_s)
+        core.step(t_s, f_axis)
+        return self._state()
 
     def skip(self, n: int) -> None:
         """See RateEstimator.skip; the next step predicts across the gap."""
-        self._core.gap()
+        self.core.gap()
+
+    def exclude(self, mask: int) -> None:
+        """See RateEstimator.exclude."""
+        self.core.exclude(mask)
+
+    def run_batch(self, t_s: Array, f_axis: Array) -> products_ekf.Track:
+        """All samples at once: times (n,) s, growing, readings (n, N) m/s^2; the same bits as step() gives one by one.
+
+        Raises ValueError for readings that are not finite or times that do not grow.
+        """
+        return self.core.run(t_s, f_axis)
 
     @property
     def refused(self) -> dict[str, int]:
         """Corrections not used because their NIS was beyond its gate: by the products, by gravity ("force")."""
-        return dict(self._core.refused)
+        return self.core.refused
 
-    def _running(self, f_axis: Array) -> RateState:
-        core, state, correction = self._core, self._core.state, self._core.correction
-        x = state.x
-        field = core.sensor.inverse @ f_axis
-        unseen = core.config.unseen_rate**2 if core.still else 0.0
+    def _state(self) -> RateState:
+        core, track = self.core, self.core.now
+        x = core.memory["core"]
+        started, still = bool(track.started[0]), bool(track.still[0])
+        m = int(core.sensor["m"])
+        P = track.P[0] + self._unseen if still and started else track.P[0].copy()
+        sights, reason = (sight.BLIND,) * 3, "no standstill yet: keep still"
+        if started:
+            two, sign = int(core.memory["marks"][frame.BRANCHES]) == 2, float(x[products_kernel.SIGN])
+            dt = float(core.memory["clock"][frame.DT])
+            sights, reason = sight.judge(track.omega_b[0], track.P[0], sign, still, two, core.sensor, dt)
+        corrected = started and m > 0 and track.nis[0] != 0.0
         return RateState(
-            omega_b=x[model.OMEGA].copy(),
-            P=state.P[model.OMEGA, model.OMEGA] + unseen * np.eye(3),
-            alpha_b=field[:3] - x[model.B_ALPHA],
-            f_b=field[3:6] - x[model.B_F],
-            q_nb=state.q_nb.copy(),
-            angle_z=float(state.angle_z),
-            innovation=EMPTY if correction is None else correction.innovation,
-            innovation_sigma=EMPTY if correction is None else correction.sigma,
-            nis=0.0 if correction is None else correction.nis,
-            nis_dof=0 if correction is None else 6,
-            still=core.still,
-            p_n=state.p_n.copy(),
-            v_n=state.v_n.copy(),
-            bias=np.concatenate([x[model.B_ALPHA], x[model.B_F], x[model.B_W]]),
+            omega_b=track.omega_b[0].copy(),
+            P=P,
+            alpha_b=track.alpha_b[0].copy(),
+            f_b=track.f_b[0].copy(),
+            q_nb=track.q_nb[0].copy(),
+            angle_z=float(track.angle_z[0]),
+            innovation=track.innovation[0, :m].copy() if corrected else EMPTY,
+            innovation_sigma=track.innovation_sigma[0, :m].copy() if corrected else EMPTY,
+            nis=float(track.nis[0]) if corrected else 0.0,
+            nis_dof=m if corrected else 0,
+            still=still,
+            p_n=x[products_kernel.P_N : products_kernel.P_N + 3].copy(),
+            v_n=x[products_kernel.V_N : products_kernel.V_N + 3].copy(),
+            bias=np.concatenate([x[3:6], x[15:18], x[6:12]]),
             phase=core.phase,
             innovation_unit="(rad/s)^2",
-        )
-
-    def _waiting(self, f_axis: Array) -> RateState:
-        field, zero = self._core.sensor.inverse @ f_axis, np.zeros(3)
-        return RateState(
-            omega_b=zero,
-            P=products_ekf.UNKNOWN_RATE**2 * np.eye(3),
-            alpha_b=field[:3],
-            f_b=field[3:6],
-            q_nb=np.array([1.0, 0.0, 0.0, 0.0]),
-            angle_z=0.0,
-            innovation=EMPTY,
-            innovation_sigma=EMPTY,
-            nis=0.0,
-            nis_dof=0,
-            still=self._core.still,
-            p_n=zero,
-            v_n=zero,
-            bias=np.zeros(12),
-            phase=self._core.phase,
+            sight=sights,
+            sight_reason=reason,
+            excluded=core.excluded,
+            calibration=self.calibration,
         )
 
 
-ESTIMATORS: dict[str, type[LeastSquaresRate] | type[ProductsRate]] = {
-    LeastSquaresRate.name: LeastSquaresRate,
-    ProductsRate.name: ProductsRate,
+class UnscentedRate(ProductsRate):
+    """Estimator "products-ukf": the same model through sigma points (unscented.py)."""
+
+    name = "products-ukf"
+    method = "ukf"
+
+
+class RecursiveLeastSquaresRate(ProductsRate):
+    """Estimator "products-rls": the same linearised regression without a noise model, with exponential forgetting."""
+
+    name = "products-rls"
+    method = "forget"
+
+
+class MovingHorizonRate(ProductsRate):
+    """Estimator "products-mhe": window of 24 samples, Gauss and Newton over it, its arrival cost from the filter."""
+
+    name = "products-mhe"
+    method = "horizon"
+
+
+ESTIMATORS: dict[str, Any] = {
+    estimator.name: estimator
+    for estimator in (LeastSquaresRate, ProductsRate, UnscentedRate, RecursiveLeastSquaresRate, MovingHorizonRate)
 }

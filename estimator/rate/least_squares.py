@@ -12,10 +12,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from estimator.attitude.rotation import level, to_dcm
-from estimator.layouts.layout import Layout, products
+from estimator.attitude.rotation import to_dcm
+from estimator.layouts.layout import Layout
 from estimator.rate import still as stillness
-from estimator.rate.field import checked
+from estimator.rate.observed import Sensor, sensor
+from estimator.rate.products_run import _level as level
+from estimator.rate.still import COUNT, DEPTH, LEARNING, Limits, Watch
 
 Array = NDArray[np.float64]
 
@@ -23,6 +25,9 @@ GRAVITY = 9.80665  # m/s^2, standard
 OMEGA, Q_NB, ANGLE, V_N, P_N = slice(0, 3), slice(3, 7), 7, slice(8, 11), slice(11, 14)
 UNKNOWN_RATE = 10.0  # rad/s, sigma before any standstill
 UNSEEN_RATE = 0.05  # rad/s, sigma at rest: a turn begins before the still detector sees it
+
+SAMPLES, STILL, STEPS = range(3)  # of Memory.marks
+LAST_S, DT, MOVING_S = range(3)  # of Memory.clock
 
 
 @dataclass(frozen=True)
@@ -34,26 +39,7 @@ class Config:
     longest_step_s: float = 0.5  # s; a longer silence is a gap
 
 
-@dataclass(frozen=True)
-class State:
-    """Everything that one step hands to the next."""
-
-    y: Array  # (14,): omega_b rad/s, q_nb, angle_z rad, v_n m/s, p_n m
-    bias: Array  # (6,): equivalent biases of omega' (rad/s^2) and p (m/s^2)
-    u: Array  # (6,): S a - bias of the last sample
-    samples: int  # of the standstill that gave the biases; 0: none yet
-    moving_s: float  # s of integration since
-    steps: int
-
-
-def start() -> State:
-    """Before any sample."""
-    y = np.zeros(14)
-    y[3] = 1.0
-    return State(y, np.zeros(6), np.zeros(6), 0, 0.0, 0)
-
-
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def derivative(y: Array, u: Array, SQ: Array) -> Array:
     """dy/dt of (omega, q_nb, angle, v_n, p_n) for u = S a - bias (6,) and SQ = S Q (6, 6) (E-6)."""
     x, z = u.copy(), np.empty(6)
@@ -74,7 +60,7 @@ def derivative(y: Array, u: Array, SQ: Array) -> Array:
     return d
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def runge_kutta(y: Array, before: Array, after: Array, SQ: Array, dt: float) -> Array:
     """One RK4 step over dt (s) with u linear between two samples (E-6)."""
     middle = 0.5 * (before + after)
@@ -87,108 +73,144 @@ def runge_kutta(y: Array, before: Array, after: Array, SQ: Array, dt: float) -> 
     return y
 
 
-def align(state: State, S: Array, mean_axis: Array, samples: int) -> State:
-    """Biases and tilt from the mean axis readings (N,) of a standstill (E-7).
+# Everything that one step hands to the next, beside the detector's Watch.
+MEMORY = np.dtype(
+    (
+        np.record,
+        [
+            ("y", "f8", (14,)),  # omega_b rad/s, q_nb, angle_z rad, v_n m/s, p_n m
+            ("bias", "f8", (6,)),  # equivalent biases of omega' (rad/s^2) and p (m/s^2)
+            ("u", "f8", (6,)),  # S a - bias of the last sample
+            ("x", "f8", (6,)),  # the same without the rate's part
+            ("P", "f8", (3, 3)),  # of omega
+            ("marks", "i8", (3,)),  # samples of the standstill that gave the biases, still, steps
+            ("clock", "f8", (3,)),  # s
+        ],
+    )
+)
+Memory = np.record
+
+
+def memory() -> Memory:
+    """Before any sample."""
+    m = np.zeros(1, MEMORY)[0]
+    m.clock[:] = (np.nan, 0.01, 0.0)
+    restart(m, stillness.memory())
+    return m
+
+
+@njit(cache=True, error_model="numpy")
+def restart(m: Memory, w: Watch) -> None:
+    """The rate is unknown: wait for a standstill."""
+    stillness.forget(w)
+    m.y[:] = 0.0
+    m.y[3] = 1.0
+    m.bias[:] = 0.0
+    m.marks[SAMPLES], m.marks[STILL], m.clock[MOVING_S] = 0, 0, 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _align(m: Memory, w: Watch) -> None:
+    """Biases and tilt from the mean of the standstill (E-7).
 
     All of omega' is bias; of p, what exceeds gravity along the measured vertical. A bias across the vertical
     reads like a tilt and stays in it.
     """
-    x = S @ mean_axis
-    f_b = x[3:]
-    q_nb = level(f_b)
-    bias = np.concatenate([x[:3], f_b * (1.0 - GRAVITY / np.linalg.norm(f_b))])
-    y = np.zeros(14)
-    y[Q_NB] = q_nb
-    return State(y, bias, x - bias, samples, 0.0, state.steps)
+    f = w.reference[9:12]
+    size = np.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
+    m.y[:] = 0.0
+    m.y[3:7] = level(f / size)
+    for i in range(3):
+        m.bias[i], m.bias[3 + i] = w.reference[i], f[i] * (1.0 - GRAVITY / size)
+        m.u[i], m.u[3 + i] = 0.0, f[i] - m.bias[3 + i]
+    m.marks[SAMPLES] = w.n[LEARNING]
 
 
-def step(state: State, u: Array, SQ: Array, dt: float) -> State:
-    """Integrate over dt to the sample whose S a - bias is u (6,)."""
-    y = runge_kutta(state.y, state.u, u, SQ, dt)
-    return State(y, state.bias, u, state.samples, state.moving_s + dt, state.steps + 1)
+@njit(cache=True, error_model="numpy")
+def _publish(m: Memory, w: Watch, s: Sensor) -> None:
+    """omega', p of the newest sample, and the covariance of omega (E-8): white noise summed, bias error times time."""
+    y, omega = w.y[(w.n[COUNT] - 1) % DEPTH], m.y
+    for i in range(6):
+        value = (y[i] if i < 3 else y[6 + i]) - m.bias[i]
+        if s.feedback:
+            for k in range(6):
+                value -= s.SQ[i, k] * omega[(0, 0, 0, 1, 1, 2)[k]] * omega[(0, 1, 2, 1, 2, 2)[k]]
+        m.x[i] = value
+    n, t = m.marks[SAMPLES], m.clock[MOVING_S]
+    for i in range(3):
+        for j in range(3):
+            m.P[i, j] = s.R_alpha[i, j] * (m.clock[DT] * t + t * t / n) if n > 0 and t > 0.0 else 0.0
+        if n == 0:
+            m.P[i, i] = UNKNOWN_RATE**2
+        elif t == 0.0:
+            m.P[i, i] = UNSEEN_RATE**2
 
 
-def covariance(state: State, R_alpha: Array, dt: float) -> Array:
-    """Covariance of omega (3, 3), (rad/s)^2: white noise of omega' summed, its bias error times time (E-8)."""
-    if state.samples == 0:
-        return UNKNOWN_RATE**2 * np.eye(3)
-    if state.moving_s == 0.0:
-        return UNSEEN_RATE**2 * np.eye(3)
-    return R_alpha * (dt * state.moving_s + state.moving_s**2 / state.samples)
+@njit(cache=True, error_model="numpy")
+def advance(m: Memory, w: Watch, s: Sensor, c: Limits, shortest: int, longest_s: float, t_s: float, a: Array) -> None:
+    """One sample of all axes a (N,), m/s^2, read at t_s (s, growing)."""
+    dt = t_s - m.clock[LAST_S]
+    m.clock[LAST_S] = t_s
+    if dt > longest_s:
+        restart(m, w)
+    elif dt > 0.0:
+        m.clock[DT] = dt
+    m.marks[STEPS] += 1
+    stillness.take(w, s, a, m.clock[DT])
+    still, depth = stillness.detect(w, s, c, m.y[0:3], m.P, m.clock[DT])
+    m.marks[STILL] = 1 if still else 0
+    now = w.n[COUNT] - 1
+    first = now
+    if m.clock[MOVING_S] == 0.0:
+        if still and w.n[LEARNING] >= shortest:
+            _align(m, w)
+        if still or m.marks[SAMPLES] == 0:
+            first = now + 1
+        else:
+            first = now - depth  # the turn began before the detector saw it: integrate what was held back
+    u = np.empty(6)
+    for sample in range(first, now + 1):
+        y = w.y[sample % DEPTH]
+        for i in range(3):
+            u[i], u[3 + i] = y[i] - m.bias[i], y[9 + i] - m.bias[3 + i]
+        m.y[:] = runge_kutta(m.y, m.u, u, s.SQ, w.dt[sample % DEPTH])
+        m.u[:] = u
+        m.clock[MOVING_S] += w.dt[sample % DEPTH]
+    _publish(m, w, s)
 
 
 class LeastSquares:
-    """Runs the functions above over samples; holds the standstill at the start and nothing else."""
+    """Memory and constants of the estimator for one layout."""
 
     def __init__(self, layout: Layout, config: Config = Config()) -> None:
         """Raises GeometryError when the layout cannot see omega' and p."""
-        self.layout = layout
-        self.config = config
-        self.state = start()
-        self.still = False
-        self.f_b = np.zeros(3)
-        self.alpha_b = np.zeros(3)
-        self.S = np.ascontiguousarray(layout.S)
-        self.SQ = np.ascontiguousarray(layout.S @ layout.Q)
-        self._R_alpha = config.still.sigma_axis**2 * self.S[:3] @ self.S[:3].T
-        self._detector = stillness.StillDetector(layout.axes, stillness.quiet_map(layout), config.still)
-        self._standstill = stillness.Standstill(layout.axes, config.still.window)
-        self._dt = 0.01
-        self.P = covariance(self.state, self._R_alpha, self._dt)
+        self.layout, self.config = layout, config
+        self.sensor = sensor(layout, config.still.sigma_axis)
+        self.limits = stillness.limits(config.still)
+        self.memory, self.watch = memory(), stillness.memory()
+        self.excluded = 0
 
     @property
     def phase(self) -> str:
         """For people: what it is doing."""
-        if self.state.samples == 0:
+        if self.memory.marks[SAMPLES] == 0:
             return "finding biases: keep still"
-        return "still at the start" if self.state.moving_s == 0.0 else "integrating"
+        return "still at the start" if self.memory.clock[MOVING_S] == 0.0 else "integrating"
 
-    def step(self, f_axis: Array, dt: float | None) -> None:
-        """One sample (N,), m/s^2, dt after the last; None at the first. A long silence starts anew."""
-        f_axis = checked(self.layout, f_axis)
-        if dt is not None and dt > self.config.longest_step_s:
-            self._restart()
-        elif dt is not None:
-            self._dt = dt
-        waiting = self.state.moving_s == 0.0
-        self.still = self._detector.update(f_axis, self.state.y[OMEGA], self.P, self._dt)
-        if not (waiting and self._at_start(f_axis)):
-            self.state = step(self.state, self.S @ f_axis - self.state.bias, self.SQ, self._dt)
-        self._publish(f_axis)
+    def step(self, t_s: float, f_axis: Array) -> None:
+        """One sample (N,), m/s^2, at t_s (s), both checked. A long silence starts anew."""
+        c = self.config
+        advance(self.memory, self.watch, self.sensor, self.limits, c.shortest_standstill, c.longest_step_s, t_s, f_axis)
 
     def gap(self) -> None:
         """Samples are missing: the next step integrates across, with omega' linear in between."""
-        self._detector.forget()
+        stillness.forget(self.watch)
 
-    def _restart(self) -> None:
-        self._detector.forget()
-        self._standstill.clear()
-        self.state = start()
+    def exclude(self, mask: int) -> None:
+        """Go on without some axes: what their biases were in the sum is not known, so the bias of the rest stays.
 
-    def _at_start(self, f_axis: Array) -> bool:
-        """Collect the first standstill; True while it lasts or has not come."""
-        enough = self._standstill.samples >= self.config.shortest_standstill
-        if self.still:
-            self._standstill.add(f_axis)
-            if enough:
-                self._align(self._standstill.samples % self.config.still.window == 0)
-        elif enough:
-            # the turn began before the detector saw it: integrate what was held back
-            for held in self._standstill.held:
-                self.state = step(self.state, self.S @ held - self.state.bias, self.SQ, self._dt)
-            return False
-        else:
-            self._standstill.clear()
-        return True
-
-    def _align(self, learn: bool) -> None:
-        mean, samples = self._standstill.mean(), self._standstill.samples
-        self.state = align(self.state, self.S, mean, samples)
-        if learn:  # now and then: costly
-            self._detector.learn(mean, samples)
-
-    def _publish(self, f_axis: Array) -> None:
-        z = products(self.state.y[OMEGA])
-        x = self.S @ f_axis - self.state.bias - self.SQ @ z
-        self.alpha_b, self.f_b = x[:3], x[3:]
-        self.P = covariance(self.state, self._R_alpha, self._dt)
+        Raises GeometryError when the rest does not see omega' and p.
+        """
+        if mask != self.excluded:
+            self.sensor, self.excluded = sensor(self.layout, self.config.still.sigma_axis, mask), mask
+            self.gap()

@@ -1,158 +1,273 @@
-"""Is the body still? And what do the axes read then?
+"""Is the body still? Questions on the newest samples, with stated limits (E-20 to E-24).
 
-Three questions on the newest samples (E-20 to E-22):
-  spread    do the axes scatter more than their noise?               chi-square of N (window - 1) degrees
-  quiet     do the mean angular acceleration and the mean products
-            differ from those of the last standstill?                chi-square of their dimension, two windows
-  rate      does the caller's rate exclude zero?                     waived after `patience_s` of the others
-When biases have moved for good, `quiet` would fail for ever: it is waived after twice `patience_s` of the others.
+    spread    do the axes scatter more than their noise?                   chi-square of N (window - 1) degrees
+    quiet     do the mean omega' and products of two windows differ
+              from those of the last standstill?                           chi-square of 3 + m degrees
+    turn      does omega', summed over 4 to 128 samples, differ from the
+              bias of this standstill? Sees a slow start early.            chi-square of 3 degrees at each length
+    tilt      does p differ from that of this standstill?                  chi-square of 3 degrees
+    rate      does the caller's rate exclude zero?                         waived after `patience_s` of the others
+    biases    when they have moved for good, `quiet` would fail for ever: it is waived after twice `patience_s`
 
-A body that turns steadily below about 10 deg/s reads the same as one that stands: products are too small. The third
-question is for that; none of them can help when the rate is wrong as well.
+`turn` and `tilt` are asked of a body that stands; they end a standstill and say how many samples ago it ended. A body
+that turns steadily below about 10 deg/s about a vertical axis reads the same as one that stands: `rate` is for that,
+and nothing can help when the rate is wrong as well. Compiled, deterministic, no time of day.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from estimator.layouts.layout import Layout
+from estimator.rate.observed import MOST_AXES, Sensor
 
 Array = NDArray[np.float64]
+
+DEPTH = 128  # samples remembered
+LENGTHS = np.array([4, 8, 16, 32, 64, 128])  # samples over which omega' is summed
+COUNT, FILLED, STILL_FOR, QUIET_FOR, SLOW_FOR, LEARNT, LEARNING, HOLD = range(8)  # of Watch.n
 
 
 @dataclass(frozen=True)
 class Config:
-    """Limits of the still detector."""
+    """Limits of the still detector; false alarms by chance at 100 Hz as measured by tests/bench/bench_rate.py."""
 
     sigma_axis: float = 0.0408  # m/s^2, one sample of one axis: 4 mg noise and 3.9 mg counts (ADXL345, 100 Hz)
     window: int = 25  # samples
     short_window: int = 8  # samples; notices the start of a turn sooner
     spread_limit: float = 1.45  # mean square scatter over sigma_axis^2: 5 sigma above 1 for 12 axes and 25 samples
     quiet_limit: float = 38.0  # chi-square, 9 degrees: once in 50 000 windows by chance
-    rate_limit: float = 25.0  # chi-square, 3 degrees
-    rate_slack: float = 0.03  # rad/s, added to the caller's sigma
-    patience_s: float = 2.0  # s of stillness by the axes alone that outweigh the caller's rate
+    turn_limit: float = 22.0  # chi-square, 3 degrees: once in 15 000 sums by chance
+    tilt_limit: float = 30.0  # chi-square, 3 degrees
+    rate_limit: float = 16.0  # chi-square, 3 degrees
+    rate_slack: float = 0.02  # rad/s, added to the caller's sigma
+    patience_s: float = 6.0  # s of stillness by the axes alone that outweigh the caller's rate
     drift: float = 0.02  # 1/s^2, sigma by which biases of the quiet quantities may have moved since
+    drift_now: float = 0.004  # rad/s^2, the same within one standstill
+    drift_tilt: float = 0.01  # m/s^2, of p within one standstill
+    guard: int = 64  # newest samples of a standstill that are not learnt: they may already move
+    hold: int = 50  # samples after the end of a standstill before there can be another
 
 
-def quiet_map(layout: Layout) -> Array:
-    """What must not move at rest, from the axes: omega' (3) and, where the layout sees them, the products (6)."""
-    if layout.rank < 12:
-        return layout.S[:3]
-    return np.delete(layout.field_inverse, slice(3, 6), axis=0)
+# Config for compiled functions.
+LIMITS = np.dtype((np.record, [(f.name, "i8" if f.type in (int, "int") else "f8") for f in fields(Config)]))
+Limits = np.record
+
+# Memory of the detector.
+WATCH = np.dtype(
+    (
+        np.record,
+        [
+            ("a", "f8", (DEPTH, MOST_AXES)),  # ring of readings
+            ("dt", "f8", (DEPTH,)),
+            ("y", "f8", (DEPTH, 12)),  # of [alpha_m, c_m, p_m]
+            ("total", "f8", (2 * DEPTH, 12)),  # running sum of y after each sample
+            ("square", "f8", (MOST_AXES, 3)),  # of the readings in the window: offset, sum, sum of squares
+            ("reference", "f8", (12,)),  # mean y of the last standstill
+            ("sum", "f8", (12,)),  # of y over this standstill without its newest samples
+            ("n", "i8", (8,)),  # counters
+        ],
+    )
+)
+Watch = np.record
 
 
-@njit(cache=True)
-def _statistics(
-    ring: Array, newest: int, quiet: Array, reference: Array, long_weight: Array, short_weight: Array, short: int
-) -> tuple[float, float, float]:
-    """Mean square scatter, and chi-squares of the quiet quantities over the whole ring and its newest samples."""
-    window, axes = ring.shape
-    mean, recent, scatter = np.zeros(axes), np.zeros(axes), 0.0
-    for k in range(window):
-        mean += ring[k] / window
-    for k in range(window):
-        for i in range(axes):
-            scatter += (ring[k, i] - mean[i]) ** 2
-    for k in range(1, short + 1):
-        recent += ring[(newest - k) % window] / short
-    off, off_recent = quiet @ mean - reference, quiet @ recent - reference
-    long_square = np.sum(off * (long_weight @ off))
-    return scatter / ((window - 1) * axes), long_square, np.sum(off_recent * (short_weight @ off_recent))
-
-
-@njit(cache=True)
-def _exclusion(omega_b: Array, P: Array, slack: float) -> float:
-    """Chi-square of zero rate."""
-    W = P + slack * np.eye(3)
-    return np.sum(omega_b * np.linalg.solve(W, omega_b))
-
-
-class StillDetector:
-    """Ring of the newest samples; `update` answers for the newest. Deterministic, no time of day."""
-
-    def __init__(self, axes: int, quiet_map: Array, config: Config = Config()) -> None:
-        """quiet_map (m, axes): what must not move, angular acceleration and (where seen) products."""
-        self.config = config
-        self._map = np.ascontiguousarray(quiet_map)
-        covariance = config.sigma_axis**2 * quiet_map @ quiet_map.T
-        self._covariance = covariance
-        self._long = self._weights(config.window, 0)
-        self._short = self._weights(config.short_window, 0)
-        self._ring = np.zeros((config.window, axes))
-        self._filled = 0
-        self._next = 0
-        self._reference = np.zeros(len(quiet_map))
-        self._reference_samples = 0
-        self._quiet_for = self._slow_for = 0  # samples
-
-    def forget(self) -> None:
-        """After a gap: the window must fill anew; the reference of the last standstill stays."""
-        self._filled = self._next = self._quiet_for = self._slow_for = 0
-
-    def learn(self, mean_axis: Array, samples: int) -> None:
-        """The mean (axes,) of `samples` readings of a standstill becomes the reference of `quiet`."""
-        self._reference = self._map @ mean_axis
-        self._reference_samples = samples
-        self._long = self._weights(self.config.window, samples)
-        self._short = self._weights(self.config.short_window, samples)
-
-    def mean(self) -> Array:
-        """Mean of the window, (axes,), m/s^2."""
-        return self._ring.mean(axis=0)
-
-    def update(self, f_axis: Array, omega_b: Array, P: Array, dt: float) -> bool:
-        """True when still, by axis readings (N,), the caller's rate (3,) and its covariance (3, 3)."""
-        c = self.config
-        self._ring[self._next] = f_axis
-        self._next = (self._next + 1) % c.window
-        self._filled = min(self._filled + 1, c.window)
-        scatter, long, short = _statistics(
-            self._ring, self._next, self._map, self._reference, self._long, self._short, c.short_window
+def limits(config: Config) -> Limits:
+    """Config as compiled functions take it. Raises ValueError for windows longer than the memory."""
+    if not 2 <= config.short_window <= config.window <= config.guard < DEPTH:
+        raise ValueError(
+            f"still detector: windows {config.short_window} <= {config.window} <= {config.guard} < {DEPTH}"
         )
-        if self._filled < c.window or scatter > c.spread_limit * c.sigma_axis**2:
-            self._quiet_for = self._slow_for = 0
-            return False
-        slow = _exclusion(omega_b, P, c.rate_slack**2) < c.rate_limit
-        if self._reference_samples == 0 or max(long, short) <= c.quiet_limit:
-            self._quiet_for, self._slow_for = self._quiet_for + 1, 0
-            return bool(slow or self._quiet_for * dt >= c.patience_s)
-        self._quiet_for, self._slow_for = 0, self._slow_for + 1 if slow else 0
-        return bool(self._slow_for * dt >= 2.0 * c.patience_s)
-
-    def _weights(self, n: int, reference_samples: int) -> Array:
-        covariance = self._covariance / n + self.config.drift**2 * np.eye(len(self._covariance))
-        if reference_samples:
-            covariance = covariance + self._covariance / reference_samples
-        return np.linalg.inv(covariance)
+    out = np.zeros(1, LIMITS)[0]
+    for name in LIMITS.names:
+        out[name] = getattr(config, name)
+    return out
 
 
-class Standstill:
-    """Mean of the axes over the running standstill, without its last `guard` samples, which may already move."""
+def memory() -> Watch:
+    """Nothing seen yet."""
+    return np.zeros(1, WATCH)[0]
 
-    def __init__(self, axes: int, guard: int) -> None:
-        self._guard = guard
-        self.held: list[Array] = []  # newest samples, not in the mean
-        self._sum = np.zeros(axes)
-        self.samples = 0
 
-    def add(self, f_axis: Array) -> None:
-        """One more sample of standstill."""
-        self.held.append(f_axis)
-        if len(self.held) > self._guard:
-            self._sum += self.held.pop(0)
-            self.samples += 1
+@njit(cache=True, error_model="numpy")
+def forget(w: Watch) -> None:
+    """After a gap: the window must fill anew; the reference of the last standstill stays."""
+    w.n[FILLED] = w.n[STILL_FOR] = w.n[QUIET_FOR] = w.n[SLOW_FOR] = w.n[LEARNING] = 0
+    w.sum[:] = 0.0
 
-    def clear(self) -> None:
-        """The body moved."""
-        self.held.clear()
-        self._sum[:] = 0.0
-        self.samples = 0
 
-    def mean(self) -> Array:
-        """(axes,), m/s^2; raises ValueError before any sample has passed the guard."""
-        if self.samples == 0:
-            raise ValueError(f"standstill of at most {self._guard} samples, want more: keep the body still longer")
-        return self._sum / self.samples
+@njit(cache=True, error_model="numpy")
+def take(w: Watch, s: Sensor, a: Array, dt: float) -> None:
+    """Remember one sample."""
+    k = w.n[COUNT] % DEPTH
+    before = (w.n[COUNT] + 2 * DEPTH - 1) % (2 * DEPTH)
+    now = w.n[COUNT] % (2 * DEPTH)
+    w.dt[k] = dt
+    y = w.y[k]
+    y[:] = 0.0
+    for i in range(s.n):
+        w.a[k, i] = a[i]
+        for r in range(3):
+            y[r] += s.S[r, i] * a[i]
+            y[9 + r] += s.S[3 + r, i] * a[i]
+        for r in range(s.m):
+            y[3 + r] += s.B[r, i] * a[i]
+    for r in range(12):
+        w.total[now, r] = y[r] + (w.total[before, r] if w.n[FILLED] > 0 else 0.0)
+    w.n[COUNT] += 1
+    w.n[FILLED] += 1
+
+
+@njit(cache=True, error_model="numpy")
+def _scatter(w: Watch, s: Sensor, window: int) -> float:
+    """Mean square of the axes about their means over the window, (m/s^2)^2; running sums, made anew now and then."""
+    anew = w.n[FILLED] == window or w.n[COUNT] % DEPTH == 0
+    newest, oldest = (w.n[COUNT] - 1) % DEPTH, (w.n[COUNT] - 1 - window) % DEPTH
+    total, axes = 0.0, 0.0
+    for i in range(s.n):
+        sums = w.square[i]
+        if anew:
+            sums[0], sums[1], sums[2] = w.a[newest, i], 0.0, 0.0
+            for k in range(1, window + 1):
+                d = w.a[(w.n[COUNT] - k) % DEPTH, i] - sums[0]
+                sums[1] += d
+                sums[2] += d * d
+        else:
+            come, gone = w.a[newest, i] - sums[0], w.a[oldest, i] - sums[0]
+            sums[1] += come - gone
+            sums[2] += come * come - gone * gone
+        if s.used[i] > 0.0:
+            total += sums[2] - sums[1] * sums[1] / window
+            axes += 1.0
+    return total / ((window - 1) * axes)
+
+
+@njit(cache=True, error_model="numpy")
+def _mean(w: Watch, window: int, r: int) -> float:
+    """Mean of component r of y over the window."""
+    now, then = (w.n[COUNT] - 1) % (2 * DEPTH), (w.n[COUNT] - 1 - window) % (2 * DEPTH)
+    return (w.total[now, r] - (w.total[then, r] if w.n[FILLED] > window else 0.0)) / window
+
+
+@njit(cache=True, error_model="numpy")
+def _moved(w: Watch, s: Sensor, window: int, drift: float) -> float:
+    """Chi-square of the mean [omega', c] of the window against the reference (E-21)."""
+    total = 0.0
+    share = 1.0 / window + 1.0 / w.n[LEARNT]
+    d = np.zeros(9)
+    for r in range(3 + s.m):
+        d[r] = _mean(w, window, r) - w.reference[r]
+    for k in range(9):
+        along = 0.0
+        for r in range(9):
+            along += s.basis[k, r] * d[r]
+        total += along * along / (s.spread[k] * share + drift * drift)
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def _turned(w: Watch, s: Sensor, length: int, drift: float) -> float:
+    """Chi-square of the sum of omega' over the newest `length` samples against the bias of this standstill (E-23)."""
+    now, then = (w.n[COUNT] - 1) % (2 * DEPTH), (w.n[COUNT] - 1 - length) % (2 * DEPTH)
+    share = length * (1.0 + length / w.n[LEARNT])
+    total = 0.0
+    for r in range(3):
+        d = w.total[now, r] - w.total[then, r] - length * w.reference[r]
+        total += d * d / (s.R_alpha[r, r] * share + (length * drift) ** 2)
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def _tilted(w: Watch, s: Sensor, window: int, drift: float) -> float:
+    """Chi-square of the mean p of the window against that of this standstill (E-24)."""
+    total, share = 0.0, 1.0 / window + 1.0 / w.n[LEARNT]
+    for r in range(9, 12):
+        total += (_mean(w, window, r) - w.reference[r]) ** 2 / (s.R_p[r - 9, r - 9] * share + drift * drift)
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def rate_excludes_zero(omega: Array, P: Array, slack: float) -> float:
+    """Chi-square of zero rate: omega^T (P + slack^2 I)^-1 omega (E-22)."""
+    a, b, c = P[0, 0] + slack * slack, P[1, 1] + slack * slack, P[2, 2] + slack * slack
+    d, e, f = P[0, 1], P[0, 2], P[1, 2]
+    x, y, z = b * c - f * f, e * f - d * c, d * f - b * e
+    det = a * x + d * y + e * z
+    u, v, q = a * c - e * e, d * e - a * f, a * b - d * d
+    o0, o1, o2 = omega[0], omega[1], omega[2]
+    return (o0 * o0 * x + o1 * o1 * u + o2 * o2 * q + 2.0 * (o0 * o1 * y + o0 * o2 * z + o1 * o2 * v)) / det
+
+
+@njit(cache=True, error_model="numpy")
+def began(w: Watch, s: Sensor, c: Limits) -> int:
+    """0 while a standing body stands on; else how many samples ago it began to move (E-23, E-24)."""
+    worst, depth = 1.0, 0
+    for k in range(len(LENGTHS)):
+        length = LENGTHS[k]
+        if w.n[LEARNING] < c.window or length >= min(w.n[STILL_FOR], w.n[FILLED] - 1):
+            break
+        ratio = _turned(w, s, length, c.drift_now) / c.turn_limit
+        if ratio > worst:
+            worst, depth = ratio, length + length // 2
+    if depth == 0 and w.n[LEARNING] >= c.window and _tilted(w, s, c.window, c.drift_tilt) > c.tilt_limit:
+        depth = c.guard
+    return min(depth, DEPTH - 8)
+
+
+@njit(cache=True, error_model="numpy")
+def _learn(w: Watch, c: Limits) -> None:
+    """One more sample of standstill; the one `guard` samples ago becomes part of the reference."""
+    w.n[STILL_FOR] += 1
+    if w.n[STILL_FOR] <= c.guard:
+        return
+    y = w.y[(w.n[COUNT] - 1 - c.guard) % DEPTH]
+    w.n[LEARNING] += 1
+    for r in range(12):
+        w.sum[r] += y[r]
+    if w.n[LEARNING] >= c.window:
+        w.n[LEARNT] = w.n[LEARNING]
+        for r in range(12):
+            w.reference[r] = w.sum[r] / w.n[LEARNING]
+
+
+@njit(cache=True, error_model="numpy")
+def _end(w: Watch) -> None:
+    w.n[STILL_FOR] = w.n[LEARNING] = 0
+    w.sum[:] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _stands(w: Watch, s: Sensor, c: Limits, omega: Array, P: Array, dt: float) -> bool:
+    if w.n[HOLD] > 0:
+        w.n[HOLD] -= 1
+    if w.n[FILLED] < c.window or _scatter(w, s, c.window) > c.spread_limit * c.sigma_axis**2 or w.n[HOLD] > 0:
+        w.n[QUIET_FOR] = w.n[SLOW_FOR] = 0
+        return False
+    slow = rate_excludes_zero(omega, P, c.rate_slack) < c.rate_limit
+    if w.n[LEARNT] == 0 or (
+        _moved(w, s, c.window, c.drift) <= c.quiet_limit and _moved(w, s, c.short_window, c.drift) <= c.quiet_limit
+    ):
+        w.n[QUIET_FOR], w.n[SLOW_FOR] = w.n[QUIET_FOR] + 1, 0
+        return slow or w.n[QUIET_FOR] * dt >= c.patience_s
+    w.n[QUIET_FOR], w.n[SLOW_FOR] = 0, w.n[SLOW_FOR] + 1 if slow else 0
+    return w.n[SLOW_FOR] * dt >= 2.0 * c.patience_s
+
+
+@njit(cache=True, error_model="numpy")
+def detect(w: Watch, s: Sensor, c: Limits, omega: Array, P: Array, dt: float) -> tuple[bool, int]:
+    """Is the sample taken last one of standstill, by the caller's omega (3,) and its covariance P (3, 3)?
+
+    When a standstill ends: also how many samples ago the turn began.
+    """
+    standing = w.n[STILL_FOR] > 0
+    still = _stands(w, s, c, omega, P, dt)
+    depth = began(w, s, c) if standing else 0
+    if still and depth == 0:
+        _learn(w, c)
+        return True, 0
+    depth = min(max(depth, 2 * c.window), w.n[STILL_FOR], DEPTH - 8) if standing and depth == 0 else depth
+    _end(w)
+    if standing:
+        w.n[QUIET_FOR], w.n[HOLD] = 0, c.hold
+    return False, depth

@@ -107,6 +107,36 @@ PROFILES: dict[str, Profile] = {
         ),
         Profile("fast", [_rest(5), *_turn(684.0 * DEGREE, 10, 5, 7), _rest(3)]),
         Profile("still", [_rest(30)]),
+        # through zero without a stop, three times
+        Profile(
+            "reversals",
+            [
+                _rest(5),
+                Ramp(1, 0, PLATEAU),
+                Ramp(3, PLATEAU, PLATEAU),
+                Ramp(2, PLATEAU, -PLATEAU),
+                Ramp(4, -PLATEAU, -PLATEAU),
+                Ramp(2, -PLATEAU, PLATEAU),
+                Ramp(4, PLATEAU, PLATEAU),
+                Ramp(3, PLATEAU, -PLATEAU / 2),
+                Ramp(3, -PLATEAU / 2, -PLATEAU / 2),
+                Ramp(1, -PLATEAU / 2, 0),
+                _rest(2),
+            ],
+        ),  # fmt: skip
+        # where products say little: 10, 20, 30 deg/s with stops between
+        Profile(
+            "slow",
+            [
+                _rest(5),
+                *_turn(10 * DEGREE, 1, 5, 1),
+                _rest(2),
+                *_turn(-20 * DEGREE, 1, 5, 1),
+                _rest(2),
+                *_turn(30 * DEGREE, 1, 4, 1),
+                _rest(1),
+            ],
+        ),  # fmt: skip
     )
 }
 
@@ -119,3 +149,13 @@ def named(name: str) -> Profile:
     if profile is None:
         raise ValueError(f"no profile {name!r}; want one of {', '.join([*PROFILES, *ALIASES])}")
     return profile
+
+
+# Begins and ends at full speed; for a body that is switched on while it turns. Not in the table: not at rest at 0 s.
+TURNING = Profile(
+    "turning",
+    [
+        Ramp(8, PLATEAU, PLATEAU), Ramp(2, PLATEAU, PLATEAU / 2), Ramp(6, PLATEAU / 2, PLATEAU / 2),
+        Ramp(2, PLATEAU / 2, 0), _rest(3), Ramp(2, 0, PLATEAU), Ramp(7, PLATEAU, PLATEAU),
+    ],
+)  # fmt: skip

@@ -1,0 +1,319 @@
+"""From samples to states: start, standstill, the taking back of unnoticed turns, two signs at once; compiled.
+
+A turn begins before the detector sees it. The filter keeps its states of the last 128 samples of standstill, every
+eighth; when a turn is noticed it goes back to where that began and runs those samples again as turning.
+
+A start while turning: the products give omega but for its sign. Two filters run, one for each sign, until what they
+say of omega' and of gravity's turn tells them apart (E-46).
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from estimator.rate import still as stillness
+from estimator.rate.observed import Sensor
+from estimator.rate.products_kernel import (
+    ALPHA,
+    FORCE_USED,
+    GRAVITY,
+    HORIZON,
+    LEVEL,
+    LIKELIHOOD,
+    OUT,
+    P_N,
+    PP,
+    Q_NB,
+    REST,
+    REST_VARIANCE,
+    SIGN,
+    SIZE,
+    USED,
+    V_N,
+    Tuning,
+)  # fmt: skip
+from estimator.rate.products_model import BIASES, FIRST, SECOND, STATES, TURNED
+from estimator.rate.products_step import step
+from estimator.rate.still import COUNT, DEPTH, FILLED, Limits, Watch
+
+Array = NDArray[np.float64]
+
+EVERY = 8  # samples between states that are kept
+KEPT = DEPTH // EVERY + 1
+ARRIVALS = 4
+WINDOW = 24  # samples of the moving horizon
+ITERATIONS = 2  # of Gauss and Newton
+STARTED, STILL, MOVED, BRANCHES, REFUSED, REFUSED_FORCE, TAKEN_BACK, STEPS, FREE = range(9)  # of Memory.marks
+LAST_S, DT, BALANCE = range(3)  # of Memory.clock
+LONGEST_GAP_S = 0.5  # s; after a longer one the rate is unknown
+UNKNOWN_RATE = 10.0  # rad/s, sigma before any standstill
+DECIDED = 14.0  # log of the likelihood ratio of two signs at which one is dropped: one wrong in a million
+
+
+# All that one filter remembers, beside the detector's Watch.
+MEMORY = np.dtype(
+    (
+        np.record,
+        [
+            ("core", "f8", (SIZE,)),  # flat state of products_kernel
+            ("other", "f8", (SIZE,)),  # of the other sign, while there are two
+            ("kept", "f8", (KEPT, SIZE)),  # states before samples of this standstill
+            ("kept_at", "i8", (KEPT,)),  # the samples' numbers; -1: none
+            ("out", "f8", (OUT,)),
+            ("other_out", "f8", (OUT,)),
+            ("arrival", "f8", (ARRIVALS, SIZE)),  # of the moving horizon: states before samples of this turn
+            ("arrival_at", "i8", (ARRIVALS,)),
+            ("marks", "i8", (9,)),
+            ("clock", "f8", (3,)),
+        ],
+    )
+)
+Memory = np.record
+
+
+def memory() -> Memory:
+    """Before any sample."""
+    m = np.zeros(1, MEMORY)[0]
+    m.kept_at[:] = m.arrival_at[:] = -1
+    m.core[Q_NB] = m.other[Q_NB] = 1.0
+    m.clock[:] = (np.nan, 0.01, 0.0)
+    return m
+
+
+@njit(cache=True, error_model="numpy")
+def gap(m: Memory, w: Watch) -> None:
+    """Samples are missing: the next step predicts across."""
+    stillness.forget(w)
+    m.kept_at[:] = -1
+    m.arrival_at[:] = -1
+
+
+@njit(cache=True, error_model="numpy")
+def restart(m: Memory, w: Watch) -> None:
+    """The rate is unknown: wait for a standstill, or start while turning."""
+    gap(m, w)
+    m.marks[STARTED] = m.marks[STILL] = m.marks[MOVED] = m.marks[BRANCHES] = 0
+    m.core[:] = 0.0
+    m.core[Q_NB] = 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def begin(core: Array, s: Sensor, t: Tuning, mean: Array, theta_b: Array) -> None:
+    """First state from the mean y (12,) of a short standstill (E-36)."""
+    core[:] = 0.0
+    P = core[STATES:PP].reshape(STATES, STATES)
+    up = mean[9:12] / np.sqrt(np.sum(mean[9:12] ** 2))
+    core[12:15] = GRAVITY * up
+    for i in range(12):
+        for j in range(12):
+            P[BIASES[i], BIASES[j]] = t.bias * s.drift[i, j]
+    for i in range(3):
+        P[i, i] = t.still_rate / 25.0
+        P[18 + i, 18 + i] = t.pivot
+        for j in range(3):
+            along = up[i] * up[j]
+            P[12 + i, 12 + j] = t.gravity * along + t.tilt * ((1.0 if i == j else 0.0) - along)
+    core[ALPHA : ALPHA + 3] = mean[0:3]
+    core[SIGN] = t.still_rate / 25.0
+    core[Q_NB : Q_NB + 4] = _level(up)
+    for k in range(12):
+        core[REST_VARIANCE + k] = core[LEVEL + k] = t.bias * s.drift[k, k]
+    for i in range(s.n):
+        core[REST + i] = theta_b[i, 0] * core[12] + theta_b[i, 1] * core[13] + theta_b[i, 2] * core[14]
+
+
+@njit(cache=True, error_model="numpy")
+def _level(up: Array) -> Array:
+    """q_nb of a body at rest whose up is `up`; x_b points north, or z_b where x_b is vertical (E-11)."""
+    ahead = np.array([1.0, 0.0, 0.0]) if abs(up[0]) < 0.999 else np.array([0.0, 0.0, 1.0])
+    north = ahead - np.sum(ahead * up) * up
+    north /= np.sqrt(np.sum(north * north))
+    east = np.array([north[1] * up[2] - north[2] * up[1], north[2] * up[0] - north[0] * up[2],
+                     north[0] * up[1] - north[1] * up[0]])  # fmt: skip
+    C = np.empty((3, 3))
+    C[0], C[1], C[2] = north, east, -up
+    w = C[0, 0] + C[1, 1] + C[2, 2]
+    squares = np.array([1.0 + w, 1.0 - w + 2.0 * C[0, 0], 1.0 - w + 2.0 * C[1, 1], 1.0 - w + 2.0 * C[2, 2]])
+    a, b, c = C[2, 1] - C[1, 2], C[0, 2] - C[2, 0], C[1, 0] - C[0, 1]
+    xy, xz, yz = C[0, 1] + C[1, 0], C[0, 2] + C[2, 0], C[1, 2] + C[2, 1]
+    table = np.array([[squares[0], a, b, c], [a, squares[1], xy, xz], [b, xy, squares[2], yz], [c, xz, yz, squares[3]]])
+    q = table[np.argmax(squares)]
+    q = q / np.sqrt(np.sum(q * q))
+    return q if q[0] >= 0.0 else -q
+
+
+@njit(cache=True, error_model="numpy")
+def _mean(w: Watch, window: int) -> Array:
+    mean = np.zeros(12)
+    for k in range(1, window + 1):
+        mean += w.y[(w.n[COUNT] - k) % DEPTH] / window
+    return mean
+
+
+@njit(cache=True, error_model="numpy")
+def _begin_turning(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits) -> None:
+    """Two filters, for omega and -omega, when the products say that the body turns (E-46)."""
+    if w.n[FILLED] < 2 * c.window or not s.plain:
+        return
+    mean = _mean(w, c.window)
+    Z = np.empty((3, 3))
+    for k in range(6):
+        Z[FIRST[k], SECOND[k]] = Z[SECOND[k], FIRST[k]] = mean[3 + k]
+    sizes, directions = np.linalg.eigh(Z)
+    if not sizes[2] ** 2 > t.start_turning * (t.bias * s.drift[3, 3] + s.R_c[0, 0]):
+        return
+    omega = np.sqrt(sizes[2]) * directions[:, 2]
+    for sign in (1.0, -1.0):
+        core = m.core if sign > 0.0 else m.other
+        begin(core, s, t, mean, s.theta_b)
+        core[0:3] = sign * omega
+        P = core[STATES:PP].reshape(STATES, STATES)
+        for i in range(3):
+            P[i, i] = t.bias * s.drift[3, 3] / sizes[2]
+            P[12 + i, 12 + i] += 3.0 * t.tilt
+    m.marks[STARTED], m.marks[BRANCHES], m.marks[MOVED], m.clock[BALANCE] = 1, 2, 1, 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _take_back(m: Memory, depth: int, now: int) -> int:
+    """Core becomes the state before sample now - depth, or the nearest that is kept; returns that sample."""
+    best = -1
+    for k in range(KEPT):
+        at = m.kept_at[k]
+        if at < 0 or at > now or now - at >= DEPTH:
+            continue
+        if best < 0 or abs(at - (now - depth)) < abs(m.kept_at[best] - (now - depth)):
+            best = k
+    first = now
+    if best >= 0:
+        m.core[:] = m.kept[best]
+        first = m.kept_at[best]
+    m.marks[TAKEN_BACK] += now - first
+    m.kept_at[:] = -1
+    return first
+
+
+@njit(cache=True, error_model="numpy")
+def _two_signs(m: Memory, still: bool) -> None:
+    """Keep the better one of two signs in core, and only that once it is sure."""
+    m.clock[BALANCE] += m.out[LIKELIHOOD] - m.other_out[LIKELIHOOD]
+    if m.clock[BALANCE] < 0.0:
+        for k in range(len(m.core)):
+            m.core[k], m.other[k] = m.other[k], m.core[k]
+        for k in range(OUT):
+            m.out[k], m.other_out[k] = m.other_out[k], m.out[k]
+        m.clock[BALANCE] = -m.clock[BALANCE]
+    if still or m.clock[BALANCE] > DECIDED:
+        m.marks[BRANCHES] = 1
+
+
+@njit(cache=True, error_model="numpy")
+def _horizon(m: Memory, t: Tuning, still: bool, now: int) -> int:
+    """First sample of the moving horizon's window when it is due and all of it was turning; else -1 (E-49)."""
+    first = now + 1 - WINDOW
+    if t.method != HORIZON or still or first < 0 or first % EVERY != 0 or m.marks[BRANCHES] != 1:
+        return -1
+    return first if m.arrival_at[(first // EVERY) % ARRIVALS] == first else -1
+
+
+@njit(cache=True, error_model="numpy")
+def _on_axis(m: Memory, w: Watch, s: Sensor, t: Tuning) -> bool:
+    """Does omega keep its direction? Not while omega' across it, summed over 16 or 64 samples, is more than noise.
+
+    A body found to turn freely is taken for one for at least 2 s, and omega's variance across grows (E-45).
+    """
+    core = m.core
+    square = core[0] ** 2 + core[1] ** 2 + core[2] ** 2
+    if t.axis == 0.0 or square <= t.axis_from:
+        return False
+    now = (w.n[COUNT] - 1) % (2 * DEPTH)
+    for length in (16, 64):
+        if w.n[FILLED] <= length:
+            break
+        then = (w.n[COUNT] - 1 - length) % (2 * DEPTH)
+        across, along = 0.0, 0.0
+        for i in range(3):
+            d = w.total[now, i] - w.total[then, i] - length * core[3 + i]
+            across += d * d
+            along += d * core[i]
+        across -= along * along / square
+        if across > t.axis_limit * length * s.R_alpha[0, 0] and m.marks[FREE] < 200:
+            if m.marks[FREE] == 0:
+                for i in range(3):
+                    core[STATES + STATES * i + i] += t.axis_lost
+            m.marks[FREE] = 200
+    if m.marks[FREE] > 0:
+        m.marks[FREE] -= 1
+    return m.marks[FREE] == 0
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def advance(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, t_s: float, a: Array) -> None:
+    """One sample of all axes a (N,), m/s^2, read at t_s (s, growing)."""
+    dt = t_s - m.clock[LAST_S]
+    m.clock[LAST_S] = t_s
+    if dt > LONGEST_GAP_S:
+        restart(m, w)
+    elif dt > 0.0:
+        m.clock[DT] = dt
+    dt = m.clock[DT]
+    m.marks[STEPS] += 1
+    stillness.take(w, s, a, dt)
+    m.out[:] = 0.0
+    if m.marks[STARTED] == 0:
+        still, _ = stillness.detect(w, s, c, np.zeros(3), UNKNOWN_RATE**2 * np.eye(3), dt)
+        m.marks[STILL] = 1 if still else 0
+        if still:
+            begin(m.core, s, t, _mean(w, c.window), s.theta_b)
+            m.marks[STARTED], m.marks[BRANCHES] = 1, 1
+        else:
+            _begin_turning(m, w, s, t, c)
+        return
+    P = m.core[STATES:PP].reshape(STATES, STATES)
+    still, depth = stillness.detect(w, s, c, m.core[0:3], P[0:3, 0:3], dt)
+    now = w.n[COUNT] - 1
+    first = now
+    if still and now % EVERY == 0:
+        m.kept[(now // EVERY) % KEPT] = m.core
+        m.kept_at[(now // EVERY) % KEPT] = now
+    elif not still and m.marks[STILL]:
+        m.marks[MOVED] = 1
+        first = _take_back(m, depth, now)
+    m.marks[STILL] = 1 if still else 0
+    fixed = not still and _on_axis(m, w, s, t)
+    if still:
+        m.arrival_at[:] = -1
+    at = np.full(3, np.nan)
+    for turn in range(1 + ITERATIONS):
+        if turn > 0:
+            first = _horizon(m, t, still, now)
+            if first < 0:
+                break
+            end = m.core[0:6].copy()
+            m.core[:] = m.arrival[(first // EVERY) % ARRIVALS]
+        for sample in range(first, now + 1):
+            k = sample % DEPTH
+            grow = EVERY * dt if sample % EVERY == 0 else 0.0
+            if sample % EVERY == 0 and t.method == HORIZON and not still:
+                m.arrival[(sample // EVERY) % ARRIVALS] = m.core
+                m.arrival_at[(sample // EVERY) % ARRIVALS] = sample
+            if turn > 0:  # back from the end by what omega' was since
+                left = now - sample
+                for i in range(3):
+                    gained = w.total[now % (2 * DEPTH), i] - w.total[sample % (2 * DEPTH), i]
+                    at[i] = end[i] - dt * (gained - left * end[3 + i])
+            for branch in range(m.marks[BRANCHES]):
+                core, out = (m.core, m.out) if branch == 0 else (m.other, m.other_out)
+                step(core, s, t, w.y[k], at, w.dt[k], not still, fixed, grow, out)
+    if m.marks[BRANCHES] == 2:
+        _two_signs(m, still)
+    if still and m.marks[MOVED] == 0:  # position counts from the end of the first standstill
+        m.core[V_N : V_N + 3] = 0.0
+        m.core[P_N : P_N + 3] = 0.0
+        m.core[TURNED] = 0.0
+        P[TURNED, :] = 0.0
+        P[:, TURNED] = 0.0
+    if m.out[USED] == 0.0:
+        m.marks[REFUSED] += 1
+    if m.out[FORCE_USED] == 0.0:
+        m.marks[REFUSED_FORCE] += 1
