@@ -98,11 +98,22 @@ class Pipeline:
 
     def order(self, command: pb.EstimatorCommand) -> tuple[pb.Reply, list[Output]]:
         """Do what a person asked the estimator of a device for; never raises for an order that cannot be followed."""
+        if command.action == pb.EstimatorCommand.ACTION_MUTE_GNSS:
+            return self._mute(command), []
         device, before = command.device, self._desk.used.get(command.device)
         reply, status = self._desk.order(command, make_layout(self._settings.layout_of(device)))
         if self._desk.used.get(device) is not before or command.action == pb.EstimatorCommand.ACTION_USE_CARD:
             self._boards.pop(device, None)  # the estimators begin anew with the other card
         return reply, [] if status is None else [Output(CALIBRATION, device, "", status)]
+
+    def _mute(self, command: pb.EstimatorCommand) -> pb.Reply:
+        board = self._vehicles.get(command.device)
+        if board is None:
+            return pb.Reply(ok=False, message=f"{command.device} does not navigate: it has sent no inertial samples")
+        try:
+            return pb.Reply(ok=True, message=board.mute(command.seconds))
+        except ValueError as error:
+            return pb.Reply(ok=False, message=str(error))
 
     def on_tacho(self, message: pb.TachoRate) -> list[Output]:
         """A report of the tachometer: table runs of a guided calibration need it."""
@@ -182,7 +193,7 @@ class Pipeline:
                 )
                 continue
             header = convert.sample_header(batch.header, o.row * batch.period_s)
-            nav = convert.nav_message(header, batch, o.index, o.estimator, o.what)
+            nav = convert.nav_message(header, batch, o.index, o.estimator, o.what, board.muted(o.what.t))
             out.append(Output(NAV, device, o.estimator, nav))
             pose = convert.pose_message(header, o.estimator, o.what.p_ned, o.what.q_nb)
             out.append(Output(POSE, device, o.estimator, pose))
@@ -231,6 +242,7 @@ class Pipeline:
         state = board.last[name]
         status.state = state.phase or ("standing still" if state.still else "turning")
         status.layout = board.layout.name
+        status.us_per_sample = board.cost_us(name)
         bias = convert.as_list(state.bias)
         if len(bias) >= 6:
             status.bias_alpha_radps2[:] = bias[:3]

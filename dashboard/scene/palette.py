@@ -13,13 +13,29 @@ AXES = (VERMILLION, GREEN, SKY)  # x, y, z
 REFERENCE = GREEN  # tachometer
 FIX = ORANGE  # GNSS
 REJECTED = VERMILLION  # a fix the filter did not believe
-_ESTIMATORS = {"products-ekf": SKY, "least-squares": VERMILLION, "ekf": SKY}
+_ESTIMATORS = {
+    "products-ekf": SKY,
+    "least-squares": VERMILLION,
+    "ekf": SKY,
+    "huber-nhc": SKY,
+    "kf": VERMILLION,
+    "fpe-fuzzy": PURPLE,
+}
 _FURTHER = (PURPLE, YELLOW, ORANGE, BLUE, VERMILLION, SKY)
 # Names for people; anything else is shown as it is called on the bus.
 _TITLES = {
     "products-ekf": "products filter",
     "least-squares": "least squares",
+    "products-ukf": "products, unscented",
+    "products-rls": "products, recursive",
+    "products-mhe": "products, moving horizon",
     "ekf": "INS/GNSS filter",
+    "kf": "Kalman filter",
+    "kf-nhc": "Kalman + wheels",
+    "huber": "robust",
+    "huber-nhc": "robust + wheels",
+    "fpe-fuzzy": "predictive, fuzzy",
+    "mhe-robust": "robust horizon",
     "vqf": "VQF",
     "tilt-vector": "fixed weight, vector form",
     "tilt-published": "fixed weight, published",

@@ -17,6 +17,7 @@ from dashboard.scene.tilt import tilt_rows
 from messages import gyrofree_pb2 as pb
 from messages import topics as tp
 
+LEADERS = ("products-ekf", "huber-nhc", "ekf")  # estimators that stand first wherever they run
 HISTORY_S = 620.0  # kept in the rings; the longest window a view offers is 600 s
 LATE_JOIN_S = 2.0  # repaired stretches nearer than this are one
 MARKS = 200  # notes and marks of a device that are drawn
@@ -29,8 +30,10 @@ SLOW_STALE_S = {"link": 3.0, "status": 3.0, "estimator": 3.0, "board": 30.0, "gn
 RATE_OMEGA, RATE_SIGMA, RATE_F = slice(0, 3), slice(3, 6), slice(6, 9)
 RATE_ANGLE, RATE_NIS, RATE_POSITION = 9, 10, slice(11, 14)
 RATE_INNOVATION, RATE_INNOVATION_SIGMA, RATE_NIS_DOF = slice(14, 20), slice(20, 26), 26
+RATE_SIGHT, RATE_BOUND = slice(27, 30), slice(30, 33)
 TRUTH_OMEGA, TRUTH_F, TRUTH_ANGLE = slice(0, 3), slice(3, 6), 6
 NAV_POSITION, NAV_VELOCITY, NAV_SIGMA_POSITION, NAV_YAW = slice(0, 3), slice(3, 6), slice(6, 9), 9
+NAV_HORIZON, NAV_CRISP, NAV_INPUTS, NAV_MEMBERSHIP = 10, 11, slice(12, 14), slice(14, 20)
 INNOVATION_VALUE, INNOVATION_SIGMA, INNOVATION_NIS, INNOVATION_ERROR = slice(0, 6), slice(6, 12), 12, slice(13, 16)
 GNSS_POSITION = slice(0, 3)
 
@@ -72,9 +75,9 @@ class Device:
         return ("imu", "") in self.latest or any(topic == "nav" for topic, _ in self.latest)
 
     def estimators(self, topic: str) -> list[str]:
-        """Names of the estimators heard on a topic; the one with corrections first, because it is the main one."""
+        """Names of the estimators heard on a topic; the leading one first."""
         names = [estimator for name, estimator in self.latest if name == topic]
-        return sorted(names, key=lambda name: ("ekf" not in name, name))
+        return sorted(names, key=lambda name: (name not in LEADERS, name))
 
     def get(self, topic: str, estimator: str = "") -> Latest | None:
         """Newest message of a topic."""
@@ -240,7 +243,8 @@ def _rate(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.RateE
     nis = m.nis if m.nis_dof else np.nan
     row = _three(m.omega_ib_b_radps) + _sigmas(m.omega_covariance) + _three(m.f_b_mps2) + [m.angle_z_rad, nis]
     row += _three(m.p_n_m) + _six(m.innovation) + _six(m.innovation_sigma) + [m.nis_dof]
-    _ring(device, topic, estimator, 27).append(t, row)
+    row += _three(m.sight) + _three(m.bound_sigma_radps)
+    _ring(device, topic, estimator, 33).append(t, row)
 
 
 def _nav(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.NavSolution) -> None:
@@ -250,7 +254,11 @@ def _nav(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.NavSol
     w, x, y, z = m.q_nb if len(m.q_nb) == 4 else (1.0, 0.0, 0.0, 0.0)
     yaw = float(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
     row = list(m.p_ned_m) + _three(m.v_n_mps) + _sigmas(m.position_covariance) + [yaw]
-    _ring(device, topic, estimator, 10, rate=50.0).append(t, row)
+    if m.HasField("horizon"):
+        row.append(m.horizon.n)
+        if len(m.horizon.inputs) == 2 and len(m.horizon.membership) == 6:  # fuzzy
+            row += [m.horizon.crisp, *m.horizon.inputs, *m.horizon.membership]
+    _ring(device, topic, estimator, 20, rate=50.0).append(t, row)
     device.tracks.setdefault(f"nav/{estimator}", Track(spacing=0.3)).add(m.p_ned_m)
 
 

@@ -1,7 +1,8 @@
 """All navigation filters of one six-axis board, side by side on the same samples and fixes."""
 
 import logging
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from estimator.stream import Stream, every, worth_a_line
 log = logging.getLogger(__name__)
 
 Array = NDArray[np.float64]
+
+LONGEST_MUTE = 600.0  # s
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,8 @@ class NavBoard:
         self.navigators: dict[str, Any] = {}
         self._config, self._names = config, names  # no closures: a process that goes on after a crash pickles this
         self._limit = limit_hz
+        self._newest = -math.inf  # s, time of the newest sample
+        self._muted_until = -math.inf
 
     def feed(
         self, epoch: int, first_index: int, period_s: float, t_s: Array, f_b: Array, omega_b: Array
@@ -50,6 +55,7 @@ class NavBoard:
             log.warning("%s: %d samples missing before %d (gap %d)", self.device, admission.missing, first_index,
                         self.stream.gaps)  # fmt: skip
         step = every(period_s, self._limit)
+        self._newest = float(t_s[-1])
         out = []
         for row in range(len(t_s)):
             index = first_index + row
@@ -64,5 +70,21 @@ class NavBoard:
 
     def fix(self, fix: Fix) -> None:
         """Hand a fix to every filter; one that comes before the first sample has nothing to correct."""
+        if self.muted(fix.t):
+            fix = replace(fix, withheld=True, muted=True)
         for navigator in self.navigators.values():
             navigator.fix(fix)
+
+    def muted(self, t: float) -> bool:
+        """Whether fixes of time t, s, are held back."""
+        return t < self._muted_until
+
+    def mute(self, seconds: float) -> str:
+        """Hold the fixes of the next seconds back, to see how the filters do without; 0 ends it. Says what was done.
+
+        The filters are still scored on them. Raises ValueError for a length that makes no sense.
+        """
+        if not 0.0 <= seconds <= LONGEST_MUTE:
+            raise ValueError(f"mute GNSS for {seconds:g} s: want 0 to {LONGEST_MUTE:g} s")
+        self._muted_until = self._newest + seconds if seconds else -math.inf
+        return f"GNSS of {self.device} muted for {seconds:g} s" if seconds else f"GNSS of {self.device} is used again"

@@ -23,7 +23,7 @@ PSI, DV, DP, B, D = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(1
 class ImuNoise:
     """Noise of a consumer IMU in a moving car, vibration included."""
 
-    accel: float = 0.1  # m/s^2/sqrt(Hz)
+    accel: float = 0.05  # m/s^2/sqrt(Hz)
     gyro: float = math.radians(0.1)  # rad/s/sqrt(Hz)
     sigma_bias_accel: float = 0.03  # m/s^2, Gauss-Markov
     sigma_bias_gyro: float = math.radians(0.05)  # rad/s, Gauss-Markov

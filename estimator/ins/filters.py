@@ -27,8 +27,8 @@ class Constraints:
     car: bool = False  # wheels do not slide sideways and do not leave the ground
     standstill: bool = False  # zero velocity and zero rate while it stands
     every: float = 0.5  # s
-    sigma_side: float = 0.3  # m/s, correlated in time: so more than a single look would show
-    sigma_up: float = 0.3  # m/s
+    sigma_side: float = 0.2  # m/s, correlated in time: so more than a single look would show
+    sigma_up: float = 0.2  # m/s
     least_speed: float = 2.0  # m/s
     most_turn: float = 0.7  # rad/s
     still_v: float = 0.05  # m/s

@@ -46,6 +46,7 @@ class Fix:
     v_n: Array | None = None  # (3,) m/s
     sigma_v: Array | None = None  # (3,) m/s, with v_n
     withheld: bool = False  # only to score the filter with
+    muted: bool = False  # withheld, because an operator asked for an outage
     key: int = 0  # whatever the caller needs to know it by
     yaw: float | None = None  # rad, heading by two antennas
     sigma_yaw: float = 0.01  # rad, with yaw

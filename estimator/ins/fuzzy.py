@@ -78,6 +78,14 @@ def membership(value: float, points: Array, out: Array) -> None:
     out[0], out[1], out[2] = s, 1.0 - s - h, h
 
 
+def memberships(force: float, rate: float, rules: FuzzyRules = FuzzyRules()) -> list[float]:
+    """Six numbers in the order of MEMBERSHIPS, for |f| in m/s^2 and |w| in rad/s."""
+    out = np.empty(6)
+    membership(force, np.array(rules.force), out[:3])
+    membership(rate, np.array(rules.rate), out[3:])
+    return out.tolist()
+
+
 @njit(cache=True)
 def horizon(force: float, rate: float, rules: Array) -> float:
     """1 + No, not yet rounded, from |f| in m/s^2 and |w| in rad/s; rules as FuzzyRules.vector (E-49)."""

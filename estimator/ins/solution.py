@@ -74,7 +74,7 @@ def correction_of(fix: Fix, row: Array) -> Correction:
     if status == est.REJECTED:
         reason, weight = f"NIS {row[est.O_NIS]:.0f} of {m}", 0.0
     elif status == est.WITHHELD:
-        reason, weight = WITHHELD, 0.0
+        reason, weight = MUTED if fix.muted else WITHHELD, 0.0
     elif weight < 1.0:
         reason = f"weighted down to {weight:.2f}"
     horizon = None

@@ -9,10 +9,13 @@ from dashboard.scene.panels.calibration import Calibration
 from dashboard.scene.panels.devices import Devices
 from dashboard.scene.panels.errors import Errors
 from dashboard.scene.panels.health import Health
+from dashboard.scene.panels.horizon import Horizon
 from dashboard.scene.panels.innovations import Innovations
 from dashboard.scene.panels.layout import LayoutBench
 from dashboard.scene.panels.link import Link
+from dashboard.scene.panels.navigation import Navigation
 from dashboard.scene.panels.position import Position
+from dashboard.scene.panels.race import Race
 from dashboard.scene.panels.rates import Rates
 from dashboard.scene.panels.record import Record
 from dashboard.scene.panels.tilt import Tilt
@@ -24,6 +27,8 @@ PAGES: tuple[type[Panel], ...] = (
     Acceleration,
     Angle,
     Position,
+    Navigation,
+    Horizon,
     Errors,
     Innovations,
     Link,
@@ -32,6 +37,7 @@ PAGES: tuple[type[Panel], ...] = (
     LayoutBench,
     Calibration,
     Tilt,
+    Race,
 )
 
 __all__ = ["PAGES", "Devices", "Panel", "Position", "Record", "Snapshot", "Timeline"]

@@ -1,0 +1,125 @@
+"""Navigation filters against each other: the map, the race on unseen fixes, and the button that takes GNSS away."""
+
+import logging
+
+import numpy as np
+import viser
+
+from dashboard.scene.map import map_svg
+from dashboard.scene.palette import estimator_colour, estimator_title, number, rows
+from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve
+from dashboard.scene.store import (
+    GNSS_POSITION,
+    INNOVATION_ERROR,
+    INNOVATION_NIS,
+    INNOVATION_VALUE,
+    NAV_POSITION,
+    NAV_SIGMA_POSITION,
+)
+from messages import gyrofree_pb2 as pb
+
+log = logging.getLogger(__name__)
+
+OUTAGE_S = 30.0
+
+
+class Navigation(Panel):
+    """Whoever is closest to the fixes that nobody saw leads the table."""
+
+    title = "Map"
+    _top = None
+
+    def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
+        super().__init__(client, folder)
+        self._device, self._muted = "", False
+        with folder:
+            self._button = client.gui.add_button(
+                f"GNSS outage, {OUTAGE_S:.0f} s", icon=viser.Icon.SATELLITE_OFF, color="gray", order=2.0, visible=False,
+                hint="Hold the fixes back from all filters, and see what they do without",
+            )  # fmt: skip
+        self._button.on_click(lambda _: self._order())
+
+    @property
+    def uuids(self) -> frozenset[str]:
+        """The button: a viewer may not press it."""
+        return frozenset([self._button._impl.uuid])
+
+    def update(self, s: Snapshot) -> None:
+        self._device = s.device.name
+        names = s.device.estimators("nav")
+        if not names:
+            note = '<p class="gf-note">No navigation yet: it needs a six-axis board and a GNSS receiver.</p>'
+            self._top = self.html(note, self._top)
+            return
+        messages = {name: s.device.get("nav", name).message for name in names}
+        self._muted = any(m.gnss_muted for m in messages.values())
+        label = "End the outage" if self._muted else f"GNSS outage, {OUTAGE_S:.0f} s"
+        if self._button.label != label:
+            self._button.label = label
+        if not self._button.visible:
+            self._button.visible = True
+        self._top = self.html(self._map(s, names) + self._race(s, names), self._top)
+        curves = []
+        for name in names:
+            t, r = s.rows("nav", name)
+            half = 3 * r[:, NAV_SIGMA_POSITION][:, 2] if name == names[0] else None
+            curves.append(estimator_curve(s, "nav", name, t, -r[:, NAV_POSITION][:, 2], half))
+        self.show("height", "Height above the origin", "m", curves, s, height=170, digits=2)
+        curves = []
+        for name in names:
+            t, r = s.rows("innovation", name)
+            error = np.hypot(r[:, INNOVATION_ERROR][:, 0], r[:, INNOVATION_ERROR][:, 1])
+            unseen = np.isfinite(error)
+            if unseen.any():
+                curves.append(estimator_curve(s, "innovation", name, t[unseen], error[unseen]))
+        if curves:
+            self.show("error", "Horizontal error on fixes held back", "m", curves, s, height=170, digits=2)
+
+    def _map(self, s: Snapshot, names: list[str]) -> str:
+        ways = []
+        for name in names:
+            _, r = s.rows("nav", name)
+            ways.append((estimator_title(name), estimator_colour(name, names), r[:, NAV_POSITION]))
+        _, fixes = s.rows("gnss")
+        track = s.device.tracks.get("rejected")
+        pieces = [np.asarray(piece) for piece in track.pieces if len(piece)] if track else []
+        rejected = np.concatenate(pieces)[:, :3] if pieces else np.empty((0, 3))
+        _, lead = s.rows("nav", names[0])
+        sigma = tuple(lead[-1, NAV_SIGMA_POSITION][:2]) if len(lead) else None
+        drawn = map_svg(ways, fixes[:, GNSS_POSITION], rejected, sigma, s.dark)
+        alarm = '<p class="gf-alert">GNSS is muted: the filters go on without fixes.</p>' if self._muted else ""
+        m = s.device.get("nav", names[0]).message
+        waits = f'<p class="gf-note">{m.alignment}</p>' if m.mode != pb.NavSolution.MODE_NAVIGATING else ""
+        return alarm + waits + drawn
+
+    def _race(self, s: Snapshot, names: list[str]) -> str:
+        """Three metrics, which are not the same: see docs/navigation.md."""
+        found = []
+        for name in names:
+            t, r = s.rows("innovation", name)
+            error, value = r[:, INNOVATION_ERROR][:, :2], r[:, INNOVATION_VALUE][:, :2]
+            unseen = np.isfinite(error[:, 0])
+            fed = ~unseen & np.isfinite(value[:, 0])
+            found.append((_rms(error[unseen]), _rms(value[fed]), name, r[fed, INNOVATION_NIS]))
+        items = []
+        for error, ahead, name, nis in sorted(found, key=lambda f: (np.nan_to_num(f[0], nan=1e9), f[2])):
+            dot = f'<span style="color:{estimator_colour(name, names)}">●</span> {estimator_title(name)}'
+            honest = number(float(np.mean(nis)), 1) if len(nis) else "–"
+            items.append((dot, f"{number(error, 3)} · {number(ahead, 3)} m · NIS {honest}"))
+        return rows([("<b>race</b>, horizontal RMS", "unseen fixes · prediction"), *items])
+
+    def _order(self) -> None:
+        seconds = 0.0 if self._muted else OUTAGE_S
+        command = pb.EstimatorCommand(action=pb.EstimatorCommand.ACTION_MUTE_GNSS, device=self._device, seconds=seconds)
+        try:
+            reply = self.feed.estimator(command)
+            text, good = reply.message, reply.ok
+        except Exception as error:  # shown to the person who pressed the button
+            log.warning("outage: %s", error)
+            text, good = str(error), False
+        title = "GNSS outage" if good else "The estimator did not do it"
+        self.client.add_notification(title, text, color="teal" if good else "red", auto_close_seconds=8.0)
+
+
+def _rms(rows: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.sum(rows**2, axis=1)))) if len(rows) else float("nan")
