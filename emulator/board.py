@@ -183,6 +183,8 @@ class Board:
         follow()
 
     def _pulse(self, pulse: tuple[float, int]) -> None:
+        if not pulse[1]:
+            return
         pins = self.gpio.inputs[2] & ~DIRECTION_PIN
         self.gpio.inputs[2] = pins | (DIRECTION_PIN if pulse[1] > 0 else 0)
         self.timer2.edge(TACHO, True)

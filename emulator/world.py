@@ -21,7 +21,7 @@ class World:
     """Everything the board can sense. All functions must give the same answers in every run."""
 
     counts: Callable[[int, Array], Array] = still  # sensor, times (n,) s -> (n, 3), not rounded, 3.9 mg each
-    pulses: Callable[[], Iterator[tuple[float, int]]] = lambda: iter(())  # (time s, direction +1 or -1), endless or not
+    pulses: Callable[[], Iterator[tuple[float, int]]] = lambda: iter(())  # (time s, direction +1 or -1; 0: none now)
     pps: Callable[[], Iterator[float]] = lambda: iter(())  # times, s
     gnss: Callable[[], Iterator[tuple[float, bytes]]] = lambda: iter(())  # (time s of the first bit, bytes)
     analog: Callable[[int, float], float] = lambda channel, t_s: 1.65  # volts at the converter

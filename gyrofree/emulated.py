@@ -65,6 +65,7 @@ def table_world(test: TableTest, seed: int, clock_error: float = 0.0) -> World:
         for second in itertools.count():
             for pulse in test.pulses(float(second), second + 1.0):
                 yield pulse.t_s, pulse.direction
+            yield second + 1.0, 0  # a table at rest must not be asked for ever
 
     def gnss() -> Iterator[tuple[float, bytes]]:
         sky = np.random.default_rng([seed, 5])
