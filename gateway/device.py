@@ -148,7 +148,8 @@ class DeviceLink:
         by_pulses = self.pps.span_s >= PPS_ENOUGH_S
         skew = self.pps.skew_ppm if by_pulses else self.clock.skew_ppm
         window = SKEW_WINDOW_S if by_pulses else self.clock.span_s
-        self.faults.line(connected, skew, window, now_ns * 1e-9, now_ns + self.wall_offset_ns)
+        doubt = 0.0 if by_pulses else 0.5e6 * self.clock.residual_s / max(window, 1.0)  # half the scatter, end to end
+        self.faults.line(connected, skew, doubt, window, now_ns * 1e-9, now_ns + self.wall_offset_ns)
         if self.faults.news():
             self._publish_board(now_ns, self.clock.device_us(now_ns))
 

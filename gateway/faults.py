@@ -143,13 +143,15 @@ class FaultWatch:
         rate = TOP_RATE_HZ / 2.0 ** (15 - (hello.sensors[k].rate_code & 15))
         return rate * hello.sample_period_ns * 1e-9 > 0.97
 
-    def line(self, connected: bool, skew_ppm: float, window_s: float, now_s: float, utc_ns: int) -> None:
-        """Once a second: what only the line shows."""
+    def line(
+        self, connected: bool, skew_ppm: float, doubt_ppm: float, window_s: float, now_s: float, utc_ns: int
+    ) -> None:
+        """Once a second: what only the line shows. doubt_ppm: by how much the skew may be wrong."""
         silent = self._heard_s is not None and now_s - self._heard_s > SILENT_S
         if connected and silent:
             text = f"the line is open and silent for {now_s - self._heard_s:.1f} s: has the board stopped?"
             self._see("uart-stall", text, now_s, utc_ns, 1.5)
-        if window_s >= SKEW_WINDOW_S and SKEW_PPM < abs(skew_ppm) < CRYSTAL_PPM:
+        if window_s >= SKEW_WINDOW_S and SKEW_PPM + doubt_ppm < abs(skew_ppm) < CRYSTAL_PPM:
             text = f"its clock runs {skew_ppm:+.0f} ppm against the host's: check the crystal (and the host's NTP)"
             self._see("clock-skew", text, now_s, utc_ns, ACTIVE_S)
 
