@@ -35,6 +35,16 @@ class Curve:
     live: bool = True  # its newest value stands in the heading
 
 
+@dataclass
+class Shade:
+    """Times of a chart that a colour lies behind: where on (n,) is true, at t (n,) s."""
+
+    label: str
+    colour: str
+    t: np.ndarray
+    on: np.ndarray
+
+
 class Chart:
     """A chart inside a container of a client's GUI; show() builds it again only when its set of curves changes."""
 
@@ -64,13 +74,15 @@ class Chart:
         primary: int = 0,
         late: Sequence[Sequence[float]] = (),
         marks: Sequence[float] = (),
+        shades: Sequence[Shade] = (),
     ) -> None:
         """Draw the window [t0, t1]; gaps are those of the curve number `primary`.
 
         Stretches [from, until] of `late` get a strip at the bottom: filled in after a loss. Each of `marks` (s) gets a
-        line from top to bottom.
+        line from top to bottom. A shade lies behind the times it names.
         """
-        heading = self._heading_html(curves)
+        shades = [shade for shade in shades if len(shade.t)]
+        heading = self._heading_html(curves, shades)
         if self._heading.content != heading:
             self._heading.content = heading
         curves = [curve for curve in curves if len(curve.t)]
@@ -78,13 +90,17 @@ class Chart:
             if self._plot is not None and self._plot.visible:
                 self._plot.visible = False
             return
-        data = _data(curves, t0, t1, min(primary, len(curves) - 1), late, marks)
-        signature = (dark, *((c.label, c.colour, c.half is not None, c.dash, c.width) for c in curves))
+        data = _data(curves, t0, t1, min(primary, len(curves) - 1), late, marks, shades)
+        signature = (
+            dark,
+            *(s.label for s in shades),
+            *((c.label, c.colour, c.half is not None, c.dash, c.width) for c in curves),
+        )
         if self._plot is None:
-            self._build(curves, data, dark)
+            self._build(curves, data, dark, shades)
         elif signature != self._signature:
             # Changed in place: a browser that is behind would complain of an update of a chart already removed.
-            self._plot.series, self._plot.bands = _lines(curves, dark)
+            self._plot.series, self._plot.bands = _lines(curves, dark, shades)
             self._plot.data = data
         else:
             self._plot.data = data
@@ -92,7 +108,7 @@ class Chart:
         if not self._plot.visible:
             self._plot.visible = True
 
-    def _heading_html(self, curves: Sequence[Curve]) -> str:
+    def _heading_html(self, curves: Sequence[Curve], shades: Sequence[Shade] = ()) -> str:
         items = []
         for curve in curves:
             if not curve.label:
@@ -105,14 +121,20 @@ class Chart:
                 f'<span class="gf-item{stale}"><i class="{mark}" style="border-color:{curve.colour}"></i>'
                 f"{curve.label} <b>{value}</b></span>"
             )
+        for shade in shades:
+            if shade.on.any():
+                items.append(f'<span class="gf-item"><i class="gf-line" style="border-color:{shade.colour};'
+                             f'border-width:8px"></i>{shade.label}</span>')  # fmt: skip
         empty = "" if items else '<span class="gf-item gf-stale">no data yet</span>'
         return (
             f'<div class="gf-chart"><span class="gf-title">{self._title} <em>{self._unit}</em></span>'
             f'<span class="gf-legend">{"".join(items)}{empty}</span></div>'
         )
 
-    def _build(self, curves: Sequence[Curve], data: tuple[np.ndarray, ...], dark: bool) -> None:
-        lines, bands = _lines(curves, dark)
+    def _build(
+        self, curves: Sequence[Curve], data: tuple[np.ndarray, ...], dark: bool, shades: Sequence[Shade] = ()
+    ) -> None:
+        lines, bands = _lines(curves, dark, shades)
         with self._folder:
             self._plot = self._client.gui.add_uplot(
                 data,
@@ -127,7 +149,9 @@ class Chart:
             )
 
 
-def _lines(curves: Sequence[Curve], dark: bool) -> tuple[tuple[dict, ...], tuple[dict, ...] | None]:
+def _lines(
+    curves: Sequence[Curve], dark: bool, shades: Sequence[Shade] = ()
+) -> tuple[tuple[dict, ...], tuple[dict, ...] | None]:
     """uPlot's description of the series that _data gives, and of the bands between them."""
     lines: list[dict] = [{"label": "t"}]
     bands: list[dict] = []
@@ -138,6 +162,9 @@ def _lines(curves: Sequence[Curve], dark: bool) -> tuple[tuple[dict, ...], tuple
             bands.append({"series": (len(lines), len(lines) + 1), "fill": rgba(curve.colour, 0.20)})
             edge = {"stroke": rgba(curve.colour, 0.35), "width": 0.7, "points": {"show": False}}
             lines += [edge | {"label": f"{curve.label} +3σ"}, edge | {"label": f"{curve.label} −3σ"}]
+    for shade in shades:
+        fill = {"scale": "gap", "stroke": shade.colour, "width": 0, "fill": rgba(shade.colour, 0.25), "fillTo": 0}
+        lines.append(fill | {"label": shade.label, "points": {"show": False}})
     grey = "#3b3b3b" if dark else "#d5d5d5"
     gap = {"label": "gap", "scale": "gap", "stroke": grey, "width": 0, "fill": grey, "fillTo": 0}
     strip = gap | {"label": "filled in", "stroke": REPAIRED, "fill": REPAIRED}
@@ -153,6 +180,7 @@ def _data(
     primary: int,
     late: Sequence[Sequence[float]] = (),
     marks: Sequence[float] = (),
+    shades: Sequence[Shade] = (),
 ) -> tuple[np.ndarray, ...]:
     """The arrays of a chart: time, each curve with the edges of its band, and the gap mask; all of one length."""
     edges, x = series.grid(t0, t1)
@@ -170,6 +198,9 @@ def _data(
                 np.clip(centre + half, low - reach, high + reach),
                 np.clip(centre - half, low - reach, high + reach),
             ]
+    for shade in shades:  # the nearest sample's word, 0 or 1
+        on = np.clip(np.searchsorted(shade.t, x), 0, len(shade.t) - 1)
+        out.append(shade.on[on].astype(float))
     out.append(LATE_HEIGHT * series.stretch_mask(late, edges))
     out.append(series.moment_mask(marks, edges))
     t = curves[primary].t

@@ -1,6 +1,7 @@
 """All gyro-free rate estimators of one accelerometer board, side by side on the same samples."""
 
 import logging
+import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,6 +49,8 @@ class RateBoard:
         self.stream = Stream()
         self.last: dict[str, Any] = {}  # newest RateState by estimator
         self._make = {name: ESTIMATORS[name] for name in names}
+        self.cost_ns = dict.fromkeys(names, 0)  # spent in each estimator, and for how many samples
+        self.cost_samples = dict.fromkeys(names, 0)
         self._limit = rate_limit_hz
         self._estimators: dict[str, Any] = {}
         self._last_t: float | None = None
@@ -102,10 +105,19 @@ class RateBoard:
             self.health.step(float(t_s[row]), f_axis[row], stale)
             self._exclude(self.health.mask)
             for name, estimator in self._estimators.items():
+                began = time.perf_counter_ns()  # told by EstimatorStatus, touches no estimate
                 state = self.last[name] = estimator.step(index, float(t_s[row]), f_axis[row])
+                self.cost_ns[name] += time.perf_counter_ns() - began
+                self.cost_samples[name] += 1
                 if index % step == step - 1:
                     out.append(RateOutput(row, index, name, state))
         return out
+
+    def cost_us(self, name: str) -> float:
+        """Time of one sample in this estimator, us, since it was last asked for."""
+        cost = self.cost_ns[name] / max(1, self.cost_samples[name]) / 1000.0
+        self.cost_ns[name] = self.cost_samples[name] = 0
+        return cost
 
     def _exclude(self, mask: int) -> None:
         """Tell the estimators when the axes they may use have changed; one that cannot do without says so itself."""

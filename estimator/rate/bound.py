@@ -91,7 +91,10 @@ def _prior(s: Sensor, q_nb: Array, what: Knowledge) -> Array:
     return P
 
 
-def _moved(P: Array, x: Array, alpha: Array, SQ: Array, s: Sensor, dt: float, still: bool, what: Knowledge) -> Array:
+def _moved(
+    P: Array, x: Array, alpha: Array, SQ: Array, s: Sensor, dt: float, still: bool, what: Knowledge, n: int = 1
+) -> Array:
+    """P after n samples, dt s in all."""
     turning, omega = not still, x[model.OMEGA]
     y = model.transition(x, alpha, SQ, dt, turning)
     F = model.transition_jacobian(x, y, SQ, dt, turning)
@@ -103,7 +106,7 @@ def _moved(P: Array, x: Array, alpha: Array, SQ: Array, s: Sensor, dt: float, st
         F[0:3, 3:6] = -dt * N
     P = F @ P @ F.T
     if turning:
-        P[0:3, 0:3] += dt * dt * N @ s.R_alpha @ N.T + what.axis_wander**2 * dt * (np.eye(3) - N)
+        P[0:3, 0:3] += dt * dt / n * N @ s.R_alpha @ N.T + what.axis_wander**2 * dt * (np.eye(3) - N)
     return P
 
 
@@ -118,6 +121,39 @@ def _up(q_nb: Array) -> Array:
     w, x, y, z = q_nb
     down = np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
     return -GRAVITY * down
+
+
+class Along:
+    """The bound along an estimate instead of the truth, live: one step for EVERY samples (E-48)."""
+
+    EVERY = 8  # samples
+
+    def __init__(self, layout: Layout, what: Knowledge = IN_USE) -> None:
+        """Raises GeometryError for a layout that does not see omega' and p."""
+        self.sensor, self.what = sensor(layout, what.sigma_axis), what
+        self.sigma: Array | None = None  # rad/s, (3,); None before the first standstill
+        self._P = np.zeros((model.STATES, model.STATES))
+        self._count = 0
+
+    def step(self, omega_b: Array, alpha_b: Array, q_nb: Array, still: bool, dt: float) -> None:
+        """One sample of the estimate: rate, angular acceleration, attitude, the still detector's word."""
+        self._count += 1
+        if self._count % self.EVERY or (self.sigma is None and not still):
+            return
+        s, n, what = self.sensor, self.EVERY, self.what
+        if self.sigma is None:
+            self._P = _prior(s, q_nb, what)
+        x = np.zeros(model.STATES)
+        x[model.OMEGA], x[model.U] = omega_b, _up(q_nb)
+        P = _moved(self._P, x, alpha_b, s.SQ, s, n * dt, still, what, n)
+        m = int(s.m)
+        if m:
+            P = _seen(P, model.measured_products_jacobian(x, s.M)[:m], s.R_c[:m, :m] / n)
+        R = s.R_p + (what.centre**2 if not still else 0.0) * np.eye(3)
+        P = _seen(P, model.measured_force_jacobian(x, alpha_b, s.SQ), R / n)
+        if still:
+            P = _seen(P, np.eye(6, model.STATES), np.diag([1e-10] * 3 + list(np.diag(s.R_alpha) / n)))
+        self._P, self.sigma = P, np.sqrt(np.diag(P)[:3])
 
 
 def rms(sigma: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.layouts.layout import Layout
-from estimator.rate import least_squares, products_ekf, products_kernel, sight
+from estimator.rate import bound, least_squares, products_ekf, products_kernel, sight
 from estimator.rate import products_run as frame
 from estimator.rate.field import checked
 
@@ -151,6 +151,7 @@ class ProductsRate:
 
     name = "products-ekf"
     method = "ekf"
+    with_bound = True  # follow the Cramer-Rao bound along the estimate, by step()
 
     def __init__(
         self, layout: Layout, config: products_ekf.Config = products_ekf.Config(), calibration: str = ""
@@ -159,6 +160,7 @@ class ProductsRate:
         self.core = products_ekf.ProductsFilter(layout, config, self.method)
         self.calibration = calibration
         self._clock = _Clock()
+        self._bound = bound.Along(layout) if self.with_bound else None
         self._unseen = config.unseen_rate**2 * np.eye(3)
 
     def step(self, index: int, t_s: float, f_axis: Array) -> RateState:
@@ -193,6 +195,9 @@ class ProductsRate:
         core, track = self.core, self.core.now
         x = core.memory["core"]
         started, still = bool(track.started[0]), bool(track.still[0])
+        if self._bound is not None and started:
+            dt = float(core.memory["clock"][frame.DT])
+            self._bound.step(track.omega_b[0], track.alpha_b[0], track.q_nb[0], still, dt)
         m = int(core.sensor["m"])
         P = track.P[0] + self._unseen if still and started else track.P[0].copy()
         sights, reason = (sight.BLIND,) * 3, "no standstill yet: keep still"
@@ -222,6 +227,7 @@ class ProductsRate:
             sight_reason=reason,
             excluded=core.excluded,
             calibration=self.calibration,
+            bound_sigma=None if self._bound is None else self._bound.sigma,
         )
 
 
@@ -230,6 +236,7 @@ class UnscentedRate(ProductsRate):
 
     name = "products-ukf"
     method = "ukf"
+    with_bound = False
 
 
 class RecursiveLeastSquaresRate(ProductsRate):
@@ -237,6 +244,7 @@ class RecursiveLeastSquaresRate(ProductsRate):
 
     name = "products-rls"
     method = "forget"
+    with_bound = False
 
 
 class MovingHorizonRate(ProductsRate):
@@ -244,6 +252,7 @@ class MovingHorizonRate(ProductsRate):
 
     name = "products-mhe"
     method = "horizon"
+    with_bound = False
 
 
 ESTIMATORS: dict[str, Any] = {

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from dashboard.scene.chart import Chart, Curve
+from dashboard.scene.chart import Chart, Curve, Shade
 from dashboard.scene.palette import estimator_colour, estimator_title
 from dashboard.scene.store import Device, Store
 
@@ -53,10 +53,17 @@ class Panel:
             self._charts[key] = Chart(self.client, self.folder, self._order, title, unit, height, digits)
         return self._charts[key]
 
-    def show(self, key: str, title: str, unit: str, curves: Sequence[Curve], s: Snapshot, **options) -> None:
+    def show(self, key: str, title: str, unit: str, curves: Sequence[Curve], s: Snapshot,
+             shades: Sequence[Shade] = (), **options) -> None:  # fmt: skip
         """Draw a chart for the window of the snapshot."""
         self.chart(key, title, unit, **options).show(
-            curves, s.t0, s.t1, s.dark, late=s.device.late, marks=[at for at, _ in s.device.marks]
+            curves,
+            s.t0,
+            s.t1,
+            s.dark,
+            late=s.device.late,
+            marks=[at for at, _ in s.device.marks],
+            shades=shades,
         )
 
     def html(self, content: str, handle: viser.GuiHtmlHandle | None) -> viser.GuiHtmlHandle:

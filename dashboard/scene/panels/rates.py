@@ -1,15 +1,19 @@
 """Angular rate: every estimator with its 3-sigma band over the tachometer; a vehicle's gyroscope."""
 
-from dashboard.scene.chart import Curve
-from dashboard.scene.palette import AXES, REFERENCE, truth_colour
+import numpy as np
+
+from dashboard.scene.chart import Curve, Shade
+from dashboard.scene.palette import AXES, GREY, REFERENCE, VERMILLION, YELLOW, escape, truth_colour
 from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
-from dashboard.scene.store import RATE_OMEGA, RATE_SIGMA, TRUTH_OMEGA
+from dashboard.scene.store import RATE_BOUND, RATE_OMEGA, RATE_SIGHT, RATE_SIGMA, TRUTH_OMEGA
+from messages import gyrofree_pb2 as pb
 
 
 class Rates(Panel):
     """omega_z with the tachometer first, because it is what the table turns about; then omega_x and omega_y."""
 
     title = "Rates"
+    _note = None
 
     def update(self, s: Snapshot) -> None:
         if s.device.is_vehicle:
@@ -20,6 +24,7 @@ class Rates(Panel):
             ]
             self.show("imu", "Measured rate, body", "°/s", curves, s, height=230)
             return
+        self._say_why(s)
         for k, axis in ((2, "z"), (0, "x"), (1, "y")):
             curves = self._estimates(s, k)
             if k == 2 and s.device.get("tacho"):
@@ -31,7 +36,15 @@ class Rates(Panel):
                 t, rows = s.rows("truth")
                 line = Curve("truth", truth_colour(s.dark), t, rows[:, TRUTH_OMEGA][:, k] * DEG, width=1.0)
                 curves.append(line)
-            self.show(f"omega{axis}", f"ω<sub>{axis}</sub> with 3σ", "°/s", curves, s, height=215 if k == 2 else 150)
+            self.show(f"omega{axis}", f"ω<sub>{axis}</sub> with 3σ", "°/s", curves, s, height=215 if k == 2 else 150,
+                      shades=_sight(s, k))  # fmt: skip
+
+    def _say_why(self, s: Snapshot) -> None:
+        """The best filter's reason where it does not vouch for a component."""
+        first = _best(s)
+        latest = s.device.get("rate", first) if first else None
+        reason = latest.message.sight_reason if latest else ""
+        self._note = self.html(f'<p class="gf-note">{escape(reason)}</p>' if reason else "", self._note)
 
     @staticmethod
     def _estimates(s: Snapshot, k: int) -> list[Curve]:
@@ -40,4 +53,42 @@ class Rates(Panel):
             t, rows = s.rows("rate", name)
             sigma = rows[:, RATE_SIGMA][:, k] * DEG
             curves.append(estimator_curve(s, "rate", name, t, rows[:, RATE_OMEGA][:, k] * DEG, 3 * sigma))
+        curves += _bound(s, k)
         return curves
+
+
+def _best(s: Snapshot) -> str:
+    """The estimator whose sight and bound are shown: the one that has a bound, else the first."""
+    names = list(s.device.estimators("rate"))
+    with_bound = [name for name in names if len(s.device.get("rate", name).message.bound_sigma_radps)]
+    return (with_bound or names or [""])[0]
+
+
+def _sight(s: Snapshot, k: int) -> list[Shade]:
+    """Where a component is ambiguous or blind (docs/estimators.md)."""
+    name = _best(s)
+    if not name:
+        return []
+    t, rows = s.rows("rate", name)
+    words = rows[:, RATE_SIGHT][:, k] if len(t) else rows[:, :0].sum(axis=1)
+    return [
+        Shade("ambiguous", YELLOW, t, words == pb.RateEstimate.SIGHT_AMBIGUOUS),
+        Shade("blind", VERMILLION, t, words == pb.RateEstimate.SIGHT_BLIND),
+    ]
+
+
+def _bound(s: Snapshot, k: int) -> list[Curve]:
+    """The Cramer-Rao bound, 3 sigma about the estimate."""
+    name = _best(s)
+    if not name:
+        return []
+    t, rows = s.rows("rate", name)
+    bound = 3 * rows[:, RATE_BOUND][:, k] * DEG if len(t) else np.empty(0)
+    known = np.isfinite(bound)
+    if not known.any():
+        return []
+    t, bound, omega = t[known], bound[known], rows[known][:, RATE_OMEGA][:, k] * DEG
+    return [
+        Curve("3σ bound", GREY, t, omega + bound, dash=True, width=1.0, live=False),
+        Curve("", GREY, t, omega - bound, dash=True, width=1.0, live=False),
+    ]
