@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.attitude.rotation import from_rotation_vector, level, multiply
 from estimator.calibration.card import Card, read_card
 from estimator.layouts.catalogue import find
 from estimator.layouts.layout import GeometryError, Layout
@@ -22,6 +23,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
 SURE = 5.0  # rad/s; an estimate less certain than that says "I do not know yet" and has no NEES
+AT_REST = 2e-3  # rad/s; a truth below it stands for rest
 WARM_SAMPLES = 800  # run on a throw-away estimator, into the first turn, so that no compiler is timed
 SHOW_GAPS = 20
 
@@ -70,7 +72,8 @@ def run_cube(
     used = read_card(card) if card is not None else None
     tracks, notes = run_log(data, shape, used, estimators, progress)
     truth = reference(data)
-    bound = _bound(data, shape, truth)
+    progress(0.95, "bound")
+    bound = _bound(data, used.layout(shape) if used is not None else shape, truth)
     known = [name for name in estimators or ESTIMATORS]
     default = EstimatorSettings().rate[0]
     result = {
@@ -196,7 +199,33 @@ def _known(value: float) -> float | None:
 
 
 def _bound(data: CubeLog, shape: Layout, truth: Reference) -> Array | None:
-    return None
+    """RMS of the posterior Cramer-Rao bound (3,), rad/s, along the true motion; None where that is not known."""
+    if not np.isfinite(truth.omega_b).all():
+        return None
+    try:
+        from estimator.rate.bound import IN_USE, rate_bound  # here: it compiles
+    except ImportError:
+        return None
+    omega = np.where(np.abs(truth.omega_b) < AT_REST, 0.0, truth.omega_b)
+    alpha = np.gradient(omega, data.t_s, axis=0)
+    alpha[(omega == 0.0).all(axis=1)] = 0.0  # the difference across the first sample of a turn is not the table's
+    q_nb = data.q_nb if data.q_nb is not None else _turned(data, shape, omega)
+    try:
+        sigma = rate_bound(shape, data.t_s, q_nb, omega, alpha, IN_USE)
+    except GeometryError:
+        return None
+    return np.sqrt(np.mean(sigma**2, axis=0))
+
+
+def _turned(data: CubeLog, shape: Layout, omega_b: Array) -> Array:
+    """Attitude (n, 4) of a motion from its rate: levelled on the first tenth of a second, then turned."""
+    n = max(1, round(0.1 / data.period_s))
+    q = np.empty((len(omega_b), 4))
+    q[0] = level(np.linalg.pinv(shape.theta_b) @ data.f_axis[:n].mean(axis=0))
+    for k in range(1, len(q)):
+        mean = 0.5 * (omega_b[k - 1] + omega_b[k])
+        q[k] = multiply(q[k - 1], from_rotation_vector((data.t_s[k] - data.t_s[k - 1]) * mean))
+    return q
 
 
 def _notes(data: CubeLog, truth: Reference, card: Card | None) -> list[str]:
