@@ -83,6 +83,8 @@ class DeviceLink:
         self._tacho_said_us = 0
         self._index: dict[type, Index] = {}
         self._lacking: list[int] = []  # inputs that an analogue board does not send though settings want them
+        self._repeated = 0  # wire's stale mask of the newest frame
+        self._fresh = False  # a value has come from a sensor since boot
         self._last_row: list[float] | None = None  # specific force of the newest sample, as read
         self._joiner: dict[type, Joiner] = {kind: Joiner() for kind in samples.KINDS}
 
@@ -227,7 +229,7 @@ class DeviceLink:
         self.tacho.reset()
         self.gnss.restart()
         self._index, self._last_row = {kind: Index() for kind in samples.KINDS}, None
-        self._tacho_said_us = 0
+        self._tacho_said_us, self._repeated, self._fresh = 0, 0, False
 
     def _take_samples(self, frame: Frame, payload: samples.Samples, received_ns: int) -> None:
         n = len(payload.counts)
@@ -235,9 +237,15 @@ class DeviceLink:
         first, lost = self._index[type(payload)].take(payload.first_index, n)
         if self._put is None:
             return  # nor held back for joining with live ones
+        if isinstance(payload, Acc12) and not self._fresh:
+            self._fresh = bool(payload.sensor_mask & ~payload.stale_mask)
+            if not self._fresh:
+                return  # instants before the sensors' first value: zeros, not samples
         batch = Batch(first, frame.t_us, payload.period_ns, n, lost, frame.seq, received_ns, frame.flags)
         if isinstance(payload, Acc12):
-            batch.stale_mask = convert.stale_axes(payload.stale_mask, payload.sensor_mask)
+            # One repeated value is the beat of two clocks of one nominal rate; two frames of them are a slow sensor.
+            batch.stale_mask = convert.stale_axes(payload.stale_mask & self._repeated, payload.sensor_mask)
+            self._repeated = payload.stale_mask
             batch.columns = self._accel_columns(payload, lost)
         elif isinstance(payload, Imu6):
             batch.columns = convert.imu_si(payload)
