@@ -78,6 +78,7 @@ static gf_pulses_t no_pulses;
 static volatile uint32_t rounds;
 static volatile uint32_t sending;
 static uint64_t asleep;
+static uint32_t reboot_wanted;
 
 static void irq_off(void) { __asm volatile("cpsid i" ::: "memory"); }
 static void irq_on(void) { __asm volatile("cpsie i\n isb" ::: "memory"); }
@@ -156,7 +157,7 @@ static uint32_t none(void *context) {
 
 static void reboot(void *context) {
   (void)context;
-  SCB_AIRCR = 0x05FA0004u;
+  reboot_wanted = 1;
 }
 
 /* The transmitter holds one byte; its interrupt comes when that has left. */
@@ -292,6 +293,9 @@ __attribute__((noreturn)) void reset_handler(void) {
   gf_board_start(&board);
   for (;;) {
     gf_board_step(&board);
+    if (reboot_wanted != 0u && sending == 0u && (UART0->STATE & UART_TX_FULL) == 0u) {
+      SCB_AIRCR = 0x05FA0004u; /* what was written has left */
+    }
     sleep_until_something();
   }
 }
