@@ -7,9 +7,14 @@ from scipy.linalg import null_space
 from estimator.layouts.layout import CUBE, LAYOUTS, products
 from estimator.rate import parity
 from estimator.rate.board import RateBoard
+from estimator.rate.estimators import ESTIMATORS
 from estimator.rate.health import AxisState, HealthMonitor
+from estimator.service import Pipeline
+from estimator.settings import EstimatorSettings
 from estimator.simulation.faults import FaultError, Faults, parse
 from estimator.simulation.table import IDEAL, TableTest
+from messages import gyrofree_pb2 as pb
+from messages.topics import AXES
 
 NAMES = CUBE(0.05).axis_names
 
@@ -180,7 +185,7 @@ def test_the_same_samples_give_the_same_verdicts():
 
 @pytest.mark.parametrize("name", ["chen-6", "nine", "edges-12", "stars-12"])
 def test_other_layouts_are_watched_as_far_as_they_can_be(name):
-    table = TableTest(1, layout=LAYOUTS[name](0.05))
+    table = TableTest(1, profile="still", layout=LAYOUTS[name](0.05))
     monitor, block = HealthMonitor(table.layout), table.block(0)
     readings = block.readings.copy()
     for t, row in zip(block.t_s, readings, strict=True):
@@ -213,11 +218,11 @@ class Told:
         self.masks.append(mask)
 
 
-def test_estimators_are_told_which_axes_to_leave_out():
+def test_estimators_are_told_which_axes_to_leave_out(monkeypatch):
     table = TableTest(1)
     faults = Faults([parse("a21:saturated@6-6.5", NAMES)])
-    board = RateBoard("cube", table.layout, [], 200.0)
-    board._make = {"told": Told}
+    monkeypatch.setitem(ESTIMATORS, "told", Told)
+    board = RateBoard("cube", table.layout, ["told"], 200.0)
     for number in range(2):
         block = faults.into(table.block(number))
         for k in range(0, 1000, 10):
@@ -248,3 +253,19 @@ def test_an_axis_the_board_calls_stale_is_not_used():
 def test_faults_that_cannot_be_are_refused(text, message):
     with pytest.raises(FaultError, match=message):
         parse(text, NAMES)
+
+
+def test_axis_health_is_published_four_times_a_second():
+    pipeline = Pipeline(EstimatorSettings(rate=["least-squares"]))
+    block = Faults([parse("a21:saturated@1", NAMES)]).into(TableTest(1).block(0))
+    said = []
+    for k in range(0, 300, 10):
+        header = pb.Header(device="cube", device_us=k * 10_000, utc_ns=10**18 + k * 10**7)
+        rows = block.readings[k : k + 10]
+        batch = pb.AccelBatch(header=header, first_index=k, period_s=0.01, axes=12, f_mps2=rows.ravel())
+        said += [o.message for o in pipeline.on_accel(batch) if o.topic is AXES]
+    assert 11 <= len(said) <= 13
+    last = said[-1].axes[3]
+    assert last.name == "a21" and last.excluded and last.state == pb.AxisHealth.STATE_SATURATED
+    assert 1.0 <= (last.since_utc_ns - 10**18) * 1e-9 < 1.2
+    assert list(last.position_b_m) == [-0.05, 0.05, 0.05] and not any(a.excluded for a in said[2].axes)
