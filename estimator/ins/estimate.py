@@ -33,6 +33,7 @@ from estimator.ins.window import ARRIVAL_KF, Window, arrival, forward, kf_beside
 
 Array = NDArray[np.float64]
 
+LOW = 0.2  # weight of a fix that a robust filter hardly believes
 USED, REJECTED, WITHHELD, LATE, READMITTED, DOUBTED = range(6)  # what became of a fix; DOUBTED: with less weight
 
 # columns of a row of results; the arrays that they hold follow one another
@@ -64,7 +65,7 @@ class Memory(NamedTuple):
 
     window: Window
     trial: Leg  # where a fix is tried
-    counts: Array  # (2,) int64: refusals in a row, refusals and low weights in a row
+    counts: Array  # (2,) int64: refusals in a row, low weights in a row
     still_f: Array  # (1,) |mean f| at standstill, m/s^2
     scratch: Array  # (3, n, n)
     last: Array  # (n,) the estimate that the last fix used was answered with
@@ -111,11 +112,13 @@ def take(leg: Leg, m: Model, s: Settings, mem: Memory, fix: Array, rate: Array, 
     if s.huber < 1e300 and s.window == 0:
         block_weights(S, y, rows, s.huber, G, u, weight)
     lowest = min(weight[0], weight[1], weight[2])
-    gate = s.gates[rows]
-    if not nis <= gate:
+    # a robust filter that doubts fix after fix is as lost as one that refuses them
+    mem.counts[1] = mem.counts[1] + 1 if lowest < LOW else 0
+    if not nis <= s.gates[rows] or mem.counts[1] >= s.readmit:
         mem.counts[0] += 1
-        if mem.counts[0] < s.readmit:
+        if mem.counts[0] < s.readmit and mem.counts[1] < s.readmit:
             return _answer(leg, P, out, REJECTED)
+        mem.counts[1] = 0
         # the filter is wrong, not the receiver: believe less of it, and nothing of what its horizon holds
         consistent(P, y, H, R, rows, PHt, S, G, u)
         innovate(P, y, H, R, rows, PHt, S)

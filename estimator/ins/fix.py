@@ -70,7 +70,7 @@ class FixSettings:
     floor_yaw: float = 0.005  # rad, of a heading by two antennas
     timing: float = 0.002  # s, of the fix's time against the samples' clock: counts with the speed
     false_alarm: float = 1e-6  # chance that the NIS gate refuses a good fix of a filter whose model is right
-    readmit_after: int = 5  # rejections in a row after which the filter, not the receiver, is taken to be wrong
+    readmit_after: int = 10  # rejections in a row after which the filter, not the receiver, is taken to be wrong
 
     def gate(self, dof: int) -> float:
         """Largest NIS that is accepted."""
