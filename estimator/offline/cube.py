@@ -16,6 +16,7 @@ from estimator.layouts.catalogue import find
 from estimator.layouts.layout import GeometryError, Layout
 from estimator.offline.cube_axes import examine
 from estimator.offline.cube_log import CubeLog, LogError, read_log
+from estimator.rate.bound import IN_USE, rate_bound
 from estimator.rate.estimators import ESTIMATORS
 from estimator.settings import EstimatorSettings
 
@@ -24,7 +25,7 @@ Progress = Callable[[float, str], None]
 
 SURE = 5.0  # rad/s; an estimate less certain than that says "I do not know yet" and has no NEES
 AT_REST = 2e-3  # rad/s; a truth below it stands for rest
-WARM_SAMPLES = 800  # run on a throw-away estimator, into the first turn, so that no compiler is timed
+WARM_SAMPLES = 560  # run on a throw-away estimator, into the first turn, so that no compiler is timed
 SHOW_GAPS = 20
 
 
@@ -201,10 +202,6 @@ def _known(value: float) -> float | None:
 def _bound(data: CubeLog, shape: Layout, truth: Reference) -> Array | None:
     """RMS of the posterior Cramer-Rao bound (3,), rad/s, along the true motion; None where that is not known."""
     if not np.isfinite(truth.omega_b).all():
-        return None
-    try:
-        from estimator.rate.bound import IN_USE, rate_bound  # here: it compiles
-    except ImportError:
         return None
     omega = np.where(np.abs(truth.omega_b) < AT_REST, 0.0, truth.omega_b)
     alpha = np.gradient(omega, data.t_s, axis=0)
