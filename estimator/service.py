@@ -46,6 +46,7 @@ from messages.topics import (
 log = logging.getLogger(__name__)
 
 POSE_HZ = 20.0
+VERSION = metadata.version("gyrofree")  # once: it reads files
 INPUTS = (ACCEL, IMU, GNSS, TACHO)
 NO_TRANSLATION = (0.0, 0.0, 0.0)  # a cube on its table turns and stays
 STATES = {
@@ -137,10 +138,12 @@ class Pipeline:
         self._cost.add(device, self._clock() - started, len(samples.t_s))
         pose_step = every(batch.period_s, POSE_HZ)
         out = []
-        for row, index, name, state in ((o.row, o.index, o.estimator, o.state) for o in states):
-            header = convert.sample_header(batch.header, row * batch.period_s)
+        at, header, card = -1, batch.header, "" if board.card is None else board.card.id
+        for row, index, name, state in states:
+            if row != at:  # one header for all estimators of a sample
+                at, header = row, convert.sample_header(batch.header, row * batch.period_s)
             rate = convert.rate_message(header, batch, index, name, state)
-            rate.calibration = "" if board.card is None else board.card.id
+            rate.calibration = card
             out.append(Output(RATE, device, name, rate))
             if index % pose_step == pose_step - 1:
                 pose = convert.pose_message(header, name, NO_TRANSLATION, state.q_nb)
@@ -257,7 +260,7 @@ class Pipeline:
             gaps=stream.gaps,
             missing_samples=stream.missing,
             us_per_sample=self._cost.take(header.device, name),
-            version=metadata.version("gyrofree"),
+            version=VERSION,
         )
 
 

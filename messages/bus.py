@@ -130,6 +130,7 @@ class Publishers:
     def __init__(self, session: zenoh.Session | None, prefix: str, spool: Spool | None = None) -> None:
         self._session = session
         self._prefix = prefix
+        self._keys: dict[tuple[str, str, str], str] = {}  # checked names cost more than the message
         self._spool = spool
         self._by_key: dict[str, zenoh.Publisher] = {}
         self._sequence: dict[str, int] = {}
@@ -155,7 +156,9 @@ class Publishers:
 
     def put(self, topic: Topic[M], device: str, message: M, estimator: str = "") -> None:
         """Publish; a message with a header gets this key's next sequence unless the caller set one."""
-        key = topic.key(self._prefix, device, estimator)
+        key = self._keys.get((topic.name, device, estimator))
+        if key is None:
+            key = self._keys[topic.name, device, estimator] = topic.key(self._prefix, device, estimator)
         header = message.header if "header" in message.DESCRIPTOR.fields_by_name else None
         if header is None or not header.sequence:
             self._sequence[key] = self._sequence.get(key, 0) + 1

@@ -104,7 +104,7 @@ def test_a_reading_that_is_no_number_is_refused_by_every_estimator(name):
 
 
 def test_derivative_of_a_steady_turn():
-    y = least_squares.start().y.copy()
+    y = least_squares.memory()["y"].copy()
     y[least_squares.OMEGA] = [0.0, 0.0, 2.0]
     d = least_squares.derivative(y, np.zeros(6), np.zeros((6, 6)))
     np.testing.assert_allclose(d[least_squares.Q_NB], [0.0, 0.0, 0.0, 1.0], atol=1e-15)

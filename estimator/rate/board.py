@@ -2,8 +2,7 @@
 
 import logging
 import time
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +19,7 @@ class WrongAxes(ValueError):
     """Batches that the layout of their device does not describe."""
 
 
-@dataclass(frozen=True)
-class RateOutput:
+class RateOutput(NamedTuple):
     """State of one estimator after the sample of this index."""
 
     row: int  # of the batch

@@ -34,7 +34,7 @@ class Knowledge:
     tilt: float = 0.05  # rad, of the first levelling
     bias: float = 0.4  # m/s^2, of one axis before that
     centre: float = 0.02  # m/s^2, white acceleration of the centre while turning
-    pivot: float = 0.1  # m
+    pivot: float = 0.2  # m
     axis_wander: float = 4e-4  # rad/s per root second
     axis_from: float = 0.4  # rad/s
 

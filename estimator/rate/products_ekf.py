@@ -38,7 +38,7 @@ class Config:
     tilt: float = 0.05  # rad, of the first levelling
     gravity: float = 0.01  # m/s^2, of local gravity
     centre: float = 0.02  # m/s^2, white acceleration of the centre while it turns: vibration
-    pivot: float = 0.1  # m, of the centre from the point it turns about
+    pivot: float = 0.2  # m, of the centre from the point it turns about
     pivot_drift: float = 1e-4  # m per root second
     still_rate: float = 0.01  # rad/s, of a standstill over one window
     force_gate: float = 30.0  # NIS, 3 degrees: above it the centre accelerates, gravity is not used

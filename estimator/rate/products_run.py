@@ -43,10 +43,11 @@ KEPT = DEPTH // EVERY + 1
 ARRIVALS = 4
 WINDOW = 24  # samples of the moving horizon
 ITERATIONS = 2  # of Gauss and Newton
-STARTED, STILL, MOVED, BRANCHES, REFUSED, REFUSED_FORCE, TAKEN_BACK, STEPS, FREE = range(9)  # of Memory.marks
+STARTED, STILL, MOVED, BRANCHES, REFUSED, REFUSED_FORCE, TAKEN_BACK, STEPS, FREE, UNLIKE = range(10)  # of Memory.marks
 LAST_S, DT, BALANCE = range(3)  # of Memory.clock
 LONGEST_GAP_S = 0.5  # s; after a longer one the rate is unknown
 UNKNOWN_RATE = 10.0  # rad/s, sigma before any standstill
+ALWAYS_UNLIKE = 50  # samples in a row whose force was refused, after which u and the pivot are found anew
 DECIDED = 14.0  # log of the likelihood ratio of two signs at which one is dropped: one wrong in a million
 
 
@@ -63,7 +64,7 @@ MEMORY = np.dtype(
             ("other_out", "f8", (OUT,)),
             ("arrival", "f8", (ARRIVALS, SIZE)),  # of the moving horizon: states before samples of this turn
             ("arrival_at", "i8", (ARRIVALS,)),
-            ("marks", "i8", (9,)),
+            ("marks", "i8", (10,)),
             ("clock", "f8", (3,)),
         ],
     )
@@ -315,5 +316,12 @@ def advance(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, t_s: float, a:
         P[:, TURNED] = 0.0
     if m.out[USED] == 0.0:
         m.marks[REFUSED] += 1
-    if m.out[FORCE_USED] == 0.0:
-        m.marks[REFUSED_FORCE] += 1
+    if m.out[FORCE_USED] == 1.0:
+        m.marks[UNLIKE] = 0
+        return
+    m.marks[REFUSED_FORCE] += 1
+    m.marks[UNLIKE] += 1
+    if m.marks[UNLIKE] % ALWAYS_UNLIKE == 0:  # not one bump: gravity's direction or the pivot is not what was believed
+        for i in range(3):
+            P[12 + i, 12 + i] += t.tilt
+            P[18 + i, 18 + i] += t.pivot
