@@ -18,7 +18,7 @@ from messages.topics import published_key
 
 log = logging.getLogger(__name__)
 
-ANSWER_S = 5.0  # an answer is a few MB from the disk
+ANSWER_S = 10.0  # an answer is a MB from the disk; a busy machine takes its time
 
 
 def declare(session: zenoh.Session, prefix: str, device: str, source: str, spool: Spool) -> zenoh.Queryable:
@@ -77,6 +77,7 @@ class Asker:
 
     RETRIES = 4  # a link that is just back may carry samples before it carries questions
     RETRY_S = 0.5
+    PATIENCE_S = 120.0  # with one that is there, but does not answer in time
 
     def __init__(self, session: zenoh.Session, prefix: str, done: Callable[[object, pb.HistoryReply | None], None]):
         self._session, self._prefix, self._done = session, prefix, done
@@ -98,16 +99,15 @@ class Asker:
     def _run(self) -> None:
         while (question := self._questions.get()) is not None and not self._stop.is_set():
             token, device, source, query = question
-            reply = None
-            for attempt in range(self.RETRIES):
-                if attempt and self._stop.wait(self.RETRY_S):
-                    return
+            reply, nobody, end = None, 0, time.monotonic() + self.PATIENCE_S
+            while reply is None and nobody < self.RETRIES and time.monotonic() < end:
+                began = time.monotonic()
                 try:
-                    began = time.monotonic()
                     reply = ask(self._session, self._prefix, device, source, query)
-                    log.debug("history of %s/%s: %.0f ms", device, source, (time.monotonic() - began) * 1e3)
                 except zenoh.ZError as error:
                     log.warning("history of %s: %s", device, error)
-                if reply is not None:
-                    break
+                if reply is None:
+                    nobody += time.monotonic() - began < ANSWER_S / 2  # else it was there, and slow
+                    if self._stop.wait(self.RETRY_S):
+                        return
             self._done(token, reply)

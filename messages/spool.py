@@ -27,7 +27,7 @@ from messages.journal_file import PUBLISHED, Record, scan, unpack_at
 log = logging.getLogger(__name__)
 
 HEAD = struct.Struct("<QQqBB")
-REPLY_BYTES = 2 << 20  # of one reply; who wants more asks on
+REPLY_BYTES = 1 << 20  # of one reply; who wants more asks on
 OVERVIEW_S = 0.5  # an overview is no finer than this
 OVERVIEW_LENGTH_S = 900.0  # and reaches back so far
 LATE_S = 5.0  # a message is published at most so long after the time in its header

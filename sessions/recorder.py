@@ -271,6 +271,7 @@ def run(
         samples = session.declare_subscriber(f"{bus.prefix}/**", recorder.on_sample)
         orders = session.declare_queryable(recorder_control_key(bus.prefix), recorder.on_query)
         _go_on(recorder, settings.root)
+        recorder.step()  # the session that begins now has its session.json before recovery looks at the folders
         # Beside the recording, not before it: a large file takes a minute, and what runs is locked against recovery.
         # When the process ends first, the session stays open and the next start does it.
         threading.Thread(target=recover_all, args=(settings.root,), name="recovery", daemon=True).start()

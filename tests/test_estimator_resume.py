@@ -1,0 +1,109 @@
+"""The estimator on a bus with holes, and after a crash: the same estimates under the same numbers, none twice."""
+
+import threading
+
+from test_estimator_service import accel_batches
+
+from estimator.live import SavedState, Worker
+from estimator.service import Output, Pipeline
+from estimator.settings import EstimatorSettings
+from messages import gyrofree_pb2 as pb
+from messages.bus import Publishers
+from messages.mending import Arrival, Question
+from messages.spool import Spool
+from messages.topics import ACCEL, ESTIMATOR, GATEWAY
+
+SETTINGS = EstimatorSettings(navigators=[])
+BATCHES = 300
+
+
+def arrivals() -> list[Arrival]:
+    return [Arrival(ACCEL, "cube", "", batch.SerializeToString(), 0) for batch in accel_batches(BATCHES)]
+
+
+def published(spool: Spool) -> list[tuple[str, int, bytes]]:
+    """Topic, sequence and bytes of everything but the status, which carries a measured time."""
+    items = spool.answer(pb.HistoryQuery(max_bytes=1 << 30), "cube").items
+    return [(i.topic, i.sequence, i.payload) for i in items if not i.topic.startswith(ESTIMATOR.name)]
+
+
+def work(worker: Worker, some: list[Arrival]) -> None:
+    for arrival in some:
+        worker.offer(arrival)
+    worker.finish()
+    worker.work(threading.Event())
+    assert worker.failure is None
+
+
+def put_into(publishers: Publishers):
+    def put(output: Output) -> None:
+        publishers.put(output.topic, output.device, output.message, output.estimator)
+
+    return put
+
+
+def test_after_a_crash_everything_goes_on_as_if_there_had_been_none(tmp_path):
+    inputs = arrivals()
+    whole = Spool(tmp_path / "whole")
+    work(Worker(Pipeline(SETTINGS), put_into(Publishers(None, "p", whole))), inputs)
+    expected = published(whole)
+    whole.close()
+    assert len(expected) > 2 * BATCHES
+
+    folder = tmp_path / "estimates"
+    spool = Spool(folder)
+    publishers = Publishers(None, "p", spool)
+    state = SavedState(folder, SETTINGS, "1")
+    first = Worker(Pipeline(SETTINGS), put_into(publishers))
+    work(first, inputs[:120])
+    state.save(first, publishers)
+    work(first, inputs[120:170])  # the crash comes here: published, but not in the saved state
+    spool.close()
+
+    spool = Spool(folder)
+    publishers = Publishers(None, "p", spool)
+    publishers.resume()
+    assert SavedState(folder, SETTINGS, "2").load() is None  # of another version
+    pipeline, taken, sequences = SavedState(folder, SETTINGS, "1").load()
+    publishers.repeat(sequences)
+    gateway = Spool(tmp_path / "gateway")
+    for arrival in inputs:
+        batch = pb.AccelBatch.FromString(arrival.payload)
+        gateway.append("accel", "cube", 7, batch.header.sequence, batch.header.utc_ns, arrival.payload)
+    asked: list[Question] = []
+
+    def ask(question: Question) -> None:
+        asked.append(question)
+        second.answered(question, gateway.answer(question.query, question.stream[0]))
+
+    second = Worker(pipeline, put_into(publishers), ask)
+    for (device, name), (run, last) in taken.items():
+        second.mender.seed(device, name, run, last)
+    work_with_answers(second, inputs[200:])  # what came between is asked of the gateway
+    assert [question.stream for question in asked] == [("cube", GATEWAY)]
+    assert published(spool) == expected
+    gateway.close()
+    spool.close()
+
+
+def work_with_answers(worker: Worker, some: list[Arrival]) -> None:
+    """Like `work`, but the end comes behind the answers that the messages ask for."""
+    for arrival in some:
+        worker.offer(arrival)
+    thread = threading.Thread(target=worker.work, args=(threading.Event(),))
+    thread.start()
+    while worker._queue.qsize() or worker.mender.asking:
+        thread.join(0.05)
+    worker.finish()
+    thread.join(60.0)
+    assert not thread.is_alive() and worker.failure is None
+
+
+def test_what_nobody_kept_is_a_gap_for_the_estimators_and_no_end():
+    inputs = arrivals()
+    outputs: list[Output] = []
+    worker = Worker(Pipeline(SETTINGS), outputs.append)
+    work_with_answers(worker, inputs[:50] + inputs[80:100])
+    last = [o.message for o in outputs if o.topic is ESTIMATOR][-1]
+    assert worker.mender.counts() == {"cube/accel": (0, 30)}
+    assert outputs[-1].message.header.utc_ns > outputs[0].message.header.utc_ns and last.samples
