@@ -1,4 +1,4 @@
-"""What one waits for with sessions: report of a 30 s table run, exports, and the list of 500 sessions. One line of JSON.
+"""What one waits for with sessions: report of a table run, exports, the list of 500 sessions. One line of JSON.
 
     python tests/bench/bench_sessions.py
 """
