@@ -272,7 +272,8 @@ def by_force(x: Array, P: Array, p_m: Array, alpha: Array, turning: bool, s: Sen
     """Correct by gravity and the motion of the centre about its pivot (E-35); NIS and log det."""
     n = len(x)
     Ho, Hr, HP, C, y = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, n)), np.empty((3, 3)), np.empty(3)
-    force_jacobian(x, alpha, s, Ho, Hr)
+    # at rest omega' is noise: it must not seem to measure the pivot
+    force_jacobian(x, alpha if turning else np.zeros(3), s, Ho, Hr)
     arm = x[18] * x[18] + x[19] * x[19] + x[20] * x[20] + P[18, 18] + P[19, 19] + P[20, 20]
     more = t.centre + arm * s.R_alpha[0, 0] if turning else 0.0
     for k in range(3):

@@ -65,7 +65,7 @@ WATCH = np.dtype(
             ("total", "f8", (2 * DEPTH, 12)),  # running sum of y after each sample
             ("square", "f8", (MOST_AXES, 3)),  # of the readings in the window: offset, sum, sum of squares
             ("reference", "f8", (12,)),  # mean y of the last standstill
-            ("sum", "f8", (12,)),  # of y over this standstill without its newest samples
+            ("gathered", "f8", (12,)),  # of y over this standstill without its newest samples
             ("n", "i8", (8,)),  # counters
         ],
     )
@@ -94,7 +94,7 @@ def memory() -> Watch:
 def forget(w: Watch) -> None:
     """After a gap: the window must fill anew; the reference of the last standstill stays."""
     w.n[FILLED] = w.n[STILL_FOR] = w.n[QUIET_FOR] = w.n[SLOW_FOR] = w.n[LEARNING] = 0
-    w.sum[:] = 0.0
+    w.gathered[:] = 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -224,17 +224,17 @@ def _learn(w: Watch, c: Limits) -> None:
     y = w.y[(w.n[COUNT] - 1 - c.guard) % DEPTH]
     w.n[LEARNING] += 1
     for r in range(12):
-        w.sum[r] += y[r]
+        w.gathered[r] += y[r]
     if w.n[LEARNING] >= c.window:
         w.n[LEARNT] = w.n[LEARNING]
         for r in range(12):
-            w.reference[r] = w.sum[r] / w.n[LEARNING]
+            w.reference[r] = w.gathered[r] / w.n[LEARNING]
 
 
 @njit(cache=True, error_model="numpy")
 def _end(w: Watch) -> None:
     w.n[STILL_FOR] = w.n[LEARNING] = 0
-    w.sum[:] = 0.0
+    w.gathered[:] = 0.0
 
 
 @njit(cache=True, error_model="numpy")
