@@ -117,7 +117,7 @@ def test_truncated_anywhere_a_file_is_recovered_to_its_last_complete_chunk(setti
         chunks = make_reader(stream).get_summary().chunk_indexes
     ends = sorted((c.chunk_start_offset + c.chunk_length, c.message_end_time) for c in chunks)
     rng = random.Random(5)
-    for cut in [0, 1, 8, len(whole) - 1] + [rng.randrange(len(whole)) for _ in range(40)]:
+    for cut in [0, 1, 8, len(whole) - 1] + [rng.randrange(len(whole)) for _ in range(100)]:
         torn = tmp_path / "torn.mcap"
         torn.write_bytes(whole[:cut])
         found = salvage(torn, tmp_path / "new.mcap")
