@@ -100,6 +100,8 @@ def test_pictures_and_markdown(tmp_path, papers, columns):
     text = in_motion_draw.markdown({"seeds": 1, "note": "n", "conditions": columns, "paper": tables, "real": None})
     assert re.search(r"\| KF \| 0\.\d\d/0\.1\d\d/", text)
     assert "Residual to the fix just fed" in text and "No error" in text
+    html = in_motion_draw.page(text, [tmp_path / "methods.png"])
+    assert html.count("<table>") >= 9 and "<td>KF</td>" in html and 'src="methods.png"' in html
     assert in_motion_draw.horizon(tmp_path, "town", horizons["town"]).stat().st_size > 10_000
     assert in_motion_draw.columns(tmp_path, columns).stat().st_size > 10_000
 

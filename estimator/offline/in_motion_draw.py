@@ -1,5 +1,6 @@
 """What the comparison of in-motion filters looks like on paper: Markdown tables, bars, the horizon along a drive."""
 
+import html
 import math
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,34 @@ def markdown(result: dict[str, Any]) -> str:
     if result["real"]:
         parts.append(_real(result["real"]))
     return "\n\n".join(parts) + "\n"
+
+
+def page(text: str, pictures: list[Path]) -> str:
+    """The Markdown tables and the pictures as one HTML page that needs nothing else."""
+    body = []
+    for block in text.strip().split("\n\n"):
+        lines = block.splitlines()
+        if lines[0].startswith("|"):
+            rows = [[html.escape(cell.strip()) for cell in line.strip("|").split("|")] for line in lines]
+            head = "".join(f"<th>{cell}</th>" for cell in rows[0])
+            cells = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows[2:])
+            body.append(f"<table><tr>{head}</tr>{cells}</table>")
+        elif lines[0].startswith("#"):
+            level = 1 if lines[0].startswith("# ") else 2
+            body.append(f"<h{level}>{html.escape(lines[0].lstrip('# '))}</h{level}>")
+        else:
+            body.append(f"<p>{html.escape(block)}</p>")
+    images = "".join(f'<p><img src="{picture.name}" alt="{picture.stem}" width="900"></p>' for picture in pictures)
+    style = "body{font:14px sans-serif;margin:2em}table{border-collapse:collapse}"
+    style += "td,th{border:1px solid #ccc;padding:2px 6px}"
+    return (
+        (
+            '<!doctype html><html lang="en"><meta charset="utf-8"><title>In-motion alignment</title>'
+            f"<style>{style}</style>{''.join(body)}{images}</html>\n"
+        )
+        .replace("&lt;sub&gt;", "<sub>")
+        .replace("&lt;/sub&gt;", "</sub>")
+    )
 
 
 def _error(f: dict[str, float]) -> str:

@@ -36,8 +36,8 @@ def reproduce(
     """Run the comparison and write tables and figures to the folder `out`.
 
     data: the car_drive folder, or the folder that holds it; None: simulated drives only. seeds: drives per condition.
-    Writes in-motion.json, in-motion.md and PNG figures; returns what in-motion.json holds: {"conditions": {A:
-    {method: figures}}, "paper": {table: {method: {metric: {component: {mean, std}}}}}, "real": {...}, "files": [...]}.
+    Writes index.html, in-motion.md, in-motion.json and PNG figures; returns what in-motion.json holds: {"conditions":
+    {A: {method: figures}}, "paper": {table: {method: {metric: {component: {mean, std}}}}}, "real": {...}, "files": [...]}.
     Raises ValueError for no seeds, or data that cannot be read.
     """
     if seeds < 1:
@@ -61,8 +61,11 @@ def reproduce(
     tell(0.96, "figures")
     files = [in_motion_draw.horizon(out, name, drive) for name, drive in horizons.items()]
     files.append(in_motion_draw.columns(out, result["conditions"]))
-    (out / "in-motion.md").write_text(in_motion_draw.markdown(result), encoding="utf-8")
-    result["files"] = [str(file) for file in files] + [str(out / "in-motion.md"), str(out / "in-motion.json")]
+    text = in_motion_draw.markdown(result)
+    (out / "in-motion.md").write_text(text, encoding="utf-8")
+    (out / "index.html").write_text(in_motion_draw.page(text, files), encoding="utf-8")
+    written = ("index.html", "in-motion.md", "in-motion.json")
+    result["files"] = [str(file) for file in files] + [str(out / name) for name in written]
     (out / "in-motion.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
     tell(1.0, "done")
     return result
