@@ -54,7 +54,7 @@ class FilterConfig:
         None  # (n, n) of a calibration run; None: this one's
     )
     literal: bool = False  # fuzzy inputs as read, not conditioned
-    rules: fuzzy.FuzzyRules = fuzzy.FuzzyRules()
+    rules: fuzzy.FuzzyRules = fuzzy.RULES
     huber: float = math.inf  # Mahalanobis distance of position or velocity from which a fix is weighted down
     passes: int = 3  # of reweighting in a robust horizon
     fading: float = 1.0  # forgetting factor on the covariance, 1.05 to 1.1 for sensors that jump

@@ -1,7 +1,7 @@
 """The fuzzy horizon: how hard the vehicle moves decides how many fixes the predictive estimator looks back. E-48, E-49.
 
-Sets S, M, H on |f| and |w|, nine rules, singleton consequents. Break points and rules are a TOML file that people may
-edit: `gyrofree.toml` names it, fuzzy_horizon.toml beside this module is the default.
+Sets S, M, H on |f| and |w|, nine rules, singleton consequents. Break points and rules stand in fuzzy_horizon.toml
+beside this module, which people may edit; RULES is what it says.
 """
 
 import math
@@ -78,7 +78,10 @@ def membership(value: float, points: Array, out: Array) -> None:
     out[0], out[1], out[2] = s, 1.0 - s - h, h
 
 
-def memberships(force: float, rate: float, rules: FuzzyRules = FuzzyRules()) -> list[float]:
+RULES = read_rules()
+
+
+def memberships(force: float, rate: float, rules: FuzzyRules = RULES) -> list[float]:
     """Six numbers in the order of MEMBERSHIPS, for |f| in m/s^2 and |w| in rad/s."""
     out = np.empty(6)
     membership(force, np.array(rules.force), out[:3])

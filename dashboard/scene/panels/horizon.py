@@ -6,7 +6,7 @@ from dashboard.scene.chart import Curve
 from dashboard.scene.palette import AXES, estimator_title, number, rows
 from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve
 from dashboard.scene.store import NAV_CRISP, NAV_HORIZON, NAV_INPUTS, NAV_MEMBERSHIP
-from estimator.ins.fuzzy import MEMBERSHIPS, FuzzyRules, membership
+from estimator.ins.fuzzy import MEMBERSHIPS, RULES, membership
 
 WIDTH, HEIGHT = 170, 90
 UNITS = ("m/s²", "rad/s")
@@ -53,8 +53,7 @@ class Horizon(Panel):
             t, r = s.rows("nav", name)
             curves.append(estimator_curve(s, "nav", name, t, r[:, NAV_HORIZON]))
             if len(m.inputs) == 2 and not drawing:
-                rules = FuzzyRules()
-                drawing = sets_svg(rules.force, m.inputs[0], UNITS[0]) + sets_svg(rules.rate, m.inputs[1], UNITS[1])
+                drawing = sets_svg(RULES.force, m.inputs[0], UNITS[0]) + sets_svg(RULES.rate, m.inputs[1], UNITS[1])
                 self._fuzzy(s, name)
         legend = '<p class="gf-note">small · medium · high in the colours below; grey: the vehicle now</p>'
         self._top = self.html(drawing + (legend if drawing else "") + rows(items, s.stale("nav", names[0])), self._top)
