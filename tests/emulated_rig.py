@@ -37,8 +37,9 @@ class Rig:
     """A powered board whose bytes reach the gateway's link at the emulated time they leave."""
 
     def __init__(self, image: Path, folder: Path, world: World | None = None, faults: tuple[str, ...] = (),
-                 test: TableTest | None = None, rate: list[str] | None = None) -> None:  # fmt: skip
-        self.test = test
+                 test: TableTest | None = None, rate: list[str] | None = None, slice_s: float = SLICE_S) -> None:
+        """slice_s: how finely the times of receipt are told, s."""
+        self.test, self._slice_s = test, slice_s
         world = world or (table_world(test, 1) if test is not None else World())
         self.board = Board(image, world, [parse_fault(text) for text in faults])
         settings = GatewaySettings(devices=[DeviceSettings(name="cube", port="emulated")], journal=folder / "journal")
@@ -63,7 +64,7 @@ class Rig:
     def run(self, until_s: float) -> None:
         """Let everybody live until this time."""
         while until_s - self.board.now_s > 1e-7:  # a clock is 10 ns
-            data = self.board.run(min(self.board.now_s + SLICE_S, until_s))
+            data = self.board.run(min(self.board.now_s + self._slice_s, until_s))
             if data:
                 self.wire += data
                 self.link.take(Chunk(BOARD, data, self.now_ns))
