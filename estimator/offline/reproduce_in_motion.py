@@ -37,8 +37,8 @@ def reproduce(
 
     data: the car_drive folder, or the folder that holds it; None: simulated drives only. seeds: drives per condition.
     Writes index.html, in-motion.md, in-motion.json and PNG figures; returns what in-motion.json holds: {"conditions":
-    {A: {method: figures}}, "paper": {table: {method: {metric: {component: {mean, std}}}}}, "real": {...}, "files": [...]}.
-    Raises ValueError for no seeds, or data that cannot be read.
+    {A: {method: figures}}, "paper": {table: {method: {metric: {component: {mean, std}}}}}, "real": {...},
+    "files": [...]}. Raises ValueError for no seeds, or data that cannot be read.
     """
     if seeds < 1:
         raise ValueError(f"{seeds} seeds, want at least 1")
