@@ -51,7 +51,7 @@ def test_live_gives_what_offline_gives(simulated, name: str) -> None:
 
 def test_outliers_cost_the_robust_filters_less(simulated) -> None:
     plain = replace(FILTERS["kf"], gated=False)
-    runs = run_filters(simulated.imu, simulated.fixes, {"plain": plain, "huber": replace(plain, huber=2.5)})
+    runs = run_filters(simulated.imu, simulated.fixes, {"plain": plain, "huber": FILTERS["huber"]})
     rows = [simulated.row_of(t) for t in runs["plain"].t]
     error = {
         name: float(np.sqrt(np.mean(np.sum((run.x[30:, 3:6] - simulated.truth.v_n[rows][30:]) ** 2, axis=1))))
