@@ -51,8 +51,10 @@ dev: .make/dev
 system-packages:
 	@sh tests/system_packages.sh
 
+# The browser draws in software and wants the machine for itself, so it comes after the others.
 test: setup dev system-packages
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile -m "not browser"
+	$(BIN)/python -m pytest -m browser
 
 lint: dev
 	$(BIN)/ruff check .
