@@ -238,6 +238,15 @@ class UnscentedRate(ProductsRate):
     method = "ukf"
     with_bound = False
 
+    def __init__(
+        self,
+        layout: Layout,
+        config: products_ekf.Config = products_ekf.Config(fixed_axis=False),  # its points do not follow a turning axis
+        calibration: str = "",
+    ) -> None:
+        """Raises GeometryError when the layout does not see angular acceleration and specific force."""
+        super().__init__(layout, config, calibration)
+
 
 class RecursiveLeastSquaresRate(ProductsRate):
     """Estimator "products-rls": the same linearised regression without a noise model, with exponential forgetting."""
