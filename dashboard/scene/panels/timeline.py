@@ -1,4 +1,4 @@
-"""The bar along the bottom: where the recording or the replay stands, the replay's controls, notes and marks."""
+"""The panel at the bottom left: where the recording or the replay stands, the replay's controls, notes and marks."""
 
 import logging
 import time
@@ -46,7 +46,8 @@ class Timeline:
             self._keep = gui.add_button_group("Keep", ("note", "mark"))
             self._keep.on_click(lambda _: self._remember(self._keep.value == "mark"))
         if dock:
-            panel.dock_bottom()
+            panel.dock_below(gui.main_panel)  # viser has no bar over the whole width
+            panel.set_height(300)
         self._replay_inputs = (self._slider, self._buttons, self._speed, self._loop)
         self._showing: bool | None = None
         self._commands()
