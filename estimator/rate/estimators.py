@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from estimator.layouts.layout import Layout
 from estimator.rate import bound, least_squares, products_ekf, products_kernel, sight
 from estimator.rate import products_run as frame
+from estimator.rate.direct import Direct
 from estimator.rate.field import checked
 
 Array = NDArray[np.float64]
@@ -68,6 +69,8 @@ class RateEstimator(Protocol):
         """
         ...
 
+
+_run = Direct(products_ekf.run)
 
 EMPTY = np.zeros(0)
 EMPTY.setflags(write=False)
@@ -168,7 +171,8 @@ class ProductsRate:
         core = self.core
         f_axis = checked(core.layout, f_axis)
         self._clock.advance(t_s)
-        core.step(t_s, f_axis)
+        core._time[0], core._row[0] = t_s, f_axis
+        _run(core.memory, core.watch, core.sensor, core.tuning, core.limits, core._time, core._row, core.now)
         return self._state()
 
     def skip(self, n: int) -> None:
