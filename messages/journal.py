@@ -15,6 +15,7 @@ import os
 import threading
 import time
 from collections.abc import Iterator
+from itertools import zip_longest
 from pathlib import Path
 
 from messages.journal_file import SEGMENT_HEAD, SEGMENT_MAGIC, Record, pack, scan
@@ -127,7 +128,7 @@ class Journal:
         """Verbatim records first..last that are still kept, in order, until max_bytes are exceeded."""
         names = self.segments()
         total = 0
-        for name, following in zip(names, [*names[1:], None], strict=True):
+        for name, following in zip_longest(names, names[1:]):
             if first_of(name) > last:
                 return
             if following is not None and first_of(following) <= first:

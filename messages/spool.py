@@ -17,6 +17,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Iterator
+from itertools import zip_longest
 from pathlib import Path
 from typing import NamedTuple
 
@@ -186,7 +187,7 @@ class Spool:
 
     def _from(self, position: int) -> Iterator[Entry]:
         names = self.journal.segments()
-        for name, following in zip(names, [*names[1:], None], strict=True):
+        for name, following in zip_longest(names, names[1:]):
             if following is not None and first_of(following) <= position:
                 continue
             for record in _records(name):
