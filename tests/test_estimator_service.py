@@ -106,7 +106,7 @@ def test_same_messages_same_bytes() -> None:
 
 
 def test_a_drive_becomes_solutions_and_innovations() -> None:
-    outputs = run_through(drive_messages(40.0), EstimatorSettings(use_every_fix=2))
+    outputs = run_through(drive_messages(40.0), EstimatorSettings(use_every_fix=2, navigators=["kf"]))
     navs = [o.message for o in outputs if o.topic is NAV]
     assert len(navs) == 40 * 20
     assert [m.mode for m in (navs[0], navs[230], navs[-1])] == [1, 2, 3]
@@ -185,7 +185,7 @@ def test_service_over_the_bus(free_port: int) -> None:
 
     def work() -> None:
         try:
-            service.run(EstimatorSettings(), bus, stop)
+            service.run(EstimatorSettings(navigators=["kf"]), bus, stop)
         except BaseException as error:
             failures.append(error)
 
