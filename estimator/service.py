@@ -10,7 +10,6 @@ import threading
 import time
 from collections.abc import Callable
 from importlib import metadata
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from google.protobuf.message import Message
@@ -18,12 +17,14 @@ from google.protobuf.message import Message
 from estimator import convert
 from estimator.attitude.board import AttitudeBoard
 from estimator.attitude.filters import ATTITUDES
-from estimator.calibration.card import Card, CardError, read_card
-from estimator.ins.board import NavBoard
+from estimator.calibration.card import CardError
+from estimator.choice import UnknownEstimator, check_names, load_card, make_layout, rate_estimators
+from estimator.cost import Cost
+from estimator.ins.board import NavBoard, NavOutput
 from estimator.ins.navigation import NAVIGATORS, Correction, Mode, NavigatorConfig
 from estimator.orders import CalibrationDesk
 from estimator.rate.board import RateBoard, WrongAxes
-from estimator.settings import EstimatorSettings, LayoutSettings
+from estimator.settings import EstimatorSettings
 from estimator.stream import Stream, every
 from messages import gyrofree_pb2 as pb
 from messages.bus import BusSettings
@@ -55,6 +56,9 @@ STATES = {
     Mode.COURSE: "finding heading: drive faster than 4 m/s",
     Mode.NAVIGATING: "navigating",
 }
+
+
+__all__ = ["INPUTS", "Output", "Pipeline", "UnknownEstimator", "make_layout", "run"]
 
 
 class Output(NamedTuple):
@@ -89,7 +93,7 @@ class Pipeline:
         self._attitudes: dict[str, AttitudeBoard] = {}
         self._clock_offset: dict[str, float] = {}
         self._desk = CalibrationDesk(settings.cards)
-        self._cost = _Cost()
+        self._cost = Cost()
         self._second: dict[tuple[str, str], int] = {}
 
     def on(self, topic: Topic, message: Message) -> list[Output]:
@@ -187,7 +191,19 @@ class Pipeline:
             batch.header.epoch, batch.first_index, batch.period_s, samples.t_s, samples.values, rates
         )  # fmt: skip
         self._cost.add(device, self._clock() - started, len(samples.t_s))
-        out = []
+        out = self._navigated(batch, samples, board, said, self._settings.navigators)
+        return out + self._tilt(batch, samples.values, rates)
+
+    def _navigated(
+        self,
+        batch: pb.ImuBatch,
+        samples: convert.Samples,
+        board: NavBoard,
+        said: list[NavOutput],
+        names: list[str],
+    ) -> list[Output]:
+        """What navigation filters said, as messages; once per second of data their health."""
+        device, out = batch.header.device, []
         for o in said:
             if isinstance(o.what, Correction):
                 header = convert.sample_header(batch.header, o.what.fix.t - samples.t_s[0])
@@ -200,11 +216,11 @@ class Pipeline:
             out.append(Output(NAV, device, o.estimator, nav))
             pose = convert.pose_message(header, o.estimator, o.what.p_ned, o.what.q_nb)
             out.append(Output(POSE, device, o.estimator, pose))
-        if self._new_second(device, "imu", samples.t_s[-1]):
+        if self._new_second(device, "nav", samples.t_s[-1]):
             header = convert.sample_header(batch.header, (len(samples.t_s) - 1) * batch.period_s)
-            for name in self._settings.navigators:
+            for name in names:
                 out.append(Output(ESTIMATOR, device, name, self._nav_status(header, board, name)))
-        return out + self._tilt(batch, samples.values, rates)
+        return out
 
     def _tilt(self, batch: pb.ImuBatch, f_b: Any, omega_b: Any) -> list[Output]:
         """Attitude of every tilt filter."""
@@ -262,62 +278,6 @@ class Pipeline:
             us_per_sample=self._cost.take(header.device, name),
             version=VERSION,
         )
-
-
-class _Cost:
-    """Measured time per sample, by device, since it was last asked for."""
-
-    def __init__(self) -> None:
-        self._ns: dict[str, int] = {}
-        self._samples: dict[str, int] = {}
-        self._asked: dict[tuple[str, str], tuple[int, int]] = {}
-
-    def add(self, device: str, ns: int, samples: int) -> None:
-        self._ns[device] = self._ns.get(device, 0) + ns
-        self._samples[device] = self._samples.get(device, 0) + samples
-
-    def take(self, device: str, estimator: str) -> float:
-        """us per sample of all estimators of this device together."""
-        now = (self._ns.get(device, 0), self._samples.get(device, 0))
-        before = self._asked.get((device, estimator), (0, 0))
-        self._asked[device, estimator] = now
-        return (now[0] - before[0]) / max(1, now[1] - before[1]) / 1000.0
-
-
-class UnknownEstimator(ValueError):
-    """Settings name an estimator that does not exist."""
-
-
-def rate_estimators() -> dict[str, Any]:
-    """The table of rate estimators."""
-    from estimator.rate.estimators import ESTIMATORS  # here: the tables of names need not load with the settings
-
-    return ESTIMATORS
-
-
-def check_names(key: str, names: list[str], known: dict[str, Any]) -> None:
-    """Raises UnknownEstimator with the known names."""
-    for name in names:
-        if name not in known:
-            raise UnknownEstimator(f"[estimator] {key}: no estimator {name!r}; want some of {', '.join(known)}")
-
-
-def load_card(path: Path) -> Card:
-    """A calibration card; raises UnknownEstimator for a file that is none or cannot be read."""
-    try:
-        return read_card(path)
-    except (CardError, OSError) as error:
-        raise UnknownEstimator(f"[estimator] calibration: {error}") from None
-
-
-def make_layout(settings: LayoutSettings) -> Any:
-    """Accelerometer layout from its settings; raises UnknownEstimator for a file that is none."""
-    from estimator.layouts import catalogue, layout
-
-    try:
-        return catalogue.find(settings.file or settings.kind, settings.half_side_m)
-    except layout.GeometryError as error:
-        raise UnknownEstimator(f"[estimator] layout: {error}") from None
 
 
 def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) -> None:

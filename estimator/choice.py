@@ -1,0 +1,43 @@
+"""Names and files of the settings become estimators, layouts and calibration cards; a wrong one is refused by name."""
+
+from pathlib import Path
+from typing import Any
+
+from estimator.calibration.card import Card, CardError, read_card
+from estimator.settings import LayoutSettings
+
+
+class UnknownEstimator(ValueError):
+    """Settings name an estimator that does not exist."""
+
+
+def rate_estimators() -> dict[str, Any]:
+    """The table of rate estimators."""
+    from estimator.rate.estimators import ESTIMATORS  # here: the tables of names need not load with the settings
+
+    return ESTIMATORS
+
+
+def check_names(key: str, names: list[str], known: dict[str, Any]) -> None:
+    """Raises UnknownEstimator with the known names."""
+    for name in names:
+        if name not in known:
+            raise UnknownEstimator(f"[estimator] {key}: no estimator {name!r}; want some of {', '.join(known)}")
+
+
+def load_card(path: Path) -> Card:
+    """A calibration card; raises UnknownEstimator for a file that is none or cannot be read."""
+    try:
+        return read_card(path)
+    except (CardError, OSError) as error:
+        raise UnknownEstimator(f"[estimator] calibration: {error}") from None
+
+
+def make_layout(settings: LayoutSettings) -> Any:
+    """Accelerometer layout from its settings; raises UnknownEstimator for a file that is none."""
+    from estimator.layouts import catalogue, layout
+
+    try:
+        return catalogue.find(settings.file or settings.kind, settings.half_side_m)
+    except layout.GeometryError as error:
+        raise UnknownEstimator(f"[estimator] layout: {error}") from None
