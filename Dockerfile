@@ -23,7 +23,7 @@ RUN NUMBA_CACHE_DIR=/opt/gyrofree/numba python -m estimator.warm
 FROM python:3.11-slim-bookworm
 RUN groupadd --gid 10001 gyrofree \
  && useradd --uid 10001 --gid 10001 --no-create-home --home-dir /nonexistent --shell /usr/sbin/nologin gyrofree \
- && install -d -o gyrofree -g gyrofree -m 0750 /data/journal /data/sessions /data/state \
+ && install -d -o gyrofree -g gyrofree -m 0750 /data/journal /data/estimates /data/sessions /data/state \
  && install -d /etc/gyrofree
 COPY --from=build /opt/gyrofree /opt/gyrofree
 COPY --chmod=0755 deploy/entrypoint.sh /opt/gyrofree/entrypoint.sh

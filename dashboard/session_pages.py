@@ -98,7 +98,7 @@ def _report(front: Front, session: str) -> dict | None:
 def _completeness(manifest: Manifest | None) -> list[Completeness]:
     rows = []
     for key, count in sorted(manifest.keys.items() if manifest else ()):
-        repaired = getattr(count, "repaired", 0)
         received = count.messages - count.repeated
-        rows.append(Completeness("/".join(key.split("/")[1:]), received + count.lost, received, repaired, count.lost))
+        name = "/".join(key.split("/")[1:])
+        rows.append(Completeness(name, count.expected, received, count.repaired, count.lost))
     return rows

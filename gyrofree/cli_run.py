@@ -46,7 +46,7 @@ def run(
     gnss: Annotated[str, typer.Option(help="Drives: file of GNSS epochs.")] = "gnss.csv",
     every: Annotated[int, typer.Option(min=1, help="Drives: give 1 of so many fixes, score on the others.")] = 1,
     outages: Annotated[
-        str, typer.Option(help="Drives: starts and length of outages, s from the first sample, as 120,200:30.")
+        str, typer.Option(help="Drives: starts and length of outages, s from the first fix, as 120,200:30.")
     ] = "",
     truth: Annotated[Path | None, typer.Option(help="Drives: CSV of the true attitude and position.")] = None,
     plot: Plot = None,
@@ -112,7 +112,10 @@ def show(result: dict[str, Any], as_json: bool) -> None:
         table.add_row(name + mark, *(cell(row.get(key)) for key in columns))
     Console(file=sys.stdout, width=None if sys.stdout.isatty() else 200).print(table)
     for key, value in result.items():
-        if key not in (kind, "default") and value not in (None, [], {}, ""):
+        if key == "axes" and isinstance(value, dict):
+            bad = {name: state for name, state in value.items() if state not in ("good", {"state": "good"})}
+            print(f"axes: {len(value) - len(bad)} good" + (f"; {json.dumps(bad)}" if bad else ""))
+        elif key not in (kind, "default") and value not in (None, [], {}, ""):
             print(f"{key}: {json.dumps(value)}")
 
 

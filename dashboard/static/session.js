@@ -29,10 +29,22 @@ async function ended(job, line) {
   return job;
 }
 
-by("replay")?.addEventListener("click", (event) => guarded(event.target, async () => {
-  await call(`${path}/replay`, { speed: 1.0 });
-  location.assign("/");
-}));
+by("replay")?.addEventListener("click", (event) => replay(event.target, moment > 0 ? moment : 0));
+
+async function replay(button, t) {
+  await guarded(button, async () => {
+    await call(`${path}/replay`, { speed: 1.0, t });
+    location.assign("/");
+  });
+}
+
+for (const button of document.querySelectorAll("[data-from]")) {
+  button.addEventListener("click", () => replay(button, Number(button.dataset.from)));
+}
+
+// A link to a moment, /sessions/ID?t=12.5, offers to replay from there.
+const moment = Number(new URLSearchParams(location.search).get("t"));
+if (moment > 0 && by("replay")) by("replay").textContent = `Replay from ${moment} s`;
 
 by("report")?.addEventListener("click", (event) => guarded(event.target, async () => {
   await ended(await call(`${path}/report`, {}), by("report-state"));
