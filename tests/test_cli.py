@@ -70,11 +70,11 @@ def test_a_log_that_cannot_be_played_is_named_by_file_row_and_column(tmp_path):
 
 def test_a_drive_wants_its_folder(tmp_path):
     refused(gyrofree("demo", "--source", "drive", cwd=tmp_path), 2, "--data FOLDER")
-    refused(gyrofree("demo", "--source", "boat", cwd=tmp_path), 2, "'table' or 'drive'")
+    refused(gyrofree("demo", "--source", "boat", cwd=tmp_path), 2, "'table', 'emulated' or 'drive'")
 
 
 def test_an_unknown_profile_is_refused(tmp_path):
-    refused(gyrofree("simulate", "--profile", "slow", cwd=tmp_path), 2, "published, wobble, fast, still")
+    refused(gyrofree("simulate", "--profile", "gentle", cwd=tmp_path), 2, "published, wobble, fast, still")
 
 
 def test_doctor_speaks_json(tmp_path):

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import viser
 from feeder import UTC0_NS, Feeder, cube_attitude
 
 from dashboard.scene import camera, series
@@ -281,9 +282,17 @@ class Seen(Panel):
         return None
 
 
+@pytest.fixture(scope="module")
+def server():
+    """A real viser server: its own GUI stands for a client's, with the same calls."""
+    running = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield running
+    running.stop()
+
+
 @pytest.mark.parametrize("kind", ["cube", "drive", "nothing"])
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.title)
-def test_every_page_is_made_from_every_kind_of_device(store, page, kind):
+def test_every_page_is_made_from_every_kind_of_device(store, server, page, kind):
     feeder = Feeder(Direct(store))
     for k in range(700):
         feeder.cube(k * 0.01) if kind == "cube" else feeder.drive(k * 0.05)
@@ -291,7 +300,7 @@ def test_every_page_is_made_from_every_kind_of_device(store, page, kind):
         store.devices.clear()
         store.put(tp.LINK, "car-01", "", pb.LinkStatus(header=pb.Header(utc_ns=UTC0_NS), message="port is gone"))
     (device,) = store.devices.values()
-    panel = type("Seen" + page.__name__, (Seen, page), {})(None, None)
+    panel = type("Seen" + page.__name__, (Seen, page), {})(server, server.gui.add_folder(page.title))
     panel.drawn, panel.text = {}, ""
     panel.update(Snapshot(store, device, 0.0, max(device.t_newest, 1.0), time.monotonic(), True))
     if kind != "nothing":

@@ -11,6 +11,9 @@ from estimator import service
 from estimator.rate.estimators import ESTIMATORS
 from estimator.settings import EstimatorSettings
 from estimator.simulation.table import TableTest
+from gyrofree.config import Settings
+from gyrofree.replay import Options
+from gyrofree.replay import run as play
 from messages import gyrofree_pb2 as pb
 from messages.bus import subscribe
 from messages.topics import ACCEL, RATE
@@ -102,7 +105,8 @@ def test_a_live_session_is_reproduced_and_its_replay_gives_the_same_estimates(bu
         assert not compared.first_difference and compared.equal_since is not None
 
     again = order(client, pb.RecorderCommand.ACTION_START, name="again")
-    replay.run(Catalogue(settings.root).path(live.session), bus, threading.Event(), speed=1.0)
+    mine = Settings(bus=bus, estimator=SETTINGS)
+    play(mine, Catalogue(settings.root).path(live.session), Options(speed=1.0), threading.Event())
     wait_for_last(seen, "cube-replay")
     stop.set()
     thread.join(PATIENCE)

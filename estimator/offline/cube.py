@@ -192,7 +192,10 @@ def nees_mean(error: Array, P: Array) -> float | None:
     if not sure.any():
         return None
     e, V = error[sure], P[sure]
-    return float(np.mean(np.einsum("ni,ni->n", e, np.linalg.solve(V, e[:, :, None])[:, :, 0])))
+    try:
+        return _known(np.mean(np.einsum("ni,ni->n", e, np.linalg.solve(V, e[:, :, None])[:, :, 0])))
+    except np.linalg.LinAlgError:
+        return None  # it claims to know a component without any error: no NEES says how wrong that is
 
 
 def _known(value: float) -> float | None:

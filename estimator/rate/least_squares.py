@@ -99,6 +99,9 @@ def memory() -> Memory:
     return m
 
 
+FASTEST = 300.0  # rad/s; no accelerometer of this kind measures a faster turn
+
+
 @njit(cache=True, error_model="numpy")
 def restart(m: Memory, w: Watch) -> None:
     """The rate is unknown: wait for a standstill."""
@@ -176,6 +179,8 @@ def advance(m: Memory, w: Watch, s: Sensor, c: Limits, shortest: int, longest_s:
         m.y[:] = runge_kutta(m.y, m.u, u, s.SQ, w.dt[sample % DEPTH])
         m.u[:] = u
         m.clock[MOVING_S] += w.dt[sample % DEPTH]
+    if not m.y[0] ** 2 + m.y[1] ** 2 + m.y[2] ** 2 < FASTEST**2:  # feedback of a drifting rate diverges
+        restart(m, w)
     _publish(m, w, s)
 
 

@@ -70,6 +70,7 @@ MEMORY = np.dtype(
     )
 )
 Memory = np.record
+FASTEST = 120.0  # rad/s; +-16 g at 5 cm of the axis is 56 rad/s: beyond twice that a filter has diverged
 
 
 def memory() -> Memory:
@@ -308,6 +309,10 @@ def advance(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, t_s: float, a:
                 step(core, s, t, w.y[k], at, w.dt[k], not still, fixed, grow, out)
     if m.marks[BRANCHES] == 2:
         _two_signs(m, still)
+    if not m.core[0] ** 2 + m.core[1] ** 2 + m.core[2] ** 2 < FASTEST**2:  # diverged, or no number at all
+        restart(m, w)
+        m.out[:] = 0.0
+        return
     if still and m.marks[MOVED] == 0:  # position counts from the end of the first standstill
         m.core[V_N : V_N + 3] = 0.0
         m.core[P_N : P_N + 3] = 0.0
