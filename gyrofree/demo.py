@@ -106,7 +106,9 @@ def _supervise(plan: Plan, config: Path) -> Supervisor:
     supervisor = Supervisor()
     for service in ("router", "gateway", "estimator", "record", "dashboard"):
         supervisor.add(service, service, "--config", str(config))
-    supervisor.add("board", *plan.board, "--config", str(config), "--link", str(plan.folder / "board"))
+    # The board comes last: estimators that see its first standstill know its heading and biases from the start.
+    board = [*plan.board, "--config", str(config), "--link", str(plan.folder / "board")]
+    supervisor.add("board", *board, waits_for=("estimator", "estimating"))
     return supervisor
 
 

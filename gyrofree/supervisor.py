@@ -22,6 +22,7 @@ from gyrofree.process import EXIT_CONFIG, EXIT_TAKEN
 PAUSE_FIRST = 0.05  # s; while a gateway is away its board's samples are lost
 PAUSE_LONGEST = 5.0  # s
 GOOD_LIFE = 20.0  # s
+LONGEST_WAIT = 30.0  # s, for a child that waits for another
 PATIENCE = 4.0  # s between SIGTERM and SIGKILL
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 COLOURS = ("cyan", "green", "magenta", "blue", "yellow", "bright_cyan", "bright_green")
@@ -43,6 +44,7 @@ class Child:
     pause: float = PAUSE_FIRST  # s
     due: float = 0.0  # s, monotonic: when to start again
     readers: list[threading.Thread] = field(default_factory=list)
+    waits_for: tuple[str, str] | None = None  # another child, and what its log must say before this one starts
 
 
 def _die_with_parent() -> None:
@@ -59,9 +61,13 @@ class Supervisor:
         self.fatal: Child | None = None
         self._stopping = False
 
-    def add(self, name: str, *arguments: str) -> None:
-        """Have `python -m gyrofree ARGUMENTS` as a child called `name`."""
-        self.children.append(Child(name, list(arguments), COLOURS[len(self.children) % len(COLOURS)]))
+    def add(self, name: str, *arguments: str, waits_for: tuple[str, str] | None = None) -> None:
+        """Have `python -m gyrofree ARGUMENTS` as a child called `name`.
+
+        waits_for: another child and a text of its log, before which this one is not started; at most LONGEST_WAIT.
+        """
+        colour = COLOURS[len(self.children) % len(COLOURS)]
+        self.children.append(Child(name, list(arguments), colour, waits_for=waits_for))
 
     def say(self, text: str, style: str = "bold") -> None:
         """A line of the supervisor's own."""
@@ -70,7 +76,10 @@ class Supervisor:
     def start(self) -> None:
         """Start every child."""
         for child in self.children:
-            self._spawn(child)
+            if child.waits_for is None:
+                self._spawn(child)
+            else:
+                child.due = time.monotonic() + LONGEST_WAIT
 
     def step(self) -> None:
         """Look after the children once; call a few times a second."""
@@ -140,6 +149,9 @@ class Supervisor:
         for line in process.stdout:
             level, _, rest = line.rstrip().partition(" ")
             known = level in LEVELS or level == "INFO"
+            for other in self.children:
+                if other.waits_for is not None and other.waits_for[0] == child.name and other.waits_for[1] in line:
+                    other.waits_for, other.due = None, 0.0
             self._print(child.name, child.colour, rest if known else line.rstrip(), LEVELS.get(level, ""))
 
     def _print(self, name: str, colour: str, text: str, style: str) -> None:
