@@ -36,7 +36,7 @@ class Timeline:
             self._state = gui.add_html("")
             self._slider = gui.add_slider("Position", 0, STEPS, 1, 0, visible=False, hint="Seconds of the recording")
             self._slider.on_update(lambda event: self._slid(event))
-            self._buttons = gui.add_button_group("Replay", ("⏮", "−10 s", "◂ step", "play / pause", "step ▸", "+10 s"))
+            self._buttons = gui.add_button_group("Replay", ("start", "−10 s", "◂ step", "play / pause", "step ▸", "+10 s"))
             self._buttons.on_click(lambda _: self._press(self._buttons.value))
             self._speed = gui.add_dropdown("Speed", SPEEDS, initial_value="1×")
             self._speed.on_update(lambda event: self._set_speed(event))
@@ -150,7 +150,7 @@ class Timeline:
         elif what.endswith("step") or what.startswith("step"):
             self._order(kind.ACTION_STEP, 1.0 if what.startswith("step") else -1.0)
         else:
-            jump = {"⏮": -at, "−10 s": -10.0, "+10 s": 10.0}[what]
+            jump = {"start": -at, "−10 s": -10.0, "+10 s": 10.0}[what]
             self._order(kind.ACTION_SEEK, max(0.0, at + jump))
 
     def _set_loop(self, what: str) -> None:
