@@ -12,6 +12,7 @@ of the file and its column.
 import csv
 import hashlib
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +24,7 @@ Array = NDArray[np.float64]
 
 GRAVITY = 9.80665  # m/s^2, standard
 LSB_MG = 3.9  # mg per count, ADXL345 in full resolution
+AXIS = re.compile(r"a\d{1,2}_(counts|mps2)")  # a column of an accelerometer axis
 TRUE_RATE = ("true_wx", "true_wy", "true_wz")
 TRUE_ATTITUDE = ("true_qw", "true_qx", "true_qy", "true_qz")
 TACHO = "tacho_rad_s"
@@ -122,6 +124,12 @@ def _unit(path: Path, line: int, header: list[str], names: Sequence[str]) -> str
             f"{path}:{line}: column {first!r} is missing ({len(missing[unit])} of {len(names)} axes are); found "
             f"{', '.join(header)}; want t_s, {names[0]}_{unit} ... {names[-1]}_{unit} of the layout, or name another "
             f"with --layout"
+        )
+    more = [name for name in header if AXIS.fullmatch(name) and name.rpartition("_")[0] not in names]
+    if more:
+        raise LogError(
+            f"{path}:{line}: column {more[0]!r} belongs to no axis of the layout, which has {len(names)} "
+            f"({names[0]} ... {names[-1]}); the log has {len(names) + len(more)}: name its layout with --layout, or take the column out"
         )
     if "t_s" not in header:
         raise LogError(f"{path}:{line}: column 't_s' is missing, found {', '.join(header)}; want the time in seconds")

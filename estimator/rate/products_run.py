@@ -1,10 +1,9 @@
 """From samples to states: start, standstill, the taking back of unnoticed turns, two signs at once; compiled.
 
 A turn begins before the detector sees it. The filter keeps its states of the last 128 samples of standstill, every
-eighth; when a turn is noticed it goes back to where that began and runs those samples again as turning.
-
-A start while turning: the products give omega but for its sign. Two filters run, one for each sign, until what they
-say of omega' and of gravity's turn tells them apart (E-46).
+eighth; when a turn is noticed it goes back to where that began and runs those samples again as turning. At a start
+while turning the products give omega but for its sign. Two filters run, one for each sign, until what they say of
+omega' and of gravity's turn tells them apart (E-46).
 """
 
 import numpy as np
@@ -49,7 +48,6 @@ LONGEST_GAP_S = 0.5  # s; after a longer one the rate is unknown
 UNKNOWN_RATE = 10.0  # rad/s, sigma before any standstill
 ALWAYS_UNLIKE = 50  # samples in a row whose force was refused, after which u and the pivot are found anew
 DECIDED = 14.0  # log of the likelihood ratio of two signs at which one is dropped: one wrong in a million
-
 
 # All that one filter remembers, beside the detector's Watch.
 MEMORY = np.dtype(
