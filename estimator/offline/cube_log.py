@@ -129,7 +129,8 @@ def _unit(path: Path, line: int, header: list[str], names: Sequence[str]) -> str
     if more:
         raise LogError(
             f"{path}:{line}: column {more[0]!r} belongs to no axis of the layout, which has {len(names)} "
-            f"({names[0]} ... {names[-1]}); the log has {len(names) + len(more)}: name its layout with --layout, or take the column out"
+            f"({names[0]} ... {names[-1]}); the log has {len(names) + len(more)}: name its layout with "
+            f"--layout, or take the column out"
         )
     if "t_s" not in header:
         raise LogError(f"{path}:{line}: column 't_s' is missing, found {', '.join(header)}; want the time in seconds")
