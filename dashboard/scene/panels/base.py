@@ -1,5 +1,6 @@
 """What every panel gets and must do."""
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +11,9 @@ import viser
 from dashboard.scene.chart import Chart, Curve, Shade
 from dashboard.scene.palette import estimator_colour, estimator_title
 from dashboard.scene.store import Device, Store
+from messages import gyrofree_pb2 as pb
+
+log = logging.getLogger(__name__)
 
 DEG = 180.0 / np.pi
 
@@ -45,6 +49,17 @@ class Panel:
         self.client, self.folder = client, folder
         self._charts: dict[str, Chart] = {}
         self._order = 0.0
+
+    def order_estimator(self, title: str, command: pb.EstimatorCommand) -> None:
+        """Give the order and show the person who pressed the button what came of it."""
+        try:
+            reply = self.feed.estimator(command)
+            text, good = reply.message, reply.ok
+        except Exception as error:  # shown to the person who pressed the button
+            log.warning("%s: %s", title, error)
+            text, good = str(error), False
+        title = title if good else "The estimator did not do it"
+        self.client.add_notification(title, text, color="teal" if good else "red", auto_close_seconds=8.0)
 
     def chart(self, key: str, title: str, unit: str, height: int = 170, digits: int = 1) -> Chart:
         """The chart of this key, made at first use below the ones before it."""

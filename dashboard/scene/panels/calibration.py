@@ -1,6 +1,5 @@
 """The guided calibration: which pose next, is it being taken, is it good enough, save. Orders are for operators."""
 
-import logging
 
 import numpy as np
 import viser
@@ -8,8 +7,6 @@ import viser
 from dashboard.scene.palette import AXES, GREEN, escape, number, rgba, rows
 from dashboard.scene.panels.base import Panel, Snapshot
 from messages import gyrofree_pb2 as pb
-
-log = logging.getLogger(__name__)
 
 MG = 1e3 / 9.80665  # mg per m/s^2
 GONE_S = 3.0  # s without a word of a running calibration
@@ -89,14 +86,7 @@ class Calibration(Panel):
 
     def _order(self, action: int) -> None:
         command = pb.EstimatorCommand(action=action, device=self._device)
-        try:
-            reply = self.feed.estimator(command)
-            text, good = reply.message, reply.ok
-        except Exception as error:  # shown to the person who pressed the button
-            log.warning("calibration: %s", error)
-            text, good = str(error), False
-        title = "Calibration" if good else "The estimator did not do it"
-        self.client.add_notification(title, text, color="teal" if good else "red", auto_close_seconds=8.0)
+        self.order_estimator("Calibration", command)
 
 
 def content(m: pb.CalibrationStatus, gone: bool, dark: bool, card: str) -> str:

@@ -1,6 +1,5 @@
 """Navigation filters against each other: the map, the race on unseen fixes, and the button that takes GNSS away."""
 
-import logging
 
 import numpy as np
 import viser
@@ -17,8 +16,6 @@ from dashboard.scene.store import (
     NAV_SIGMA_POSITION,
 )
 from messages import gyrofree_pb2 as pb
-
-log = logging.getLogger(__name__)
 
 OUTAGE_S = 30.0
 
@@ -111,14 +108,7 @@ class Navigation(Panel):
     def _order(self) -> None:
         seconds = 0.0 if self._muted else OUTAGE_S
         command = pb.EstimatorCommand(action=pb.EstimatorCommand.ACTION_MUTE_GNSS, device=self._device, seconds=seconds)
-        try:
-            reply = self.feed.estimator(command)
-            text, good = reply.message, reply.ok
-        except Exception as error:  # shown to the person who pressed the button
-            log.warning("outage: %s", error)
-            text, good = str(error), False
-        title = "GNSS outage" if good else "The estimator did not do it"
-        self.client.add_notification(title, text, color="teal" if good else "red", auto_close_seconds=8.0)
+        self.order_estimator("GNSS outage", command)
 
 
 def _rms(rows: np.ndarray) -> float:
