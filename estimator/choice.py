@@ -13,9 +13,9 @@ class UnknownEstimator(ValueError):
 
 def rate_estimators() -> dict[str, Any]:
     """The table of rate estimators."""
-    from estimator.rate.estimators import ESTIMATORS  # here: the tables of names need not load with the settings
+    from estimator.rate.estimators import VARIANTS  # here: the tables of names need not load with the settings
 
-    return ESTIMATORS
+    return VARIANTS
 
 
 def check_names(key: str, names: list[str], known: dict[str, Any]) -> None:

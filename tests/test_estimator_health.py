@@ -7,7 +7,7 @@ from scipy.linalg import null_space
 from estimator.layouts.layout import CUBE, LAYOUTS, products
 from estimator.rate import parity
 from estimator.rate.board import RateBoard
-from estimator.rate.estimators import ESTIMATORS
+from estimator.rate.estimators import VARIANTS
 from estimator.rate.health import AxisState, HealthMonitor
 from estimator.service import Pipeline
 from estimator.settings import EstimatorSettings
@@ -221,7 +221,7 @@ class Told:
 def test_estimators_are_told_which_axes_to_leave_out(monkeypatch):
     table = TableTest(1)
     faults = Faults([parse("a21:saturated@6-6.5", NAMES)])
-    monkeypatch.setitem(ESTIMATORS, "told", Told)
+    monkeypatch.setitem(VARIANTS, "told", Told)
     board = RateBoard("cube", table.layout, ["told"], 200.0)
     for number in range(2):
         block = faults.into(table.block(number))

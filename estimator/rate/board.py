@@ -34,11 +34,11 @@ class RateBoard:
     def __init__(
         self, device: str, layout: Any, names: list[str], rate_limit_hz: float, card: Any | None = None
     ) -> None:
-        """Names are keys of estimator.rate.ESTIMATORS; card: calibration card of the device, or None.
+        """Names are keys of estimator.rate.estimators.VARIANTS; card: calibration card of the device, or None.
 
         Raises CardError for the card of another layout.
         """
-        from estimator.rate.estimators import ESTIMATORS  # here: loads only where accelerometers are
+        from estimator.rate.estimators import VARIANTS  # here: loads only where accelerometers are
 
         self.device = device
         self.card = card
@@ -46,7 +46,7 @@ class RateBoard:
         self.layout = layout if card is None else card.layout(layout)
         self.stream = Stream()
         self.last: dict[str, Any] = {}  # newest RateState by estimator
-        self._make = {name: ESTIMATORS[name] for name in names}
+        self._make = {name: VARIANTS[name] for name in names}
         self.cost_ns = dict.fromkeys(names, 0)  # spent in each estimator, and for how many samples
         self.cost_samples = dict.fromkeys(names, 0)
         self._limit = rate_limit_hz

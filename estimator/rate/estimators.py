@@ -268,7 +268,27 @@ class MovingHorizonRate(ProductsRate):
     with_bound = False
 
 
+class FreeBodyRate(ProductsRate):
+    """Estimator "products-free": for a body in a vehicle, which turns about any axis and whose centre accelerates."""
+
+    name = "products-free"
+    with_bound = False
+
+    def __init__(
+        self,
+        layout: Layout,
+        config: products_ekf.Config = products_ekf.Config(fixed_axis=False, gravity_aid=False),
+        calibration: str = "",
+    ) -> None:
+        """Raises GeometryError when the layout does not see angular acceleration and specific force."""
+        super().__init__(layout, config, calibration)
+
+
 ESTIMATORS: dict[str, Any] = {
     estimator.name: estimator
     for estimator in (LeastSquaresRate, ProductsRate, UnscentedRate, RecursiveLeastSquaresRate, MovingHorizonRate)
 }
+"""For a body on its table; compared with each other everywhere."""
+
+VARIANTS: dict[str, Any] = {**ESTIMATORS, FreeBodyRate.name: FreeBodyRate}
+"""Everything that [estimator] rate may name."""
