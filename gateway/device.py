@@ -22,10 +22,12 @@ from gateway.batch import Batch, Index, Joiner
 from gateway.clock import DeviceClock
 from gateway.faults import SKEW_WINDOW_S, FaultWatch
 from gateway.gnss_link import GnssLink
+from gateway.keeper import Keeper
 from gateway.link_report import LinkReport
 from gateway.orders import Orders
 from gateway.pps import PpsClock
 from gateway.reader import Chunk, Reader
+from gateway.resume import REACH_BYTES, Past, newest, resume
 from gateway.settings import DeviceSettings, GatewaySettings
 from gateway.tacho import Tachometer
 from messages import gyrofree_pb2 as pb
@@ -52,8 +54,10 @@ class DeviceLink:
     `run` returns when `stop` is set, at once after `wake`. Raises JournalBusy when another gateway has the journal.
     """
 
-    def __init__(self, device: DeviceSettings, settings: GatewaySettings) -> None:
+    def __init__(self, device: DeviceSettings, settings: GatewaySettings, keeper: Keeper | None = None) -> None:
         self.device = device
+        self.keeper = keeper or Keeper()
+        self.past: Past | None = None  # what an earlier life has published, while its last bytes are decoded again
         self.name = device.name
         self._put: Put | None = None  # None: there is no bus yet
         self._next_put: Put | None = None
@@ -82,19 +86,22 @@ class DeviceLink:
         self._flags = 0
         self._tacho_said_us = 0
         self._index: dict[type, Index] = {}
-        self._lacking: list[int] = []  # inputs that an analogue board does not send though settings want them
         self._repeated = 0  # wire's stale mask of the newest frame
         self._fresh = False  # a value has come from a sensor since boot
-        self._last_row: list[float] | None = None  # specific force of the newest sample, as read
+        self._force = samples.Force()
+        self._adc = samples.Analogue(device.name, device.analogue)
         self._joiner: dict[type, Joiner] = {kind: Joiner() for kind in samples.KINDS}
 
     def run(self, stop: threading.Event) -> None:
         """Open the ports, journal, count, and publish once live, until `stop` is set."""
-        device = self.device
-        self.readers = [Reader(device.port, device.baud, BOARD, self.journal, self.queue)]
-        if device.gnss_port:
-            self.readers.append(Reader(device.gnss_port, device.gnss_baud, GNSS, self.journal, self.queue))
+        ports = [(self.device.port, self.device.baud, BOARD)]
+        if self.device.gnss_port:
+            ports.append((self.device.gnss_port, self.device.gnss_baud, GNSS))
+        left = newest(self.journal.tail(REACH_BYTES)) if self.keeper.holds(self.device.port) else []
+        self.readers = [Reader(*port, self.journal, self.queue, self.keeper) for port in ports]
         try:
+            if self._next_put is not None:
+                resume(self, self._next_put, left)
             self._loop(stop)
         finally:
             for reader in self.readers:
@@ -133,6 +140,10 @@ class DeviceLink:
         """Publish from now on what is read from now on: put(topic, device, message), which must not block."""
         self._next_put = put
         self.queue.put(None)  # behind the chunks that were read without a bus
+
+    def publish_with(self, put: Put | None, past: Past | None = None) -> None:
+        """On the decoding thread: what is decoded from here on goes there, or nowhere, but samples that `past` has."""
+        self._put, self.past = put, past
 
     def wake(self) -> None:
         """Let `run` look at its stop event now."""
@@ -228,7 +239,7 @@ class DeviceLink:
         self.pps.reset()
         self.tacho.reset()
         self.gnss.restart()
-        self._index, self._last_row = {kind: Index() for kind in samples.KINDS}, None
+        self._index, self._force = {kind: Index() for kind in samples.KINDS}, samples.Force()
         self._tacho_said_us, self._repeated, self._fresh = 0, 0, False
 
     def _take_samples(self, frame: Frame, payload: samples.Samples, received_ns: int) -> None:
@@ -246,26 +257,14 @@ class DeviceLink:
             # One repeated value is the beat of two clocks of one nominal rate; two frames of them are a slow sensor.
             batch.stale_mask = convert.stale_axes(payload.stale_mask & self._repeated, payload.sensor_mask)
             self._repeated = payload.stale_mask
-            batch.columns = self._accel_columns(payload, lost)
+            batch.columns = self._force.columns(payload, self.hello, lost)
         elif isinstance(payload, Imu6):
             batch.columns = convert.imu_si(payload)
         else:
             batch.kind = samples.adc_kind(payload, self.device.analogue)
-            batch.columns, lacking = samples.adc_columns(payload, self.device.analogue)
-            if lacking and lacking != self._lacking:
-                log.warning("%s: no counts of inputs %s: see [gateway.devices.analogue]", self.name, lacking)
-            self._lacking = lacking
-        self._send(type(payload), self._joiner[type(payload)].add(batch))
-
-    def _accel_columns(self, payload: Acc12, lost: int) -> tuple[list[int], list[float]]:
-        """Counts as read, and specific force brought to the samples' instants."""
-        counts = [count for row in payload.counts for count in row]
-        force = convert.specific_force(counts, convert.axis_scales(self.hello))
-        before, self._last_row = None if lost else self._last_row, force[-12:]
-        offsets = convert.read_offsets(self.hello)
-        if offsets:
-            force = convert.at_the_instant(force, before, offsets, payload.period_ns * 1e-9)
-        return counts, force
+            batch.columns = self._adc.columns(payload)
+        if self.past is None or not self.past.has(type(payload), frame.epoch, batch):
+            self._send(type(payload), self._joiner[type(payload)].add(batch))
 
     def _send(self, kind: type, batches: list[Batch]) -> None:
         for batch in batches:

@@ -33,8 +33,9 @@ class PortEnd(PortError):
 class Port:
     """An open source of bytes. `owner` keeps the object alive that owns the descriptor."""
 
-    def __init__(self, url: str, fd: int, owner: object, is_file: bool = False) -> None:
+    def __init__(self, url: str, fd: int, owner: object, is_file: bool = False, keepable: bool = True) -> None:
         self.url = url
+        self.keepable = keepable  # its descriptor is all there is to it: another process can go on with that
         self._fd = fd
         self._owner = owner
         self._is_file = is_file
@@ -89,6 +90,21 @@ def open_port(url: str, baud: int = 921600) -> Port:
         case "file":
             return _open_file(url)
     raise ValueError(f"port {url!r}: scheme {scheme!r} unknown; want a path, tcp://, rfc2217:// or file:///")
+
+
+class _Descriptor:
+    """Owns what another process opened."""
+
+    def __init__(self, fd: int) -> None:
+        self._fd = fd
+
+    def close(self) -> None:
+        os.close(self._fd)
+
+
+def adopt_port(url: str, fd: int) -> Port:
+    """A port that another process opened with `open_port`, with its settings and the bytes that wait in it."""
+    return Port(url, fd, _Descriptor(fd), stat.S_ISREG(os.fstat(fd).st_mode))
 
 
 def _remedy(url: str, code: int | None) -> str:
@@ -197,4 +213,4 @@ def _open_rfc2217(url: str, baud: int) -> Port:
     except (serial.SerialException, OSError, ValueError) as error:
         raise PortError(f"{url}: {error}; is the RFC 2217 server up, the port right?") from None
     pump = _Pump(remote)
-    return Port(url, pump.out, pump)
+    return Port(url, pump.out, pump, keepable=False)

@@ -12,7 +12,8 @@ import threading
 import time
 from dataclasses import dataclass
 
-from gateway.ports import Port, PortEnd, PortError, open_port
+from gateway.keeper import Keeper
+from gateway.ports import Port, PortEnd, PortError, adopt_port, open_port
 from messages.journal import Journal
 
 log = logging.getLogger(__name__)
@@ -34,7 +35,13 @@ class Reader:
     """Reads one port on its own thread into `out`; journals first."""
 
     def __init__(
-        self, url: str, baud: int, channel: int, journal: Journal, out: "queue.SimpleQueue[Chunk | None]"
+        self,
+        url: str,
+        baud: int,
+        channel: int,
+        journal: Journal,
+        out: "queue.SimpleQueue[Chunk | None]",
+        keeper: Keeper,
     ) -> None:
         self.url = url
         self.baud = baud
@@ -44,6 +51,7 @@ class Reader:
         self._opened = 0
         self._channel = channel
         self._journal = journal
+        self._keeper = keeper
         self._out = out
         self._port: Port | None = None
         self._stop = threading.Event()
@@ -70,7 +78,7 @@ class Reader:
         retry_s = FIRST_RETRY_S
         while not self._stop.is_set():
             try:
-                port = open_port(self.url, self.baud)
+                port = self._open()
             except (PortError, ValueError) as error:
                 self._say(str(error))
                 self._stop.wait(retry_s)
@@ -93,7 +101,16 @@ class Reader:
                 self._stop.wait(FIRST_RETRY_S)  # a port that opens and closes at once must not spin
             finally:
                 self.connected, self._port = False, None
+                self._keeper.drop(self.url)
                 port.close()
+
+    def _open(self) -> Port:
+        """The port, as an earlier life of this gateway left it or newly opened. Raises PortError, ValueError."""
+        left = self._keeper.take(self.url)
+        port = open_port(self.url, self.baud) if left is None else adopt_port(self.url, left)
+        if port.keepable and left is None:
+            self._keeper.keep(self.url, port.fileno())
+        return port
 
     def _read_until_lost(self, port: Port) -> None:
         poller = select.poll()

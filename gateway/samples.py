@@ -1,5 +1,7 @@
 """Batches of samples as bus messages."""
 
+import logging
+
 from google.protobuf.message import Message
 
 from firmware_protocol.frames import Acc12, Adc, Hello, Imu6
@@ -8,17 +10,45 @@ from gateway.batch import Batch
 from messages import gyrofree_pb2 as pb
 from messages.topics import ACCEL, ADC, IMU, Topic
 
+log = logging.getLogger(__name__)
+
 Samples = Acc12 | Imu6 | Adc
 KINDS: tuple[type, ...] = (Acc12, Imu6, Adc)
 
 
-def adc_columns(
-    payload: Adc, settings: analogue.AnalogueSettings
-) -> tuple[tuple[list[int], list[float], list[float]], list[int]]:
-    """(counts, specific force, rate), flat, and the inputs that the board does not send though settings want them."""
-    counts = [count for row in payload.counts for count in row]
-    lacking = analogue.missing(payload, settings)
-    return (counts, *(([], []) if lacking else analogue.imu_of(payload, settings))), lacking
+class Force:
+    """Columns of ACC12 frames; knows the sample before, for boards that read their axes one after the other."""
+
+    def __init__(self) -> None:
+        self._last_row: list[float] | None = None  # specific force of the newest sample, as read
+
+    def columns(self, payload: Acc12, hello: Hello | None, lost: int) -> tuple[list[int], list[float]]:
+        """Counts as read, and specific force (m/s²) brought to the samples' instants; lost: samples before these."""
+        counts = [count for row in payload.counts for count in row]
+        force = convert.specific_force(counts, convert.axis_scales(hello))
+        before, self._last_row = None if lost else self._last_row, force[-12:]
+        offsets = convert.read_offsets(hello)
+        if offsets:
+            force = convert.at_the_instant(force, before, offsets, payload.period_ns * 1e-9)
+        return counts, force
+
+
+class Analogue:
+    """Columns of ADC frames."""
+
+    def __init__(self, name: str, settings: analogue.AnalogueSettings) -> None:
+        self._name, self._settings = name, settings
+        self._lacking: list[int] = []  # inputs that the board does not send though settings want them
+
+    def columns(self, payload: Adc) -> tuple[list[int], list[float], list[float]]:
+        """(counts, specific force, rate), flat; the last two empty while inputs are missing, which is said once."""
+        counts = [count for row in payload.counts for count in row]
+        lacking = analogue.missing(payload, self._settings)
+        if lacking and lacking != self._lacking:
+            log.warning("%s: no counts of inputs %s: see [gateway.devices.analogue]", self._name, lacking)
+        self._lacking = lacking
+        force, rate = ([], []) if lacking else analogue.imu_of(payload, self._settings)
+        return counts, force, rate
 
 
 def adc_kind(payload: Adc, settings: analogue.AnalogueSettings) -> tuple[int, float]:

@@ -14,6 +14,7 @@ from google.protobuf.message import DecodeError
 
 from gateway.device import DeviceLink
 from gateway.identity import claim
+from gateway.keeper import Keeper
 from gateway.settings import DeviceSettings, GatewaySettings
 from messages import gyrofree_pb2 as pb
 from messages.bus import BusSettings, BusUnavailable, Publishers, open_client
@@ -27,13 +28,17 @@ HISTORY_BYTES = 4 << 20  # of records in one reply; who wants more asks on from 
 BUSY_RETRY_S = 0.2  # a journal that another gateway has is asked for again after so long
 
 
-def run(settings: GatewaySettings, bus: BusSettings, stop: threading.Event) -> None:
-    """Serve all boards of the settings until `stop` is set; without a router they are read and journalled."""
+def run(settings: GatewaySettings, bus: BusSettings, stop: threading.Event, keeper: Keeper | None = None) -> None:
+    """Serve all boards of the settings until `stop` is set; without a router they are read and journalled.
+
+    `keeper` has the ports that an earlier life of this gateway left open, and holds those that this one opens.
+    """
     if not settings.devices:
         log.warning("[gateway] has no [[gateway.devices]]: nothing to read; name a board and its port")
     opened: Future[zenoh.Session | None] = Future()
+    keeper = keeper or Keeper()
     threads = [
-        threading.Thread(target=_serve, args=(device, settings, bus.prefix, opened, stop), name=device.name)
+        threading.Thread(target=_serve, args=(device, settings, bus.prefix, opened, stop, keeper), name=device.name)
         for device in settings.devices
     ]
     for thread in threads:
@@ -58,8 +63,10 @@ def run(settings: GatewaySettings, bus: BusSettings, stop: threading.Event) -> N
 class _Line:
     """A board's link on a thread of its own. Raises JournalBusy when another gateway has the journal."""
 
-    def __init__(self, device: DeviceSettings, settings: GatewaySettings, prefix: str, stop: threading.Event) -> None:
-        self.link = DeviceLink(device, settings)
+    def __init__(
+        self, device: DeviceSettings, settings: GatewaySettings, prefix: str, stop: threading.Event, keeper: Keeper
+    ) -> None:
+        self.link = DeviceLink(device, settings, keeper)
         self.publishers = Publishers(None, prefix, self.link.spool)  # keeps what it is given until there is a bus
         self.link.go_live(self.publishers.put)
         self._stop = stop
@@ -90,14 +97,15 @@ def _serve(
     prefix: str,
     opened: "Future[zenoh.Session | None]",
     stop: threading.Event,
+    keeper: Keeper,
 ) -> None:
     """One board until `stop`: read it at once, publish when the session is there and the name is ours."""
     line = None
     try:
-        line = _open_line(device, settings, prefix, stop)
+        line = _open_line(device, settings, prefix, stop, keeper)
         session = opened.result()
         if line is not None and session is not None:
-            _publish(line, device, settings, prefix, session, stop)
+            _publish(line, device, settings, prefix, session, stop, keeper)
     except Exception:
         log.exception("%s: the gateway failed and stops", device.name)
         stop.set()
@@ -107,12 +115,14 @@ def _serve(
             line.close()
 
 
-def _open_line(device: DeviceSettings, settings: GatewaySettings, prefix: str, stop: threading.Event) -> _Line | None:
+def _open_line(
+    device: DeviceSettings, settings: GatewaySettings, prefix: str, stop: threading.Event, keeper: Keeper
+) -> _Line | None:
     """Wait until no other gateway has the journal; None when `stop` came first."""
     said = False
     while not stop.is_set():
         try:
-            return _Line(device, settings, prefix, stop)
+            return _Line(device, settings, prefix, stop, keeper)
         except JournalBusy as busy:
             if not said:
                 log.error("%s: refused: %s; the board is not read until the journal is free", device.name, busy)
@@ -128,6 +138,7 @@ def _publish(
     prefix: str,
     session: zenoh.Session,
     stop: threading.Event,
+    keeper: Keeper,
 ) -> None:
     """Serve the name on the bus until `stop`. Refused, the line is closed, and opened again when the name is free."""
     refused = threading.Event()
@@ -140,7 +151,7 @@ def _publish(
     if token is None:
         return
     queryables = []
-    mine = _open_line(device, settings, prefix, stop) if refused.is_set() else line
+    mine = _open_line(device, settings, prefix, stop, keeper) if refused.is_set() else line
     try:
         if mine is not None:
             link = mine.link

@@ -128,13 +128,14 @@ def gateway(config: Config = None, verbose: Verbose = False) -> None:
     settings = settings_of(config)
 
     from gateway import service
+    from gateway.keeper import Keeper
     from gyrofree.guardian import guard, leave_when_alone
 
-    def body(stop: threading.Event) -> None:
+    def body(stop: threading.Event, keeper: Keeper) -> None:
         leave_when_alone(stop)
-        service.run(settings.gateway, settings.bus, stop)
+        service.run(settings.gateway, settings.bus, stop, keeper)
 
-    guard(lambda: run_service(body, verbose))
+    guard(lambda keeper: run_service(lambda stop: body(stop, keeper), verbose))
 
 
 @app.command()

@@ -1,14 +1,17 @@
-"""A service that must be back at once: a warm process that does nothing but start it again.
+"""A service that must be back at once: a warm process that does nothing but start it again and hold its ports.
 
 A gateway that is killed comes back after the seconds that Python takes to load, and as long its board's samples are
 lost. So `guard` forks: the parent has everything loaded, opens nothing, and waits; the child is the service. When the
-child is killed the next one is there within milliseconds. When the parent is killed, the child goes on for HANDOVER_S,
-until whoever looks after the parent has the next one warm.
+child is killed the next one is there within milliseconds. The child gives the parent every port that it opens
+(SCM_RIGHTS): killed, it leaves them open, the kernel keeps the bytes, and the next child finds them inherited. When the
+parent is killed, the child goes on for HANDOVER_S, until whoever looks after the parent has the next one warm.
 """
 
 import logging
 import os
+import select
 import signal
+import socket
 import sys
 import threading
 import time
@@ -16,21 +19,55 @@ from collections.abc import Callable
 
 import typer
 
+from gateway.keeper import Keeper
+
 HANDOVER_S = 6.0
 LOOK_S = 0.2
 GOOD_LIFE_S = 1.0  # a child that is killed sooner is not started again at once
 KILLED = {signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS}
+WORD_BYTES = 4096  # of one message to the guardian: a sign and the port's name
+KEEP, DROP = b"+", b"-"
 
 log = logging.getLogger(__name__)
 
 
-def guard(serve: Callable[[], None]) -> None:
+class Ward(Keeper):
+    """The child's side: gives its open ports away, and has those that an earlier child left."""
+
+    def __init__(self, line: socket.socket, kept: dict[str, int]) -> None:
+        self._line, self._kept = line, dict(kept)
+
+    def keep(self, url: str, fd: int) -> None:
+        """Hold an open port for whoever comes after us."""
+        self._say(KEEP + url.encode(), fd)
+
+    def drop(self, url: str) -> None:
+        """Let a port go that was lost or closed, so that it can be opened anew."""
+        self._say(DROP + url.encode())
+
+    def take(self, url: str) -> int | None:
+        """Descriptor of a port that an earlier life left open, once; None when there is none."""
+        return self._kept.pop(url, None)
+
+    def holds(self, url: str) -> bool:
+        """True while `take` has something to give."""
+        return url in self._kept
+
+    def _say(self, word: bytes, *descriptors: int) -> None:
+        try:
+            socket.send_fds(self._line, [word], descriptors)
+        except OSError:
+            pass  # the guardian is gone; a port that nobody holds is lost with us, as it always was
+
+
+def guard(serve: Callable[[Keeper], None]) -> None:
     """Run `serve` in a child, again whenever it was killed; raises typer.Exit with its exit code when it ended itself.
 
     To be called with everything imported and before any thread.
     """
     guardian = os.getpid()
     child = [0]
+    kept: dict[str, int] = {}
 
     def forward(number: int, _: object) -> None:
         if child[0]:
@@ -40,11 +77,15 @@ def guard(serve: Callable[[], None]) -> None:
         born = time.monotonic()
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, forward)
+        mine, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         child[0] = os.fork()
         if not child[0]:
-            _be_child(serve, guardian)
-        _, status = os.waitpid(child[0], 0)
+            mine.close()
+            _be_child(serve, guardian, Ward(its, kept))
+        its.close()
+        status = _wait(child[0], mine, kept)
         child[0] = 0
+        mine.close()
         if os.WIFEXITED(status):
             raise typer.Exit(os.WEXITSTATUS(status))
         if os.WTERMSIG(status) not in KILLED:
@@ -52,6 +93,40 @@ def guard(serve: Callable[[], None]) -> None:
         print(f"WARNING killed by {signal.Signals(os.WTERMSIG(status)).name}: starting again", file=sys.stderr)
         if time.monotonic() - born < GOOD_LIFE_S:
             time.sleep(GOOD_LIFE_S)
+
+
+def _wait(child: int, line: socket.socket, kept: dict[str, int]) -> int:
+    """Hold what the child gives until it ends; its wait status. Nothing it said before its end is overlooked."""
+    life = os.pidfd_open(child)
+    poller = select.poll()
+    poller.register(life, select.POLLIN)
+    poller.register(line, select.POLLIN)
+    try:
+        while True:
+            ready = {fd for fd, _ in poller.poll()}
+            if line.fileno() in ready and not _listen(line, kept):
+                poller.unregister(line)
+            if ready == {life}:
+                return os.waitpid(child, 0)[1]
+    finally:
+        os.close(life)
+
+
+def _listen(line: socket.socket, kept: dict[str, int]) -> bool:
+    """One word of the child; False when it can say no more."""
+    try:
+        word, descriptors, _, _ = socket.recv_fds(line, WORD_BYTES, 1)
+    except OSError:
+        return False
+    if not word:
+        return False
+    url = word[1:].decode()
+    old = kept.pop(url, None)
+    if old is not None:
+        os.close(old)
+    if word[:1] == KEEP and descriptors:
+        kept[url] = descriptors[0]
+    return True
 
 
 def leave_when_alone(stop: threading.Event) -> None:
@@ -73,12 +148,12 @@ def leave_when_alone(stop: threading.Event) -> None:
 _guardian = 0  # process id, in the child
 
 
-def _be_child(serve: Callable[[], None], guardian: int) -> None:
+def _be_child(serve: Callable[[Keeper], None], guardian: int, keeper: Keeper) -> None:
     global _guardian
     _guardian = guardian
     code = 0
     try:
-        serve()
+        serve(keeper)
     except typer.Exit as end:
         code = end.exit_code
     except BaseException:

@@ -18,10 +18,11 @@ from collections.abc import Iterator
 from itertools import zip_longest
 from pathlib import Path
 
-from messages.journal_file import SEGMENT_HEAD, SEGMENT_MAGIC, Record, pack, scan
+from messages.journal_file import RECORD_MAGIC, SEGMENT_HEAD, SEGMENT_MAGIC, Record, last_whole, pack, scan
 
 log = logging.getLogger(__name__)
 
+LOOK_BYTES = 1 << 18  # of a segment's end, to find its last record
 RETRY_S = 2.0  # after a failed write the next attempt waits this long
 
 
@@ -144,6 +145,19 @@ class Journal:
                     if total >= max_bytes:
                         return
 
+    def tail(self, max_bytes: int) -> list[Record]:
+        """The newest records, oldest first: those in the last max_bytes of the segments."""
+        found: list[Record] = []
+        for name in reversed(self.segments()):
+            data = _end_of(name, max_bytes)
+            whole = data.startswith(SEGMENT_MAGIC)
+            good = scan(data, SEGMENT_HEAD.size if whole else max(0, data.find(RECORD_MAGIC))).records
+            found = [record for _, _, record in good] + found
+            max_bytes -= len(data)
+            if max_bytes <= 0:
+                break
+        return found
+
     # --- segments
 
     def segments(self) -> list[Path]:
@@ -153,12 +167,17 @@ class Journal:
     def _recover(self) -> None:
         """Lock the folder, cut torn tails and find the last sequence. Raises OSError, JournalBusy among them.
 
-        A finished segment may wait for its fdatasync: look at two.
+        A finished segment may wait for its fdatasync: look at two. One that ends with a whole record has no torn tail;
+        reading all of it would take a second in which the board is not read.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         lock = _lock(self.folder)
         try:
             for name in self.segments()[-2:]:
+                last = last_whole(_end_of(name, LOOK_BYTES))
+                if last is not None:
+                    self.last_seq = max(self.last_seq, last)
+                    continue
                 data = name.read_bytes()
                 found = scan(data)
                 end = min(found.good_end, len(data))
@@ -294,6 +313,16 @@ def _lock(folder: Path) -> int:
     except OSError as error:  # a file system without locks, as some network ones: better a journal than none
         log.warning("journal %s: cannot be locked (%s): let only one gateway write it", folder, error.strerror)
     return lock
+
+
+def _end_of(name: Path, n: int) -> bytes:
+    """The last n bytes of a file; nothing when it has gone."""
+    try:
+        with name.open("rb") as stream:
+            stream.seek(max(0, os.fstat(stream.fileno()).st_size - n))
+            return stream.read()
+    except FileNotFoundError:
+        return b""
 
 
 def first_of(name: Path) -> int:

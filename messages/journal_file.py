@@ -86,6 +86,16 @@ def scan(data: bytes, start: int = SEGMENT_HEAD.size) -> Scan:
     return Scan(records, damaged)
 
 
+def last_whole(data: bytes) -> int | None:
+    """Sequence of the record that ends where `data` ends; None when none does: a torn tail, or one longer than that."""
+    start = len(data)
+    while (start := data.rfind(RECORD_MAGIC, 0, start)) >= 0:
+        found = unpack_at(data, start)
+        if found:
+            return found[0].sequence if found[1] == len(data) else None
+    return None
+
+
 def records(data: bytes) -> Iterator[Record]:
     """Good records of concatenated record bytes, as a history reply carries them."""
     for _, _, record in scan(data, 0).records:

@@ -35,7 +35,7 @@ class DeviceCertificate(BaseModel):
     complete: bool = True  # nothing lost or damaged on the bus, no sample lost on the line, never dark
     topics: dict[str, TopicCertificate] = {}
     wire: dict[str, int] = {}  # counters of LinkStatus over the session
-    dark_s: float = 0.0  # s, between two gateways' runs, by the board's clock
+    dark_s: float = 0.0  # s, by the board's clock, that nobody read it between two gateways' runs
 
 
 def certify(keys: dict[str, KeyCount], wire: dict[str, dict[str, int]]) -> dict[str, DeviceCertificate]:

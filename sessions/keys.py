@@ -13,7 +13,8 @@ class KeyState:
 
     __slots__ = (
         "channel", "device", "foreign", "last_run", "last_sequence", "sources",
-        "messages", "lost", "restarts", "repeated", "unreadable", "repaired", "dark_us", "_last_us", "_last_epoch",
+        "messages", "lost", "restarts", "repeated", "unreadable", "repaired", "dark_us", "_last_us", "_step_us",
+        "_last_epoch",
     )  # fmt: skip
 
     def __init__(self, channel: int, address: Address) -> None:
@@ -22,7 +23,7 @@ class KeyState:
         type_ = address.topic.type
         self.foreign = None if "header" in type_.DESCRIPTOR.fields_by_name else type_  # foxglove: time, no Header
         self.messages = self.lost = self.restarts = self.repeated = self.unreadable = 0  # plain: once per message
-        self.repaired = self.dark_us = self._last_us = 0
+        self.repaired = self.dark_us = self._last_us = self._step_us = 0
         self._last_epoch: int | None = None
         self.last_run: int | None = None
         self.last_sequence = 0
@@ -62,13 +63,17 @@ class KeyState:
             jump = sequence - self.last_sequence
             if run != self.last_run or jump < 0:
                 self.restarts += 1
-                if header.epoch == self._last_epoch:  # the same boot: the board's own clock says how long nobody spoke
-                    self.dark_us += max(0, header.device_us - self._last_us)
+                # The same boot: the board's own clock says how long nobody spoke. One that took the port over as it
+                # was goes on at the usual step.
+                gap = header.device_us - self._last_us
+                if header.epoch == self._last_epoch and gap > 2 * self._step_us:
+                    self.dark_us += gap - self._step_us
             elif jump == 0:
                 self.repeated += 1
             else:
                 self.lost += jump - 1
         self.last_run, self.last_sequence = run, sequence
+        self._step_us = max(0, header.device_us - self._last_us)
         self._last_epoch, self._last_us = header.epoch, header.device_us
         self.sources.add(header.source)
         return header.utc_ns

@@ -33,7 +33,9 @@ class KeyCount(BaseModel):
     repeated: int = 0  # the same header.sequence twice running
     unreadable: int = 0  # payloads without a readable header; recorded all the same
     repaired: int = 0  # of `messages`, filled in from what their publisher had kept
-    dark_s: float = 0.0  # s, by the board's clock, between the last message of one publisher and the first of the next
+    dark_s: float = (
+        0.0  # s, by the board's clock, that nobody spoke between one publisher's last message and the next's
+    )
     last_run: int = 0  # of the newest message: where the session after a crash goes on
     last_sequence: int = 0
 
