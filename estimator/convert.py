@@ -193,7 +193,7 @@ def pose_message(header: pb.Header, name: str, p_n_m: Iterable[float], q_nb: Ite
 
 
 def nav_message(
-    header: pb.Header, batch: pb.ImuBatch, index: int, name: str, s: Solution, muted: bool = False
+    header: pb.Header, batch: pb.ImuBatch | pb.AccelBatch, index: int, name: str, s: Solution, muted: bool = False
 ) -> pb.NavSolution:
     """Solution as published."""
     return pb.NavSolution(

@@ -21,6 +21,7 @@ from estimator.calibration.card import CardError
 from estimator.choice import UnknownEstimator, check_names, load_card, make_layout, rate_estimators
 from estimator.cost import Cost
 from estimator.ins.board import NavBoard, NavOutput
+from estimator.ins.gyro_free import GyroFreeNavigation
 from estimator.ins.navigation import NAVIGATORS, Correction, Mode, NavigatorConfig
 from estimator.orders import CalibrationDesk
 from estimator.rate.board import RateBoard, WrongAxes
@@ -81,6 +82,9 @@ class Pipeline:
         check_names("rate", settings.rate, rate_estimators())
         check_names("navigators", settings.navigators, NAVIGATORS)
         check_names("attitudes", settings.attitudes, ATTITUDES)
+        check_names("gyro_free_navigation", settings.gyro_free_navigation, NAVIGATORS)
+        if settings.gyro_free_navigation:
+            check_names("gyro_free_rate", [_believed(settings)], dict.fromkeys(settings.rate))
         for layout in (settings.layout, *settings.layouts.values()):
             if layout.file:  # a wrong file is refused at the start, not at the first sample
                 make_layout(layout)
@@ -90,6 +94,7 @@ class Pipeline:
         self._clock = clock
         self._boards: dict[str, RateBoard] = {}
         self._vehicles: dict[str, NavBoard] = {}
+        self._gyro_free: dict[str, GyroFreeNavigation] = {}
         self._attitudes: dict[str, AttitudeBoard] = {}
         self._clock_offset: dict[str, float] = {}
         self._desk = CalibrationDesk(settings.cards)
@@ -112,7 +117,7 @@ class Pipeline:
         return reply, [] if status is None else [Output(CALIBRATION, device, "", status)]
 
     def _mute(self, command: pb.EstimatorCommand) -> pb.Reply:
-        board = self._vehicles.get(command.device)
+        board = self._navigating(command.device)
         if board is None:
             return pb.Reply(ok=False, message=f"{command.device} does not navigate: it has sent no inertial samples")
         try:
@@ -163,6 +168,11 @@ class Pipeline:
         status = self._desk.feed(batch, samples, board.wiring)
         if status is not None:
             out.append(Output(CALIBRATION, device, "", status))
+        self._clock_offset[device] = batch.header.utc_ns * 1e-9 - batch.header.device_us * 1e-6
+        navigation = self._gyro_free.get(device)
+        if navigation is not None:
+            said = navigation.feed(batch.header.epoch, batch.period_s, samples.t_s, states)
+            out += self._navigated(batch, samples, navigation.board, said, navigation.names)
         return out
 
     def _board(self, device: str) -> RateBoard:
@@ -196,7 +206,7 @@ class Pipeline:
 
     def _navigated(
         self,
-        batch: pb.ImuBatch,
+        batch: pb.ImuBatch | pb.AccelBatch,
         samples: convert.Samples,
         board: NavBoard,
         said: list[NavOutput],
@@ -216,7 +226,7 @@ class Pipeline:
             out.append(Output(NAV, device, o.estimator, nav))
             pose = convert.pose_message(header, o.estimator, o.what.p_ned, o.what.q_nb)
             out.append(Output(POSE, device, o.estimator, pose))
-        if self._new_second(device, "nav", samples.t_s[-1]):
+        if board.navigators and self._new_second(device, "nav", samples.t_s[-1]):
             header = convert.sample_header(batch.header, (len(samples.t_s) - 1) * batch.period_s)
             for name in names:
                 out.append(Output(ESTIMATOR, device, name, self._nav_status(header, board, name)))
@@ -237,11 +247,24 @@ class Pipeline:
     def on_gnss(self, message: pb.GnssFix) -> list[Output]:
         """Keep the fix; its corrections come out of on_imu, when samples have passed its arrival."""
         device = message.header.device
-        board = self._vehicles.get(device)
-        if board is not None:
+        if device in self._boards and device not in self._gyro_free and self._settings.gyro_free_navigation:
+            self._gyro_free[device] = self._gyro_free_navigation(device)
+        board = self._navigating(device)
+        if board is not None and device in self._clock_offset:
             fix = convert.fix_of(message, self._settings.use_every_fix, self._clock_offset[device])
             board.fix(fix)
         return []
+
+    def _navigating(self, device: str) -> NavBoard | None:
+        """Where fixes of a device go: its inertial unit, else its accelerometers where that is asked for."""
+        gyro_free = self._gyro_free.get(device)
+        return self._vehicles.get(device, gyro_free.board if gyro_free else None)
+
+    def _gyro_free_navigation(self, device: str) -> GyroFreeNavigation:
+        s = self._settings
+        config = NavigatorConfig(lever_arm_b=s.vehicle_of(device).lever_arm_b_m)
+        names = s.gyro_free_navigation
+        return GyroFreeNavigation(device, config, names, s.nav_limit_hz, _believed(s), s.rate_limit_hz)
 
     def _nav_status(self, header: pb.Header, board: NavBoard, name: str) -> pb.EstimatorStatus:
         status = self._status(header, board.stream, name)
@@ -278,6 +301,11 @@ class Pipeline:
             us_per_sample=self._cost.take(header.device, name),
             version=VERSION,
         )
+
+
+def _believed(settings: EstimatorSettings) -> str:
+    """The rate estimator that feeds navigation."""
+    return settings.gyro_free_rate or (settings.rate or [""])[0]
 
 
 def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) -> None:

@@ -41,6 +41,8 @@ class EstimatorSettings(BaseModel):
 
     rate: list[str] = Field(default_factory=lambda: ["products-ekf", "least-squares"])  # gyro-free rate estimators
     navigators: list[str] = Field(default_factory=lambda: ["huber-nhc", "kf", "fpe-fuzzy"])  # the first leads
+    gyro_free_navigation: list[str] = Field(default_factory=list)  # filters on a cube's own rate, where it has GNSS
+    gyro_free_rate: str = ""  # the rate estimator whose word they take; empty: the first of rate
     attitudes: list[str] = Field(default_factory=lambda: ["vqf", "tilt-vector", "tilt-published"])  # tilt of six axes
     layout: LayoutSettings = LayoutSettings()  # of a device that layouts does not name
     layouts: dict[str, LayoutSettings] = Field(default_factory=dict)  # by device name

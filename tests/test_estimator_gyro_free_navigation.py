@@ -6,7 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from estimator.ins.gyro_free import NOISE, GyroFreeNavigation, config_of, position_error
+from estimator.ins.gyro_free import (
+    NOISE,
+    GyroFreeNavigation,
+    attitude_noise,
+    config_of,
+    equivalent_drift,
+    position_error,
+)
 from estimator.ins.navigation import Mode, NavigatorConfig, Solution
 from estimator.layouts.layout import CUBE
 from estimator.rate.board import RateOutput
@@ -43,11 +50,11 @@ def test_estimates_of_a_rate_estimator_are_navigated_with():
     truth, draw = drive.truth, np.random.default_rng(3)
     wander = np.radians(1.0) * np.sin(np.arange(len(truth.t))[:, None] / 700.0 + draw.uniform(0, 6, 3))
     navigation = GyroFreeNavigation("cube", NavigatorConfig(), ["kf"], 10.0, "products-ekf", 200.0)
-    fixes, errors, sigma = list(drive.fixes), [], []
+    fixes, errors, sigma, P = list(drive.fixes), [], [], np.radians(1.0) ** 2 * np.eye(3)
     for k in range(0, len(truth.t) - 10, 10):
         t = drive.imu[k : k + 10, 0]
         said = [
-            RateOutput(i, k + i, name, SimpleNamespace(f_b=truth.f_b[k + i + 1], omega_b=omega))
+            RateOutput(i, k + i, name, SimpleNamespace(f_b=truth.f_b[k + i + 1], omega_b=omega, P=P))
             for i in range(10)
             for name, omega in (
                 ("products-ekf", truth.omega_ib_b[k + i + 1] + (wander[k + i] if t[i] > 21.0 else 0.0)),
@@ -68,6 +75,19 @@ def test_estimates_of_a_rate_estimator_are_navigated_with():
     assert np.sqrt(np.mean(errors[:, 0] ** 2)) < 5.0
     assert np.sqrt(np.mean(errors[:, 1:3] ** 2)) < 1.0
     assert 0.3 < np.mean(sigma) < 3.0
+
+
+def test_process_noise_follows_the_covariance_of_the_rate():
+    P, C_nb = np.diag([0.01, 0.04, 100.0]), np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    noise = attitude_noise(P, C_nb) - NOISE.gyro**2
+    np.testing.assert_allclose(noise, 2.0 * np.array([0.04, 0.01, np.radians(60.0) ** 2]))
+
+
+def test_equivalent_drift_is_the_closed_form_turned_round():
+    d = np.radians([0.0, 0.02, 0.0])
+    error = np.linalg.norm(position_error(np.array([-0.03, 0.0, 0.0]), d, np.array([30.0]))[0])
+    assert equivalent_drift(float(error), 0.03, 30.0) == pytest.approx(d[1])
+    assert equivalent_drift(1.0, 0.03, 30.0) == 0.0
 
 
 def test_a_cube_is_not_taken_for_a_gyro():

@@ -37,10 +37,14 @@ class NavBoard:
         self.device = device
         self.stream = Stream()
         self.navigators: dict[str, Any] = {}
-        self._config, self._names = config, names  # no closures: a process that goes on after a crash pickles this
+        self.config, self._names = config, names  # no closures: a process that goes on after a crash pickles this
         self._limit = limit_hz
         self._newest = -math.inf  # s, time of the newest sample
         self._muted_until = -math.inf
+
+    def make(self, name: str) -> Any:
+        """A new navigator of one of the names."""
+        return NAVIGATORS[name](self.config)
 
     def feed(
         self, epoch: int, first_index: int, period_s: float, t_s: Array, f_b: Array, omega_b: Array
@@ -50,7 +54,7 @@ class NavBoard:
         if admission.restart or not self.navigators:
             if admission.reason:
                 log.warning("%s: %s: navigation starts anew", self.device, admission.reason)
-            self.navigators = {name: NAVIGATORS[name](self._config) for name in self._names}
+            self.navigators = {name: self.make(name) for name in self._names}
         elif admission.missing and worth_a_line(self.stream.gaps):
             log.warning("%s: %d samples missing before %d (gap %d)", self.device, admission.missing, first_index,
                         self.stream.gaps)  # fmt: skip

@@ -129,7 +129,7 @@ class TableTest:
         self._run = [run] if run else []
         self._tilt = tilt
         self._arms = self.layout.r_b + np.asarray(centre_b)
-        self._centre = np.asarray(centre_b, dtype=np.float64)
+        self._centre = self.centre_b = np.asarray(centre_b, dtype=np.float64)  # m, (3,)
         draw = np.random.default_rng([seed, 0])
         self.bias = draw.normal(0.0, 1.0, self.layout.axes) * sensor.bias  # m/s^2, (N,)
         self.scale = 1.0 + draw.normal(0.0, 1.0, self.layout.axes) * sensor.scale_error
