@@ -5,9 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from estimator.attitude import rotation
 from estimator.layouts.layout import CUBE, LAYOUTS, GeometryError, Layout
+from estimator.rate import products_correct as correct
 from estimator.rate import products_kernel as kernel
 from estimator.rate import products_model as model
+from estimator.rate import turns
 from estimator.rate.estimators import ESTIMATORS, LeastSquaresRate, ProductsRate
 from estimator.rate.observed import sensor
 from estimator.rate.products_ekf import Config, ProductsFilter, tuning
@@ -84,25 +87,58 @@ def test_force_jacobian_matches_central_differences(x, alpha):
 @law
 @given(x=states, alpha=vectors, seed=st.integers(0, 99))
 def test_the_kernel_is_the_model_without_its_zeros(x, alpha, seed):
-    """Prediction and both corrections against the same by whole matrices."""
+    """Prediction and all three corrections against the same by whole matrices."""
     s, t, dt = sensor(LAYOUTS["edges-12"](0.05), 0.04), tuning(Config()), 0.01
     root = np.random.default_rng(seed).normal(size=(22, 22)) * 0.1
     P = root @ root.T
     F = model.transition_jacobian(x, model.transition(x, alpha, s.SQ, dt, True), s.SQ, dt, True)
     mine, mine_P = x.copy(), P.copy()
-    kernel.predict(mine, mine_P, alpha, np.eye(3), dt, True, s, np.zeros(3))
+    none = (0.0, 0.0, 0.0)
+    kernel.predict(mine, mine_P.reshape(-1), tuple(alpha), (1.0, 0.0, 0.0, 1.0, 0.0, 1.0), dt, True, s, none)
     np.testing.assert_allclose(mine, model.transition(x, alpha, s.SQ, dt, True), atol=1e-12)
     np.testing.assert_allclose(mine_P, F @ P @ F.T, atol=1e-9)
+    assert (mine_P == mine_P.T).all()
     mean, spread = model.products_spread(P)
     H, y = model.measured_products_jacobian(x, s.M), np.arange(6.0)
     C = H @ P @ H.T + s.R_c + spread
     e = y - model.measured_products(x, s.M) - mean
-    mine, mine_P, out = x.copy(), P.copy(), np.zeros(kernel.OUT)
-    t["products_gate"] = np.inf
-    nis, _ = kernel.by_products(mine, mine_P, y, x[:3].copy(), s, t, out)
-    assert nis == pytest.approx(e @ np.linalg.solve(C, e), rel=1e-6)
-    np.testing.assert_allclose(mine, x + P @ H.T @ np.linalg.solve(C, e), rtol=1e-6, atol=1e-6)
-    np.testing.assert_allclose(mine_P, P - P @ H.T @ np.linalg.solve(C, H @ P), atol=1e-8)
+    t["products_gate"] = t["force_gate"] = np.inf
+    out, work, all_y = np.zeros(kernel.OUT), np.zeros(kernel.WORK), np.concatenate([np.zeros(3), y, np.zeros(3)])
+
+    def agrees(call, H, C, e):
+        mine, mine_P = x.copy(), P.copy()
+        said = call(mine, mine_P.reshape(-1))
+        if said is not None:
+            assert said[0] == pytest.approx(e @ np.linalg.solve(C, e), rel=1e-6)
+            assert said[1] == pytest.approx(np.linalg.slogdet(C)[1], abs=1e-8)
+        np.testing.assert_allclose(mine, x + P @ H.T @ np.linalg.solve(C, e), rtol=1e-6, atol=1e-6)
+        np.testing.assert_allclose(mine_P, P - P @ H.T @ np.linalg.solve(C, H @ P), atol=1e-8)
+
+    agrees(lambda x, P: correct.by_products(x, P, work, all_y, tuple(x[:3]), s, t, out), H, C, e)
+    H, p = model.measured_force_jacobian(x, alpha, s.SQ), np.arange(3.0)
+    arm = x[18:21] @ x[18:21] + np.trace(P[18:21, 18:21])
+    C = H @ P @ H.T + s.R_p + (t.centre + arm * s.R_alpha[0, 0]) * np.eye(3)
+    e = p - model.measured_force(x, alpha, s.SQ)
+    agrees(lambda x, P: correct.by_force(x, P, work, tuple(p), tuple(alpha), True, s, t), H, C, e)
+    H, C = np.eye(6, 22), P[:6, :6] + np.diag([t.still_rate] * 3 + [0.0] * 3)
+    C[3:, 3:] += s.R_alpha
+    e = np.concatenate([-x[:3], alpha - x[3:6]])
+    agrees(lambda x, P: correct.by_standstill(x, P, work, tuple(alpha), none, s, t), H, C, e)
+
+
+@law
+@given(v=vectors, scale=st.sampled_from([1e-6, 1e-3, 0.05, 0.1, 1.0]))
+def test_turns_without_arrays_are_those_with(v, scale):
+    turn, other = v * scale, np.array([0.4, -0.2, 0.1, 0.8])
+    q = rotation.from_rotation_vector(turn)
+    np.testing.assert_allclose(turns.quaternion(*turn), q, rtol=1e-14, atol=1e-15)
+    np.testing.assert_allclose(turns.turn_matrix(*turn), rotation.to_dcm(q).ravel(), rtol=1e-13, atol=1e-14)
+    np.testing.assert_allclose(
+        turns.product(tuple(other), tuple(q)), rotation.multiply(other, q), rtol=1e-14, atol=1e-15
+    )
+    up = np.array([0.3, 0.2, 9.7])
+    expected = rotation.tilt_correction(q, up, 1.0)
+    np.testing.assert_allclose(turns.upright(tuple(q), *up), expected, rtol=1e-13, atol=1e-14)
 
 
 def test_spread_of_the_products_is_that_of_random_rates():

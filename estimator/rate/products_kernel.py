@@ -1,21 +1,27 @@
-"""One step of the products filter, compiled, without a copy: prediction, products, gravity, standstill, navigation.
+"""State of one products filter as one flat array; its prediction and its correction, compiled, without a new array.
 
 Model and equations: products_model.py (E-30 to E-39). The functions here are the same with their zeros left out; a test
-compares them. All state of one filter is one flat array, so that it can be put aside and taken back:
+compares them. Corrections: products_correct.py. One flat array can be put aside and taken back:
 
     x (22) | P (22 x 22) | q_nb (4) v_n (3) p_n (3) alpha_m (3) force_n (3) sign_variance
     | biases at rest (12), their variances, those now by scale errors | readings at rest (N)
+
+P is handed on flat, (484,), row by row, and stays symmetric to the bit. Loops run along its rows, which the compiler
+turns into vector instructions; small matrices are tuples, which it keeps in registers.
 """
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from estimator.attitude.rotation import from_rotation_vector, to_dcm
 from estimator.rate.observed import MOST_AXES, Sensor
-from estimator.rate.products_model import FIRST, SECOND, STATES
+from estimator.rate.products_model import STATES
+from estimator.rate.turns import turn_matrix
 
 Array = NDArray[np.float64]
+Three = tuple[float, float, float]
+Six = tuple[float, float, float, float, float, float]
+Nine = tuple[float, float, float, float, float, float, float, float, float]
 
 GRAVITY = 9.80665  # m/s^2, standard
 PP = STATES + STATES * STATES  # where navigation begins
@@ -25,6 +31,12 @@ SIZE = REST + MOST_AXES
 # of the output of a step
 INNOVATION, SIGMA, NIS, USED, FORCE_NIS, FORCE_USED, LIKELIHOOD, OUT = 0, 6, 12, 13, 14, 15, 16, 17
 EKF, UKF, FORGET, HORIZON = range(4)
+# rows of P in (484,): of omega, b_alpha, b_c, u, b_f, the pivot, the angle
+OMEGA, B_ALPHA, B_C, U, B_F, PIVOT, TURNED = 0, 66, 132, 264, 330, 396, 462
+# of the workspace of one filter: rows of H P (6 x 22), C (6 x 6), H (6 x 3), spread (6 x 6), y (6), x and P of before
+ROWS, COV, JACOBIAN, SPREAD, RESIDUAL, BEFORE = 0, 132, 168, 186, 222, 228
+WORK = BEFORE + PP
+FAST = {"contract"}  # a product and a sum in one instruction; not-a-number stays one
 
 
 # Numbers of products_ekf.Config for compiled functions; variances.
@@ -60,249 +72,234 @@ TUNING = np.dtype(
 Tuning = np.record
 
 
-@njit(cache=True, error_model="numpy")
-def absorb(x: Array, P: Array, HP: Array, C: Array, y: Array, k: int, gate: float) -> tuple[float, float]:
-    """Kalman correction in place by k innovations y of covariance C, HP = H P (k, 22): NIS and log det C (E-39).
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def factor(c00: float, c10: float, c11: float, c20: float, c21: float, c22: float) -> Six:
+    """Cholesky factor of a symmetric matrix: 1 / l00, l10, 1 / l11, l20, l21, 1 / l22; not a number without one."""
+    i0 = 1.0 / np.sqrt(c00)
+    l10, l20 = c10 * i0, c20 * i0
+    i1 = 1.0 / np.sqrt(c11 - l10 * l10)
+    l21 = (c21 - l20 * l10) * i1
+    return i0, l10, i1, l20, l21, 1.0 / np.sqrt(c22 - l20 * l20 - l21 * l21)
 
-    HP has a multiple of three rows, those above k zero. C is replaced by its Cholesky factor, HP by L^-1 H P. An
-    innovation beyond the gate changes nothing else.
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def solve(f: Six, y0: float, y1: float, y2: float) -> Three:
+    """L^-1 y."""
+    i0, l10, i1, l20, l21, i2 = f
+    w0 = y0 * i0
+    w1 = (y1 - l10 * w0) * i1
+    return w0, w1, (y2 - l20 * w0 - l21 * w1) * i2
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def absorb_three(x: Array, P: Array, work: Array, gate: float) -> tuple[float, float]:
+    """Kalman correction in place by three innovations: NIS and log det C (E-39).
+
+    work holds H P, C and y. An innovation beyond the gate changes nothing else.
     """
-    logdet, nis, n = 0.0, 0.0, len(x)
-    for i in range(k):
-        for j in range(i + 1):
-            value = C[i, j]
-            for l in range(j):
-                value -= C[i, l] * C[j, l]
-            C[i, j] = np.sqrt(value) if i == j else value / C[j, j]
-        logdet += 2.0 * np.log(C[i, i])
-    for i in range(k):
-        for l in range(i):
-            y[i] -= C[i, l] * y[l]
-        y[i] /= C[i, i]
-        nis += y[i] * y[i]
+    c, y = COV, RESIDUAL
+    f = factor(work[c], work[c + 6], work[c + 7], work[c + 12], work[c + 13], work[c + 14])
+    y0, y1, y2 = solve(f, work[y], work[y + 1], work[y + 2])
+    nis, logdet = y0 * y0 + y1 * y1 + y2 * y2, -2.0 * np.log(f[0] * f[2] * f[5])
     if not nis <= gate:
         return nis, logdet
-    for i in range(k):
-        for l in range(i):
-            f = C[i, l]
-            for j in range(n):
-                HP[i, j] -= f * HP[l, j]
-        f = 1.0 / C[i, i]
-        for j in range(n):
-            HP[i, j] *= f
-            x[j] += HP[i, j] * y[i]
-    for i in range(0, k, 3):  # three at a time: one pass over P for each three
-        for r in range(n):
-            f, g, h = HP[i, r], HP[i + 1, r], HP[i + 2, r]
-            for j in range(n):
-                P[r, j] -= f * HP[i, j] + g * HP[i + 1, j] + h * HP[i + 2, j]
+    G = work[ROWS : ROWS + 3 * STATES]
+    for j in range(STATES):
+        g0, g1, g2 = solve(f, G[j], G[STATES + j], G[2 * STATES + j])
+        G[j], G[STATES + j], G[2 * STATES + j] = g0, g1, g2
+        x[j] += g0 * y0 + g1 * y1 + g2 * y2
+    for r in range(0, STATES, 2):  # two rows at a time: each g is loaded once for both
+        row = STATES * r
+        a0, a1, a2 = G[r], G[STATES + r], G[2 * STATES + r]
+        b0, b1, b2 = G[r + 1], G[STATES + r + 1], G[2 * STATES + r + 1]
+        for j in range(STATES):
+            g0, g1, g2 = G[j], G[STATES + j], G[2 * STATES + j]
+            P[row + j] -= a0 * g0 + a1 * g1 + a2 * g2
+            P[row + STATES + j] -= b0 * g0 + b1 * g1 + b2 * g2
     return nis, logdet
 
 
-@njit(cache=True, error_model="numpy")
-def along_axis(x: Array, fixed: bool, turning: bool) -> Array:
-    """Projection (3, 3) of omega' that is integrated: all of it, none at rest, along omega on a fixed axis (E-45)."""
-    N = np.zeros((3, 3))
-    square = x[0] * x[0] + x[1] * x[1] + x[2] * x[2]
-    for i in range(3):
-        if turning and fixed:
-            for j in range(3):
-                N[i, j] = x[i] * x[j] / square
-        elif turning:
-            N[i, i] = 1.0
-    return N
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def absorb_six(x: Array, P: Array, work: Array, gate: float) -> tuple[float, float]:
+    """The same by six innovations, in two blocks of three. A row of zeros with C = 1 and y = 0 says nothing."""
+    c, y = COV, RESIDUAL
+    f = factor(work[c], work[c + 6], work[c + 7], work[c + 12], work[c + 13], work[c + 14])
+    y0, y1, y2 = solve(f, work[y], work[y + 1], work[y + 2])
+    b00, b01, b02 = solve(f, work[c + 18], work[c + 19], work[c + 20])
+    b10, b11, b12 = solve(f, work[c + 24], work[c + 25], work[c + 26])
+    b20, b21, b22 = solve(f, work[c + 30], work[c + 31], work[c + 32])
+    h = factor(
+        work[c + 21] - b00 * b00 - b01 * b01 - b02 * b02,
+        work[c + 27] - b10 * b00 - b11 * b01 - b12 * b02,
+        work[c + 28] - b10 * b10 - b11 * b11 - b12 * b12,
+        work[c + 33] - b20 * b00 - b21 * b01 - b22 * b02,
+        work[c + 34] - b20 * b10 - b21 * b11 - b22 * b12,
+        work[c + 35] - b20 * b20 - b21 * b21 - b22 * b22,
+    )
+    y3, y4, y5 = solve(
+        h,
+        work[y + 3] - b00 * y0 - b01 * y1 - b02 * y2,
+        work[y + 4] - b10 * y0 - b11 * y1 - b12 * y2,
+        work[y + 5] - b20 * y0 - b21 * y1 - b22 * y2,
+    )
+    nis = y0 * y0 + y1 * y1 + y2 * y2 + y3 * y3 + y4 * y4 + y5 * y5
+    logdet = -2.0 * np.log(f[0] * f[2] * f[5] * h[0] * h[2] * h[5])
+    if not nis <= gate:
+        return nis, logdet
+    n, G = STATES, work[ROWS : ROWS + 6 * STATES]
+    for j in range(STATES):
+        g0, g1, g2 = solve(f, G[j], G[n + j], G[2 * n + j])
+        g3, g4, g5 = solve(
+            h,
+            G[3 * n + j] - b00 * g0 - b01 * g1 - b02 * g2,
+            G[4 * n + j] - b10 * g0 - b11 * g1 - b12 * g2,
+            G[5 * n + j] - b20 * g0 - b21 * g1 - b22 * g2,
+        )
+        G[j], G[n + j], G[2 * n + j], G[3 * n + j], G[4 * n + j], G[5 * n + j] = g0, g1, g2, g3, g4, g5
+        x[j] += g0 * y0 + g1 * y1 + g2 * y2 + g3 * y3 + g4 * y4 + g5 * y5
+    for r in range(0, STATES, 2):
+        row = STATES * r
+        a0, a1, a2, a3, a4, a5 = G[r], G[n + r], G[2 * n + r], G[3 * n + r], G[4 * n + r], G[5 * n + r]
+        k = r + 1
+        d0, d1, d2, d3, d4, d5 = G[k], G[n + k], G[2 * n + k], G[3 * n + k], G[4 * n + k], G[5 * n + k]
+        for j in range(STATES):
+            g0, g1, g2, g3, g4, g5 = G[j], G[n + j], G[2 * n + j], G[3 * n + j], G[4 * n + j], G[5 * n + j]
+            P[row + j] -= a0 * g0 + a1 * g1 + a2 * g2 + a3 * g3 + a4 * g4 + a5 * g5
+            P[row + STATES + j] -= d0 * g0 + d1 * g1 + d2 * g2 + d3 * g3 + d4 * g4 + d5 * g5
+    return nis, logdet
 
 
-@njit(cache=True, error_model="numpy")
-def predict(x: Array, P: Array, alpha_m: Array, N: Array, dt: float, turning: bool, s: Sensor, earth_b: Array) -> None:
-    """E-31 and E-32 in place, without process noise; N (3, 3) of omega' is integrated."""
-    n = len(x)
-    A, D = np.eye(3), dt * N
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def along_axis(w0: float, w1: float, w2: float, fixed: bool, turning: bool) -> Six:
+    """Projection N (symmetric: 00 01 02 11 12 22) of omega' that is integrated (E-45).
+
+    All of it, none at rest, only that along omega (rad/s) on a fixed axis.
+    """
+    if not turning:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if not fixed:
+        return 1.0, 0.0, 0.0, 1.0, 0.0, 1.0
+    f = 1.0 / (w0 * w0 + w1 * w1 + w2 * w2)
+    return f * w0 * w0, f * w0 * w1, f * w0 * w2, f * w1 * w1, f * w1 * w2, f * w2 * w2
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def predict(x: Array, P: Array, alpha_m: Three, N: Six, dt: float, turning: bool, s: Sensor, earth_b: Three) -> None:
+    """E-31 and E-32 in place, without process noise; N of omega' is integrated."""
+    n00, n01, n02, n11, n12, n22 = N
+    a00, a01, a02, a10, a11, a12, a20, a21, a22 = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
+    d00, d01, d02, d11, d12, d22 = dt * n00, dt * n01, dt * n02, dt * n11, dt * n12, dt * n22
     w0, w1, w2 = x[0], x[1], x[2]
     if turning:
-        alpha = alpha_m - x[3:6]
+        e0, e1, e2 = alpha_m[0] - x[3], alpha_m[1] - x[4], alpha_m[2] - x[5]
         if s.feedback:
-            for i in range(3):
-                for k in range(6):
-                    wi, wj = (w0, w1, w2)[FIRST[k]], (w0, w1, w2)[SECOND[k]]
-                    alpha[i] -= s.SQ[i, k] * wi * wj
-                    A[i, FIRST[k]] -= dt * s.SQ[i, k] * wj
-                    A[i, SECOND[k]] -= dt * s.SQ[i, k] * wi
-        if N[0, 0] + N[1, 1] + N[2, 2] < 2.0:  # on a fixed axis a wrong direction grows with omega
-            growth = dt * (alpha[0] * w0 + alpha[1] * w1 + alpha[2] * w2) / (w0 * w0 + w1 * w1 + w2 * w2)
-            for i in range(3):
-                for j in range(3):
-                    A[i, j] += growth * ((1.0 if i == j else 0.0) - N[i, j])
-        for i in range(3):
-            x[i] += D[i, 0] * alpha[0] + D[i, 1] * alpha[1] + D[i, 2] * alpha[2]
-    turn = np.empty(3)
-    turn[0] = -dt * (0.5 * (w0 + x[0]) - earth_b[0])
-    turn[1] = -dt * (0.5 * (w1 + x[1]) - earth_b[1])
-    turn[2] = -dt * (0.5 * (w2 + x[2]) - earth_b[2])
+            e0, a00, a01, a02 = _feedback(s, 0, w0, w1, w2, dt, e0, a00, a01, a02)
+            e1, a10, a11, a12 = _feedback(s, 1, w0, w1, w2, dt, e1, a10, a11, a12)
+            e2, a20, a21, a22 = _feedback(s, 2, w0, w1, w2, dt, e2, a20, a21, a22)
+        if n00 + n11 + n22 < 2.0:  # on a fixed axis a wrong direction grows with omega
+            growth = dt * (e0 * w0 + e1 * w1 + e2 * w2) / (w0 * w0 + w1 * w1 + w2 * w2)
+            a00, a01, a02 = a00 + growth * (1.0 - n00), a01 - growth * n01, a02 - growth * n02
+            a10, a11, a12 = a10 - growth * n01, a11 + growth * (1.0 - n11), a12 - growth * n12
+            a20, a21, a22 = a20 - growth * n02, a21 - growth * n12, a22 + growth * (1.0 - n22)
+        x[0] += d00 * e0 + d01 * e1 + d02 * e2
+        x[1] += d01 * e0 + d11 * e1 + d12 * e2
+        x[2] += d02 * e0 + d12 * e1 + d22 * e2
     x[21] += 0.5 * dt * (w2 + x[2])
-    C = to_dcm(from_rotation_vector(turn))
+    C = turn_matrix(
+        -dt * (0.5 * (w0 + x[0]) - earth_b[0]),
+        -dt * (0.5 * (w1 + x[1]) - earth_b[1]),
+        -dt * (0.5 * (w2 + x[2]) - earth_b[2]),
+    )
     u0, u1, u2 = x[12], x[13], x[14]
-    for i in range(3):
-        x[12 + i] = C[i, 0] * u0 + C[i, 1] * u1 + C[i, 2] * u2
+    x[12] = C[0] * u0 + C[1] * u1 + C[2] * u2
+    x[13] = C[3] * u0 + C[4] * u1 + C[5] * u2
+    x[14] = C[6] * u0 + C[7] * u1 + C[8] * u2
     # dt [u x] with u between the samples: right to second order in the turn of one sample
-    t0, t1, t2 = 0.5 * dt * (u0 + x[12]), 0.5 * dt * (u1 + x[13]), 0.5 * dt * (u2 + x[14])
-    for j in range(n):  # F P, then (F P) F^T
-        _line(P[:, j], C, A, D, t0, t1, t2, dt, turning)
-    for j in range(n):
-        _line(P[j], C, A, D, t0, t1, t2, dt, turning)
+    t = (0.5 * dt * (u0 + x[12]), 0.5 * dt * (u1 + x[13]), 0.5 * dt * (u2 + x[14]))
+    A, D = (a00, a01, a02, a10, a11, a12, a20, a21, a22), (d00, d01, d02, d11, d12, d22)
+    _turn_covariance(P, A, D, C, t, dt, 0.5 * dt if turning else 0.0)
 
 
-@njit(cache=True, error_model="numpy")
-def _line(v: Array, C: Array, A: Array, D: Array, t0: float, t1: float, t2: float, dt: float, turning: bool) -> None:
-    """F v in place, (22,)."""
-    back = 0.5 * dt if turning else 0.0
-    a0, a1, a2 = v[0] - back * v[3], v[1] - back * v[4], v[2] - back * v[5]
-    v0, v1, v2 = v[12], v[13], v[14]
-    v[21] += dt * a2
-    v[12] = C[0, 0] * v0 + C[0, 1] * v1 + C[0, 2] * v2 - t2 * a1 + t1 * a2
-    v[13] = C[1, 0] * v0 + C[1, 1] * v1 + C[1, 2] * v2 + t2 * a0 - t0 * a2
-    v[14] = C[2, 0] * v0 + C[2, 1] * v1 + C[2, 2] * v2 - t1 * a0 + t0 * a1
-    if turning:
-        b0, b1, b2 = v[0], v[1], v[2]
-        v[0] = A[0, 0] * b0 + A[0, 1] * b1 + A[0, 2] * b2 - D[0, 0] * v[3] - D[0, 1] * v[4] - D[0, 2] * v[5]
-        v[1] = A[1, 0] * b0 + A[1, 1] * b1 + A[1, 2] * b2 - D[1, 0] * v[3] - D[1, 1] * v[4] - D[1, 2] * v[5]
-        v[2] = A[2, 0] * b0 + A[2, 1] * b1 + A[2, 2] * b2 - D[2, 0] * v[3] - D[2, 1] * v[4] - D[2, 2] * v[5]
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _feedback(s: Sensor, i: int, w0: float, w1: float, w2: float, dt: float, e: float, a0: float, a1: float,
+              a2: float) -> tuple[float, float, float, float]:  # fmt: skip
+    """omega'_i and its row of A less what the products add to it."""
+    q = s.SQ[i]
+    e -= q[0] * w0 * w0 + q[1] * w0 * w1 + q[2] * w0 * w2 + q[3] * w1 * w1 + q[4] * w1 * w2 + q[5] * w2 * w2
+    a0 -= dt * (2.0 * q[0] * w0 + q[1] * w1 + q[2] * w2)
+    a1 -= dt * (q[1] * w0 + 2.0 * q[3] * w1 + q[4] * w2)
+    return e, a0, a1, a2 - dt * (q[2] * w0 + q[4] * w1 + 2.0 * q[5] * w2)
 
 
-@njit(cache=True, error_model="numpy")
-def add_noise(P: Array, N: Array, dt: float, turning: bool, s: Sensor, t: Tuning) -> None:
-    """What one step adds to P but for the biases: omega' noise and the pivot's walk."""
-    for i in range(3):
-        P[18 + i, 18 + i] += t.pivot_drift * dt
-        if not turning:
-            continue
-        for j in range(3):
-            P[i, j] -= t.axis * dt * N[i, j]
-            for k in range(3):
-                for l in range(3):
-                    P[i, j] += dt * dt * N[i, k] * s.R_alpha[k, l] * N[j, l]
-        P[i, i] += t.axis * dt
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _turn_covariance(P: Array, A: Nine, D: Six, C: Nine, t: Three, dt: float, back: float) -> None:
+    """P = F P F^T in place. F differs from the identity in seven rows: of omega, u and the angle.
 
-
-@njit(cache=True, error_model="numpy")
-def products_jacobian(omega: Array, s: Sensor, H: Array) -> None:
-    """H (6, 3) = M dz/domega (E-33)."""
-    H[:, :] = 0.0
+    First F P, along the rows; then the seven columns of those rows, and what is symmetric to them.
+    """
+    t0, t1, t2 = t
+    for j in range(STATES):
+        p0, p1, p2 = P[j], P[22 + j], P[44 + j]
+        p3, p4, p5 = P[66 + j], P[88 + j], P[110 + j]
+        u0, u1, u2 = P[264 + j], P[286 + j], P[308 + j]
+        q0, q1, q2 = p0 - back * p3, p1 - back * p4, p2 - back * p5
+        P[462 + j] += dt * q2
+        P[264 + j] = C[0] * u0 + C[1] * u1 + C[2] * u2 - t2 * q1 + t1 * q2
+        P[286 + j] = C[3] * u0 + C[4] * u1 + C[5] * u2 + t2 * q0 - t0 * q2
+        P[308 + j] = C[6] * u0 + C[7] * u1 + C[8] * u2 - t1 * q0 + t0 * q1
+        P[j] = A[0] * p0 + A[1] * p1 + A[2] * p2 - D[0] * p3 - D[1] * p4 - D[2] * p5
+        P[22 + j] = A[3] * p0 + A[4] * p1 + A[5] * p2 - D[1] * p3 - D[3] * p4 - D[4] * p5
+        P[44 + j] = A[6] * p0 + A[7] * p1 + A[8] * p2 - D[2] * p3 - D[4] * p4 - D[5] * p5
     for k in range(6):
-        i, j = FIRST[k], SECOND[k]
-        if s.plain:
-            H[k, i] += omega[j]
-            H[k, j] += omega[i]
-        else:
-            for r in range(s.m):
-                H[r, i] += s.M[r, k] * omega[j]
-                H[r, j] += s.M[r, k] * omega[i]
-
-
-@njit(cache=True, error_model="numpy")
-def products_covariance(P: Array, H: Array, HP: Array, C: Array, s: Sensor) -> None:
-    """HP = H P (6, 22) and C = H P H^T + R_c + second-order spread (6, 6) (E-34)."""
-    n = P.shape[0]
-    for k in range(s.m):
-        h0, h1, h2 = H[k, 0], H[k, 1], H[k, 2]
-        for j in range(n):
-            HP[k, j] = h0 * P[0, j] + h1 * P[1, j] + h2 * P[2, j] + P[6 + k, j]
-    spread = np.empty((6, 6))
-    for a in range(6):
-        for b in range(a + 1):
-            i, j, k, l = FIRST[a], SECOND[a], FIRST[b], SECOND[b]
-            spread[a, b] = spread[b, a] = P[i, k] * P[j, l] + P[i, l] * P[j, k]
-    for k in range(s.m):
-        for l in range(k + 1):
-            value = HP[k, 0] * H[l, 0] + HP[k, 1] * H[l, 1] + HP[k, 2] * H[l, 2] + HP[k, 6 + l] + s.R_c[k, l]
-            if s.plain:
-                value += spread[k, l]
-            else:
-                for a in range(6):
-                    for b in range(6):
-                        value += s.M[k, a] * spread[a, b] * s.M[l, b]
-            C[k, l] = C[l, k] = value
-
-
-@njit(cache=True, error_model="numpy")
-def by_products(x: Array, P: Array, c_m: Array, at: Array, s: Sensor, t: Tuning, out: Array) -> tuple[float, float]:
-    """Correct by the observed combinations of the products, linear about omega = at (3,) (E-33, E-34); NIS, log det."""
-    if s.m == 0:
-        return 0.0, 0.0
-    H, HP, C, y = np.empty((6, 3)), np.zeros((6, len(x))), np.empty((6, 6)), np.zeros(6)
-    products_jacobian(at, s, H)
-    products_covariance(P, H, HP, C, s)
-    for r in range(s.m):
-        y[r] = c_m[r] - x[6 + r]
-        for k in range(6):
-            if s.M[r, k] != 0.0:
-                i, j = FIRST[k], SECOND[k]
-                z = at[i] * x[j] + at[j] * x[i] - at[i] * at[j]
-                y[r] -= s.M[r, k] * (z + P[i, j])
-        out[INNOVATION + r], out[SIGMA + r] = y[r], np.sqrt(C[r, r])
-    return absorb(x, P, HP, C, y, s.m, t.products_gate)
-
-
-@njit(cache=True, error_model="numpy")
-def force_jacobian(x: Array, alpha: Array, s: Sensor, H_omega: Array, H_pivot: Array) -> None:
-    """d p_m / d omega and d pivot, both (3, 3) (E-35)."""
-    w, r = x[0:3], x[18:21]
-    wr, ww = w[0] * r[0] + w[1] * r[1] + w[2] * r[2], w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
-    for i in range(3):
-        for j in range(3):
-            H_omega[i, j] = w[i] * r[j] - 2.0 * r[i] * w[j]
-            H_pivot[i, j] = w[i] * w[j]
-        H_omega[i, i] += wr
-        H_pivot[i, i] -= ww
-    H_pivot[0, 1] -= alpha[2]
-    H_pivot[0, 2] += alpha[1]
-    H_pivot[1, 0] += alpha[2]
-    H_pivot[1, 2] -= alpha[0]
-    H_pivot[2, 0] -= alpha[1]
-    H_pivot[2, 1] += alpha[0]
-    if s.feedback:
-        for k in range(6):
-            for i in range(3):
-                H_omega[i, FIRST[k]] += s.SQ[3 + i, k] * w[SECOND[k]]
-                H_omega[i, SECOND[k]] += s.SQ[3 + i, k] * w[FIRST[k]]
-
-
-@njit(cache=True, error_model="numpy")
-def by_force(x: Array, P: Array, p_m: Array, alpha: Array, turning: bool, s: Sensor, t: Tuning) -> tuple[float, float]:
-    """Correct by gravity and the motion of the centre about its pivot (E-35); NIS and log det."""
-    n = len(x)
-    Ho, Hr, HP, C, y = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, n)), np.empty((3, 3)), np.empty(3)
-    # at rest omega' is noise: it must not seem to measure the pivot
-    force_jacobian(x, alpha if turning else np.zeros(3), s, Ho, Hr)
-    arm = x[18] * x[18] + x[19] * x[19] + x[20] * x[20] + P[18, 18] + P[19, 19] + P[20, 20]
-    more = t.centre + arm * s.R_alpha[0, 0] if turning else 0.0
+        r = 22 * k if k < 3 else 198 + 22 * k  # rows of omega, then of u
+        q0, q1, q2 = P[r] - back * P[r + 3], P[r + 1] - back * P[r + 4], P[r + 2] - back * P[r + 5]
+        u0, u1, u2 = P[r + 12], P[r + 13], P[r + 14]
+        P[r + 21] += dt * q2
+        P[r + 12] = C[0] * u0 + C[1] * u1 + C[2] * u2 - t2 * q1 + t1 * q2
+        P[r + 13] = C[3] * u0 + C[4] * u1 + C[5] * u2 + t2 * q0 - t0 * q2
+        P[r + 14] = C[6] * u0 + C[7] * u1 + C[8] * u2 - t1 * q0 + t0 * q1
+        if k < 3:
+            p0, p1, p2, p3, p4, p5 = P[r], P[r + 1], P[r + 2], P[r + 3], P[r + 4], P[r + 5]
+            P[r] = A[0] * p0 + A[1] * p1 + A[2] * p2 - D[0] * p3 - D[1] * p4 - D[2] * p5
+            P[r + 1] = A[3] * p0 + A[4] * p1 + A[5] * p2 - D[1] * p3 - D[3] * p4 - D[4] * p5
+            P[r + 2] = A[6] * p0 + A[7] * p1 + A[8] * p2 - D[2] * p3 - D[4] * p4 - D[5] * p5
+    P[462 + 21] += dt * (P[462 + 2] - back * P[462 + 5])
     for k in range(3):
-        for j in range(n):
-            HP[k, j] = P[12 + k, j] + P[15 + k, j]
-            for i in range(3):
-                HP[k, j] += Ho[k, i] * P[i, j] + Hr[k, i] * P[18 + i, j]
-        y[k] = p_m[k] - x[12 + k] - x[15 + k] - Hr[k, 0] * x[18] - Hr[k, 1] * x[19] - Hr[k, 2] * x[20]
-        if s.feedback:
-            for l in range(6):
-                y[k] -= s.SQ[3 + k, l] * x[FIRST[l]] * x[SECOND[l]]
-    for k in range(3):
-        for l in range(k + 1):
-            value = HP[k, 12 + l] + HP[k, 15 + l] + s.R_p[k, l] + (more if k == l else 0.0)
-            for i in range(3):
-                value += HP[k, i] * Ho[l, i] + HP[k, 18 + i] * Hr[l, i]
-            C[k, l] = C[l, k] = value
-    return absorb(x, P, HP, C, y, 3, t.force_gate)
+        for r in range(k + 1, 22):
+            P[22 * r + k] = P[22 * k + r]
+    for k in range(12, 15):
+        for r in range(3, 12):
+            P[22 * r + k] = P[22 * k + r]
+        for r in range(k + 1, 22):
+            P[22 * r + k] = P[22 * k + r]
+    for r in range(3, 12):
+        P[22 * r + 21] = P[462 + r]
+    for r in range(15, 21):
+        P[22 * r + 21] = P[462 + r]
 
 
-@njit(cache=True, error_model="numpy")
-def by_standstill(x: Array, P: Array, alpha_m: Array, earth_b: Array, s: Sensor, t: Tuning) -> None:
-    """omega is the Earth's and omega' is bias (E-38)."""
-    HP, C, y = np.empty((6, len(x))), np.zeros((6, 6)), np.empty(6)
-    HP[:, :] = P[0:6, :]
-    for i in range(3):
-        y[i], y[3 + i] = earth_b[i] - x[i], alpha_m[i] - x[3 + i]
-        for j in range(3):
-            C[3 + i, 3 + j] = s.R_alpha[i, j]
-        C[i, i] = t.still_rate
-    C += P[0:6, 0:6]
-    absorb(x, P, HP, C, y, 6, np.inf)
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def add_noise(P: Array, N: Six, dt: float, turning: bool, s: Sensor, t: Tuning) -> None:
+    """What one step adds to P but for the biases: omega' noise along N, omega's wander across it, the pivot's walk."""
+    for i in range(18, 21):
+        P[23 * i] += t.pivot_drift * dt
+    if not turning:
+        return
+    R, f = s.R_alpha, dt * dt
+    if N[0] + N[3] + N[5] < 2.0:  # N is of rank one: N R N = tr(N R) N
+        q = N[0] * R[0, 0] + N[3] * R[1, 1] + N[5] * R[2, 2]
+        q += 2.0 * (N[1] * R[0, 1] + N[2] * R[0, 2] + N[4] * R[1, 2])
+        g, w = f * q - t.axis * dt, t.axis * dt
+        r00, r01, r02, r11, r12, r22 = g * N[0] + w, g * N[1], g * N[2], g * N[3] + w, g * N[4], g * N[5] + w
+    else:
+        r00, r01, r02 = f * R[0, 0], f * R[0, 1], f * R[0, 2]
+        r11, r12, r22 = f * R[1, 1], f * R[1, 2], f * R[2, 2]
+    P[0] += r00
+    P[1] += r01
+    P[2] += r02
+    P[22] += r01
+    P[23] += r11
+    P[24] += r12
+    P[44] += r02
+    P[45] += r12
+    P[46] += r22

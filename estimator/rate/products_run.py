@@ -27,9 +27,7 @@ from estimator.rate.products_kernel import (
     REST_VARIANCE,
     SIGN,
     SIZE,
-    USED,
-    V_N,
-    Tuning,
+    USED, V_N, WORK, Tuning,
 )  # fmt: skip
 from estimator.rate.products_model import BIASES, FIRST, SECOND, STATES, TURNED
 from estimator.rate.products_step import step
@@ -64,6 +62,7 @@ MEMORY = np.dtype(
             ("arrival_at", "i8", (ARRIVALS,)),
             ("marks", "i8", (10,)),
             ("clock", "f8", (3,)),
+            ("work", "f8", (WORK,)),  # of one step, of no meaning after it
         ],
     )
 )
@@ -283,7 +282,7 @@ def advance(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, t_s: float, a:
     fixed = not still and _on_axis(m, w, s, t)
     if still:
         m.arrival_at[:] = -1
-    at = np.full(3, np.nan)
+    at = (np.nan, np.nan, np.nan)
     for turn in range(1 + ITERATIONS):
         if turn > 0:
             first = _horizon(m, t, still, now)
@@ -299,12 +298,12 @@ def advance(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, t_s: float, a:
                 m.arrival_at[(sample // EVERY) % ARRIVALS] = sample
             if turn > 0:  # back from the end by what omega' was since
                 left = now - sample
-                for i in range(3):
-                    gained = w.total[now % (2 * DEPTH), i] - w.total[sample % (2 * DEPTH), i]
-                    at[i] = end[i] - dt * (gained - left * end[3 + i])
+                gained = w.total[now % (2 * DEPTH)] - w.total[sample % (2 * DEPTH)]
+                at = (end[0] - dt * (gained[0] - left * end[3]), end[1] - dt * (gained[1] - left * end[4]),
+                      end[2] - dt * (gained[2] - left * end[5]))  # fmt: skip
             for branch in range(m.marks[BRANCHES]):
                 core, out = (m.core, m.out) if branch == 0 else (m.other, m.other_out)
-                step(core, s, t, w.y[k], at, w.dt[k], not still, fixed, grow, out)
+                step(core, m.work, s, t, w.y[k], at, w.dt[k], not still, fixed, grow, out)
     if m.marks[BRANCHES] == 2:
         _two_signs(m, still)
     if not m.core[0] ** 2 + m.core[1] ** 2 + m.core[2] ** 2 < FASTEST**2:  # diverged, or no number at all

@@ -4,12 +4,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from estimator.attitude.rotation import from_rotation_vector, multiply, tilt_correction, to_dcm
 from estimator.rate import products_kernel as kernel
-from estimator.rate import unscented
+from estimator.rate import turns, unscented
 from estimator.rate.observed import Sensor
+from estimator.rate.products_correct import by_force, by_products, by_standstill
 from estimator.rate.products_kernel import (
     ALPHA,
+    BEFORE,
+    FAST,
     FORCE,
     FORCE_NIS,
     FORCE_USED,
@@ -28,6 +30,7 @@ from estimator.rate.products_kernel import (
     UKF,
     USED,
     V_N,
+    Three,
     Tuning,
 )
 from estimator.rate.products_model import BIASES, FIRST, SECOND, STATES
@@ -37,60 +40,70 @@ Array = NDArray[np.float64]
 SURE = 16.0  # of |omega|^2 over its variance: the sign is certain, products may narrow the variance
 
 
-@njit(cache=True, error_model="numpy", inline="always")
-def step(core: Array, s: Sensor, t: Tuning, y: Array, at: Array, dt: float, turning: bool, fixed: bool, grow: float,
-         out: Array) -> None:  # fmt: skip
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def step(core: Array, work: Array, s: Sensor, t: Tuning, y: Array, at: Three, dt: float, turning: bool, fixed: bool,
+         grow: float, out: Array) -> None:  # fmt: skip
     """core (flat state) takes one sample y = [alpha_m, c_m, p_m] (12,), dt (s) after the last.
 
-    turning is what the still detector denies; fixed: about an axis that keeps its direction; grow: s of bias growth
-    due now, 0 for most samples. out (OUT,) tells what the corrections said.
+    at: omega that the products are linear about, not a number: that of the state. turning is what the still detector
+    denies; fixed: about an axis that keeps its direction; grow: s of bias growth due now, 0 for most samples. work
+    (WORK,) is for the filter's own use; out (OUT,) tells what the corrections said.
     """
-    x, P = core[:STATES], core[STATES:PP].reshape(STATES, STATES)
+    x, P = core[:STATES], core[STATES:PP]
     if grow > 0.0:
-        _grow(core, P, s, t, grow, turning)
-    before, alpha = core[:PP].copy(), np.empty(3)
+        _grow(core, P, work, s, t, grow, turning)
+    for k in range(PP):
+        work[BEFORE + k] = core[k]
     earth_b = _earth(core, t)
     nis, logdet, force_nis, force_logdet, used = 0.0, 0.0, 0.0, 0.0, False
-    fixed = fixed and x[0] * x[0] + x[1] * x[1] + x[2] * x[2] > t.axis_from
-    for attempt in range(2):
-        N = kernel.along_axis(x, fixed, turning or attempt == 1)
+    w0, w1, w2 = x[0], x[1], x[2]
+    fixed = fixed and w0 * w0 + w1 * w1 + w2 * w2 > t.axis_from
+    alpha = (0.5 * (core[ALPHA] + y[0]), 0.5 * (core[ALPHA + 1] + y[1]), 0.5 * (core[ALPHA + 2] + y[2]))
+    _predict(x, P, alpha, dt, turning, fixed, turning, s, t, earth_b)
+    if t.method == UKF:
+        nis, logdet = unscented.by_products(x, P, work, y, s, t, out)
+    else:
+        if np.isnan(at[0]):
+            at = (x[0], x[1], x[2])
+        nis, logdet = by_products(x, P, work, y, at, s, t, out)
+    used = nis <= t.products_gate
+    if not used:  # a damaged sample: its omega' must not be integrated either
+        for k in range(PP):
+            core[k] = work[BEFORE + k]
+        alpha = (core[ALPHA], core[ALPHA + 1], core[ALPHA + 2])
+        _predict(x, P, alpha, dt, True, fixed, turning, s, t, earth_b)
         for i in range(3):
-            last = core[ALPHA + i]
-            alpha[i] = 0.5 * (last + y[i]) if attempt == 0 else last
-        if t.method == UKF:
-            unscented.predict(x, P, alpha, N, dt, turning or attempt == 1, s, earth_b)
-        else:
-            kernel.predict(x, P, alpha, N, dt, turning or attempt == 1, s, earth_b)
-        if t.method == FORGET and turning:
-            _forget(P, s, t, dt)
-        else:
-            kernel.add_noise(P, N, dt, turning or attempt == 1, s, t)
-        if attempt == 1:  # a damaged sample: its omega' must not be integrated either
-            for i in range(3):
-                P[i, i] += t.unseen_alpha * dt * dt
-            break
-        if t.method == UKF:
-            nis, logdet = unscented.by_products(x, P, y[3:9], s, t, out)
-        else:
-            nis, logdet = kernel.by_products(x, P, y[3:9], x[0:3].copy() if np.isnan(at[0]) else at, s, t, out)
-        used = nis <= t.products_gate
-        if used:
-            break
-        core[:PP] = before
-    f_b = x[12:15].copy()
+            P[23 * i] += t.unseen_alpha * dt * dt
+    f_b = (x[12], x[13], x[14])
     if used:
         if t.centre_sees:
-            force_nis, force_logdet = kernel.by_force(x, P, y[9:12], alpha - x[3:6], turning, s, t)
+            free = (alpha[0] - x[3], alpha[1] - x[4], alpha[2] - x[5])
+            force_nis, force_logdet = by_force(x, P, work, (y[9], y[10], y[11]), free, turning, s, t)
         if not turning:
-            kernel.by_standstill(x, P, y[0:3], earth_b, s, t)
+            by_standstill(x, P, work, (y[0], y[1], y[2]), earth_b, s, t)
         for i in range(3):
             core[ALPHA + i] = y[i]
-            f_b[i] = y[9 + i] - x[15 + i]
+        f_b = (y[9] - x[15], y[10] - x[16], y[11] - x[17])
     out[NIS], out[USED], out[FORCE_NIS] = nis, 1.0 if used else 0.0, force_nis
     out[FORCE_USED] = 1.0 if force_nis <= t.force_gate else 0.0
     out[LIKELIHOOD] = -0.5 * (min(nis, t.products_gate) + logdet + min(force_nis, t.force_gate) + force_logdet)
     _sign(core, P, s, dt, turning)
-    _navigate(core, before[0:3], f_b, dt, earth_b)
+    _navigate(core, 0.5 * (w0 + x[0]), 0.5 * (w1 + x[1]), 0.5 * (w2 + x[2]), f_b, dt, earth_b)
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _predict(x: Array, P: Array, alpha: Three, dt: float, moving: bool, fixed: bool, turning: bool, s: Sensor,
+             t: Tuning, earth_b: Three) -> None:  # fmt: skip
+    """Prediction by the filter's method, with noise. moving: omega' is integrated; turning: the detector's word."""
+    N = kernel.along_axis(x[0], x[1], x[2], fixed, moving)
+    if t.method == UKF:
+        unscented.predict(x, P, alpha, N, dt, moving, s, earth_b)
+    else:
+        kernel.predict(x, P, alpha, N, dt, moving, s, earth_b)
+    if t.method == FORGET and turning:
+        _forget(P, s, t, dt)
+    else:
+        kernel.add_noise(P, N, dt, moving, s, t)
 
 
 @njit(cache=True, error_model="numpy")
@@ -98,24 +111,25 @@ def _forget(P: Array, s: Sensor, t: Tuning, dt: float) -> None:
     """Exponential forgetting (E-47): P grows by its own size, up to what is known before any sample."""
     for i in range(12):
         known = 4.0 if i < 3 else t.bias * s.drift[i - 3, i - 3]
-        if P[i, i] < known:
+        if P[23 * i] < known:
             root = np.exp(0.5 * t.forget * dt)
             for j in range(STATES):
-                P[i, j] *= root
-                P[j, i] *= root
+                P[STATES * i + j] *= root
+                P[STATES * j + i] *= root
 
 
-@njit(cache=True, error_model="numpy")
-def _earth(core: Array, t: Tuning) -> Array:
-    """Earth's rate in b, (3,), rad/s; zero unless asked for."""
-    earth_n = np.array([t.earth_north, 0.0, t.earth_down])
-    if t.earth_north == 0.0 and t.earth_down == 0.0:
-        return earth_n
-    return np.ascontiguousarray(to_dcm(core[Q_NB : Q_NB + 4]).T) @ earth_n
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _earth(core: Array, t: Tuning) -> Three:
+    """Earth's rate in b, rad/s; zero unless asked for."""
+    north, down = t.earth_north, t.earth_down
+    if north == 0.0 and down == 0.0:
+        return 0.0, 0.0, 0.0
+    C = turns.matrix((core[Q_NB], core[Q_NB + 1], core[Q_NB + 2], core[Q_NB + 3]))
+    return C[0] * north + C[6] * down, C[1] * north + C[7] * down, C[2] * north + C[8] * down
 
 
-@njit(cache=True, error_model="numpy")
-def _grow(core: Array, P: Array, s: Sensor, t: Tuning, seconds: float, turning: bool) -> None:
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _grow(core: Array, P: Array, work: Array, s: Sensor, t: Tuning, seconds: float, turning: bool) -> None:
     """What the biases became in `seconds`: a walk, and scale errors (E-37).
 
     A scale error e of an axis is a bias e (f - f at the last standstill): it comes and goes with the readings. So what
@@ -123,7 +137,8 @@ def _grow(core: Array, P: Array, s: Sensor, t: Tuning, seconds: float, turning: 
     """
     x, rest = core[:STATES], core[REST : REST + s.n]
     bias, variance, level = core[REST_BIAS:REST_VARIANCE], core[REST_VARIANCE:LEVEL], core[LEVEL:REST]
-    away = np.zeros(s.n)
+    away, follow = work[0 : s.n], work[s.n : s.n + STATES]
+    away[:], follow[:] = 0.0, 1.0
     for i in range(s.n):
         reading = s.theta_b[i, 0] * x[12] + s.theta_b[i, 1] * x[13] + s.theta_b[i, 2] * x[14]
         if turning:
@@ -140,50 +155,46 @@ def _grow(core: Array, P: Array, s: Sensor, t: Tuning, seconds: float, turning: 
         for i in range(s.n):
             now += s.W[k, i] * s.W[k, i] * away[i]
         if not turning:
-            bias[k], variance[k], level[k] = x[b], P[b, b], P[b, b]
+            bias[k], variance[k], level[k] = x[b], P[23 * b], P[23 * b]
         now += variance[k]
-        follow = np.sqrt(now / level[k])
+        follow[b] = np.sqrt(now / level[k])
         level[k] = now
-        x[b] = bias[k] + follow * (x[b] - bias[k])
+        x[b] = bias[k] + follow[b] * (x[b] - bias[k])
+    for i in range(STATES):
         for j in range(STATES):
-            P[b, j] *= follow
-        for j in range(STATES):
-            P[j, b] *= follow
+            P[STATES * i + j] *= follow[i] * follow[j]
     for k in range(12):
         for l in range(12):
-            P[BIASES[k], BIASES[l]] += s.drift[k, l] * t.drift * seconds
+            P[STATES * BIASES[k] + BIASES[l]] += s.drift[k, l] * t.drift * seconds
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=FAST)
 def _sign(core: Array, P: Array, s: Sensor, dt: float, turning: bool) -> None:
     """Variance of omega along itself for the question of its sign: products narrow it only where the sign is certain.
 
     The products say the same of omega and -omega; through zero only the integral tells them apart (E-43).
     """
-    w = core[0:3]
-    square, along = 0.0, 0.0
-    for i in range(3):
-        square += w[i] * w[i]
-        for j in range(3):
-            along += w[i] * P[i, j] * w[j]
+    w0, w1, w2 = core[0], core[1], core[2]
+    square = w0 * w0 + w1 * w1 + w2 * w2
     if not turning:
-        core[SIGN] = max(P[0, 0], P[1, 1], P[2, 2])
+        core[SIGN] = max(P[0], P[23], P[46])
     elif square > SURE * core[SIGN]:
-        core[SIGN] = along / square
+        along = w0 * w0 * P[0] + w1 * w1 * P[23] + w2 * w2 * P[46]
+        core[SIGN] = (along + 2.0 * (w0 * w1 * P[1] + w0 * w2 * P[2] + w1 * w2 * P[24])) / square
     else:
         core[SIGN] += dt * dt * max(s.R_alpha[0, 0], s.R_alpha[1, 1], s.R_alpha[2, 2])
 
 
-@njit(cache=True, error_model="numpy")
-def _navigate(core: Array, omega_before: Array, f_b: Array, dt: float, earth_b: Array) -> None:
-    """Attitude by the mean rate, tilt by u; then velocity and position from f_b (E-12, E-13)."""
-    mean = 0.5 * (omega_before + core[0:3])
-    q = multiply(core[Q_NB : Q_NB + 4], from_rotation_vector(dt * (mean - earth_b)))
-    q = tilt_correction(q, core[12:15], 1.0)
-    core[Q_NB : Q_NB + 4] = q
-    C = to_dcm(q)
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _navigate(core: Array, w0: float, w1: float, w2: float, f_b: Three, dt: float, earth_b: Three) -> None:
+    """Attitude by the mean rate w (rad/s), tilt by u; then velocity and position from f_b (E-12, E-13)."""
+    turn = turns.quaternion(dt * (w0 - earth_b[0]), dt * (w1 - earth_b[1]), dt * (w2 - earth_b[2]))
+    q = turns.product((core[Q_NB], core[Q_NB + 1], core[Q_NB + 2], core[Q_NB + 3]), turn)
+    q = turns.upright(q, core[12], core[13], core[14])
+    core[Q_NB], core[Q_NB + 1], core[Q_NB + 2], core[Q_NB + 3] = q
+    C = turns.matrix(q)
     for i in range(3):
-        force = C[i, 0] * f_b[0] + C[i, 1] * f_b[1] + C[i, 2] * f_b[2] + (GRAVITY if i == 2 else 0.0)
+        force = C[3 * i] * f_b[0] + C[3 * i + 1] * f_b[1] + C[3 * i + 2] * f_b[2] + (GRAVITY if i == 2 else 0.0)
         v = core[V_N + i] + 0.5 * dt * (core[FORCE + i] + force)
         core[P_N + i] += 0.5 * dt * (core[V_N + i] + v)
         core[V_N + i], core[FORCE + i] = v, force

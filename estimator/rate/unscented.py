@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from estimator.attitude.rotation import from_rotation_vector, to_dcm
 from estimator.rate.observed import Sensor
-from estimator.rate.products_kernel import INNOVATION, SIGMA, Tuning, absorb
-from estimator.rate.products_model import FIRST, SECOND
+from estimator.rate.products_kernel import COV, INNOVATION, RESIDUAL, ROWS, SIGMA, Six, Three, Tuning, absorb_six
+from estimator.rate.products_model import FIRST, SECOND, STATES
 
 Array = NDArray[np.float64]
 
@@ -41,9 +41,9 @@ def root(A: Array) -> Array:
 
 
 @njit(cache=True, error_model="numpy")
-def predict(x: Array, P: Array, alpha_m: Array, N: Array, dt: float, turning: bool, s: Sensor, earth_b: Array) -> None:
-    """E-31 through sigma points of [omega, u, b_alpha], in place, without process noise."""
-    n, m = len(INSIDE), len(x)
+def predict(x: Array, flat: Array, alpha_m: Three, N: Six, dt: float, turning: bool, s: Sensor, earth_b: Three) -> None:
+    """E-31 through sigma points of [omega, u, b_alpha], in place, without process noise; P flat (484,)."""
+    n, m, P = len(INSIDE), len(x), flat.reshape(STATES, STATES)
     A, mean = np.empty((n, n)), np.empty(n)
     for i in range(n):
         mean[i] = x[INSIDE[i]]
@@ -116,28 +116,32 @@ def _carry(P: Array, F: Array, m: int) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _move(p: Array, alpha_m: Array, N: Array, dt: float, turning: bool, s: Sensor, earth_b: Array) -> None:
+def _move(p: Array, alpha_m: Three, N: Six, dt: float, turning: bool, s: Sensor, earth_b: Three) -> None:
     w = p[0:3].copy()
     if turning:
-        alpha = alpha_m - p[6:9]
+        alpha = np.array([alpha_m[0] - p[6], alpha_m[1] - p[7], alpha_m[2] - p[8]])
         if s.feedback:
             for i in range(3):
                 for k in range(6):
                     alpha[i] -= s.SQ[i, k] * w[FIRST[k]] * w[SECOND[k]]
-        for i in range(3):
-            p[i] += dt * (N[i, 0] * alpha[0] + N[i, 1] * alpha[1] + N[i, 2] * alpha[2])
+        p[0] += dt * (N[0] * alpha[0] + N[1] * alpha[1] + N[2] * alpha[2])
+        p[1] += dt * (N[1] * alpha[0] + N[3] * alpha[1] + N[4] * alpha[2])
+        p[2] += dt * (N[2] * alpha[0] + N[4] * alpha[1] + N[5] * alpha[2])
     p[9] += 0.5 * dt * (w[2] + p[2])
-    C = to_dcm(from_rotation_vector(-dt * (0.5 * (w + p[0:3]) - earth_b)))
+    mean = 0.5 * (w + p[0:3])
+    turn = np.array([earth_b[0] - mean[0], earth_b[1] - mean[1], earth_b[2] - mean[2]])
+    C = to_dcm(from_rotation_vector(dt * turn))
     u0, u1, u2 = p[3], p[4], p[5]
     for i in range(3):
         p[3 + i] = C[i, 0] * u0 + C[i, 1] * u1 + C[i, 2] * u2
 
 
 @njit(cache=True, error_model="numpy")
-def by_products(x: Array, P: Array, c_m: Array, s: Sensor, t: Tuning, out: Array) -> tuple[float, float]:
-    """Correction by c_m through sigma points of omega (three, so seven points); NIS and log det."""
+def by_products(x: Array, flat: Array, work: Array, y: Array, s: Sensor, t: Tuning, out: Array) -> tuple[float, float]:
+    """Correction by c_m = y[3:9] through sigma points of omega (three, so seven points); NIS and log det."""
     if s.m == 0:
         return 0.0, 0.0
+    P = flat.reshape(STATES, STATES)
     L = root(P[0:3, 0:3].copy())
     z = np.empty((7, 6))
     w = np.empty(3)
@@ -167,14 +171,16 @@ def by_products(x: Array, P: Array, c_m: Array, s: Sensor, t: Tuning, out: Array
             for l in range(j + 1, 3):
                 value -= H[r, l] * L[l, j]
             H[r, j] = value / L[j, j] if L[j, j] > 0.0 else 0.0
-    return _absorb_products(x, P, c_m, mean, z, H, s, t, out)
+    return _absorb_products(x, flat, work, y[3:9], mean, z, H, s, t, out)
 
 
 @njit(cache=True, error_model="numpy")
-def _absorb_products(x: Array, P: Array, c_m: Array, mean: Array, z: Array, H: Array, s: Sensor, t: Tuning,
-                     out: Array) -> tuple[float, float]:  # fmt: skip
-    n = len(x)
-    HP, C, y = np.zeros((6, n)), np.empty((6, 6)), np.zeros(6)
+def _absorb_products(x: Array, flat: Array, work: Array, c_m: Array, mean: Array, z: Array, H: Array, s: Sensor,
+                     t: Tuning, out: Array) -> tuple[float, float]:  # fmt: skip
+    n, P = len(x), flat.reshape(STATES, STATES)
+    HP, C = work[ROWS : ROWS + 6 * n].reshape(6, n), work[COV : COV + 36].reshape(6, 6)
+    y = work[RESIDUAL : RESIDUAL + 6]
+    HP[:, :], C[:, :], y[:] = 0.0, np.eye(6), 0.0
     for r in range(s.m):
         for j in range(n):
             HP[r, j] = H[r, 0] * P[0, j] + H[r, 1] * P[1, j] + H[r, 2] * P[2, j] + P[6 + r, j]
@@ -189,4 +195,4 @@ def _absorb_products(x: Array, P: Array, c_m: Array, mean: Array, z: Array, H: A
                 value += weight * (z[k, r] - mean[r]) * (z[k, q] - mean[q])
             C[r, q] = value
         out[INNOVATION + r], out[SIGMA + r] = y[r], np.sqrt(C[r, r])
-    return absorb(x, P, HP, C, y, s.m, t.products_gate)
+    return absorb_six(x, flat, work, t.products_gate)

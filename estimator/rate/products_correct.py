@@ -1,0 +1,182 @@
+"""Corrections of the products filter: products, gravity, standstill (E-33 to E-38); its arrays: products_kernel.py.
+
+Each fills H P, C and y of the workspace and has the kernel absorb them, six or three innovations at a time.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from estimator.rate.observed import Sensor
+from estimator.rate.products_kernel import (
+    B_F,
+    COV,
+    FAST,
+    INNOVATION,
+    JACOBIAN,
+    PIVOT,
+    RESIDUAL,
+    ROWS,
+    SIGMA,
+    SPREAD,
+    Three,
+    Tuning,
+    U,
+    absorb_six,
+    absorb_three,
+)
+from estimator.rate.products_model import FIRST, SECOND, STATES
+
+Array = NDArray[np.float64]
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def by_products(
+    x: Array, P: Array, work: Array, y: Array, at: Three, s: Sensor, t: Tuning, out: Array
+) -> tuple[float, float]:
+    """Correct by the observed combinations y[3:9] of the products, linear about omega = at (E-33, E-34).
+
+    Returns NIS and log det. What a layout does not see are rows of zeros, which say nothing.
+    """
+    if s.m == 0:
+        return 0.0, 0.0
+    w0, w1, w2 = at
+    H, e = work[JACOBIAN : JACOBIAN + 18], work[RESIDUAL : RESIDUAL + 6]
+    z0, z1, z2 = w0 * x[0], w0 * x[1] + w1 * x[0] - w0 * w1, w0 * x[2] + w2 * x[0] - w0 * w2
+    z0, z3, z5 = 2.0 * z0 - w0 * w0, 2.0 * w1 * x[1] - w1 * w1, 2.0 * w2 * x[2] - w2 * w2
+    z4 = w1 * x[2] + w2 * x[1] - w1 * w2
+    z0, z1, z2, z3, z4, z5 = z0 + P[0], z1 + P[1], z2 + P[2], z3 + P[23], z4 + P[24], z5 + P[46]
+    if s.plain:
+        H[:] = 0.0
+        H[0], H[3], H[4], H[6], H[8], H[10] = 2.0 * w0, w1, w0, w2, w0, 2.0 * w1
+        H[13], H[14], H[17] = w2, w1, 2.0 * w2
+        e[0], e[1], e[2], e[3], e[4], e[5] = z0, z1, z2, z3, z4, z5
+    else:
+        for r in range(6):
+            M = s.M[r]
+            H[3 * r] = 2.0 * M[0] * w0 + M[1] * w1 + M[2] * w2
+            H[3 * r + 1] = M[1] * w0 + 2.0 * M[3] * w1 + M[4] * w2
+            H[3 * r + 2] = M[2] * w0 + M[4] * w1 + 2.0 * M[5] * w2
+            e[r] = M[0] * z0 + M[1] * z1 + M[2] * z2 + M[3] * z3 + M[4] * z4 + M[5] * z5
+    for r in range(6):
+        e[r] = y[3 + r] - x[6 + r] - e[r]
+    _products_rows(P, work[ROWS : ROWS + 6 * STATES], H)
+    _products_covariance(P, work, s)
+    for r in range(s.m):
+        out[INNOVATION + r], out[SIGMA + r] = e[r], np.sqrt(work[COV + 7 * r])
+    return absorb_six(x, P, work, t.products_gate)
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _products_rows(P: Array, G: Array, H: Array) -> None:
+    """H P."""
+    n = STATES
+    for r in range(6):
+        h0, h1, h2 = H[3 * r], H[3 * r + 1], H[3 * r + 2]
+        for j in range(n):
+            G[n * r + j] = h0 * P[j] + h1 * P[n + j] + h2 * P[2 * n + j] + P[n * (6 + r) + j]
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _products_covariance(P: Array, work: Array, s: Sensor) -> None:
+    """C = H P H^T + R_c + second-order spread, its lower triangle (E-34)."""
+    G, H, C = work[ROWS : ROWS + 6 * STATES], work[JACOBIAN : JACOBIAN + 18], work[COV : COV + 36]
+    S = work[SPREAD : SPREAD + 36]
+    for a in range(6):
+        i, j = FIRST[a], SECOND[a]
+        for b in range(a + 1):
+            k, l = FIRST[b], SECOND[b]
+            S[6 * a + b] = S[6 * b + a] = P[22 * i + k] * P[22 * j + l] + P[22 * i + l] * P[22 * j + k]
+    for k in range(6):
+        g0, g1, g2 = G[22 * k], G[22 * k + 1], G[22 * k + 2]
+        for l in range(k + 1):
+            value = g0 * H[3 * l] + g1 * H[3 * l + 1] + g2 * H[3 * l + 2] + G[22 * k + 6 + l] + s.R_c[k, l]
+            C[6 * k + l] = value + S[6 * k + l] if s.plain else value
+    if s.plain:
+        return
+    for k in range(s.m):
+        for l in range(k + 1):
+            value = 0.0
+            for a in range(6):
+                for b in range(6):
+                    value += s.M[k, a] * S[6 * a + b] * s.M[l, b]
+            C[6 * k + l] += value
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def by_force(
+    x: Array, P: Array, work: Array, p: Three, alpha: Three, turning: bool, s: Sensor, t: Tuning
+) -> tuple[float, float]:
+    """Correct by gravity and the motion of the centre about its pivot (E-35); NIS and log det.
+
+    p: specific force of the centre, m/s^2; alpha: omega', rad/s^2.
+    """
+    w0, w1, w2, r0, r1, r2 = x[0], x[1], x[2], x[18], x[19], x[20]
+    # at rest omega' is noise: it must not seem to measure the pivot
+    e0, e1, e2 = alpha if turning else (0.0, 0.0, 0.0)
+    wr, ww = w0 * r0 + w1 * r1 + w2 * r2, w0 * w0 + w1 * w1 + w2 * w2
+    k00, k01, k02 = w0 * w0 - ww, w0 * w1 - e2, w0 * w2 + e1  # d p / d pivot
+    k10, k11, k12 = w1 * w0 + e2, w1 * w1 - ww, w1 * w2 - e0
+    k20, k21, k22 = w2 * w0 - e1, w2 * w1 + e0, w2 * w2 - ww
+    h00, h01, h02 = wr - w0 * r0, w0 * r1 - 2.0 * r0 * w1, w0 * r2 - 2.0 * r0 * w2  # d p / d omega
+    h10, h11, h12 = w1 * r0 - 2.0 * r1 * w0, wr - w1 * r1, w1 * r2 - 2.0 * r1 * w2
+    h20, h21, h22 = w2 * r0 - 2.0 * r2 * w0, w2 * r1 - 2.0 * r2 * w1, wr - w2 * r2
+    y0 = p[0] - x[12] - x[15] - k00 * r0 - k01 * r1 - k02 * r2
+    y1 = p[1] - x[13] - x[16] - k10 * r0 - k11 * r1 - k12 * r2
+    y2 = p[2] - x[14] - x[17] - k20 * r0 - k21 * r1 - k22 * r2
+    if s.feedback:
+        y0, h00, h01, h02 = _by_squares(s.SQ[3], w0, w1, w2, y0, h00, h01, h02)
+        y1, h10, h11, h12 = _by_squares(s.SQ[4], w0, w1, w2, y1, h10, h11, h12)
+        y2, h20, h21, h22 = _by_squares(s.SQ[5], w0, w1, w2, y2, h20, h21, h22)
+    n, G = STATES, work[ROWS : ROWS + 3 * STATES]
+    for j in range(STATES):
+        p0, p1, p2 = P[j], P[n + j], P[2 * n + j]
+        q0, q1, q2 = P[PIVOT + j], P[PIVOT + n + j], P[PIVOT + 2 * n + j]
+        u0, u1, u2 = P[U + j] + P[B_F + j], P[U + n + j] + P[B_F + n + j], P[U + 2 * n + j] + P[B_F + 2 * n + j]
+        G[j] = u0 + h00 * p0 + h01 * p1 + h02 * p2 + k00 * q0 + k01 * q1 + k02 * q2
+        G[n + j] = u1 + h10 * p0 + h11 * p1 + h12 * p2 + k10 * q0 + k11 * q1 + k12 * q2
+        G[2 * n + j] = u2 + h20 * p0 + h21 * p1 + h22 * p2 + k20 * q0 + k21 * q1 + k22 * q2
+    arm = r0 * r0 + r1 * r1 + r2 * r2 + P[23 * 18] + P[23 * 19] + P[23 * 20]
+    more = t.centre + arm * s.R_alpha[0, 0] if turning else 0.0
+    h0, h1, h2 = (h00, h01, h02, k00, k01, k02), (h10, h11, h12, k10, k11, k12), (h20, h21, h22, k20, k21, k22)
+    C, R = work[COV : COV + 36], s.R_p
+    C[0] = _seen(G, 0, 0, h0) + R[0, 0] + more
+    C[6], C[7] = _seen(G, n, 0, h0) + R[1, 0], _seen(G, n, 1, h1) + R[1, 1] + more
+    C[12], C[13] = _seen(G, 2 * n, 0, h0) + R[2, 0], _seen(G, 2 * n, 1, h1) + R[2, 1]
+    C[14] = _seen(G, 2 * n, 2, h2) + R[2, 2] + more
+    work[RESIDUAL], work[RESIDUAL + 1], work[RESIDUAL + 2] = y0, y1, y2
+    return absorb_three(x, P, work, t.force_gate)
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _by_squares(q: Array, w0: float, w1: float, w2: float, y: float, h0: float, h1: float,
+                h2: float) -> tuple[float, float, float, float]:  # fmt: skip
+    """y_k and its row of d p / d omega with what the products q . z add to p_k."""
+    y -= q[0] * w0 * w0 + q[1] * w0 * w1 + q[2] * w0 * w2 + q[3] * w1 * w1 + q[4] * w1 * w2 + q[5] * w2 * w2
+    h0 += 2.0 * q[0] * w0 + q[1] * w1 + q[2] * w2
+    h1 += q[1] * w0 + 2.0 * q[3] * w1 + q[4] * w2
+    return y, h0, h1, h2 + q[2] * w0 + q[4] * w1 + 2.0 * q[5] * w2
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _seen(G: Array, row: int, l: int, h: tuple[float, float, float, float, float, float]) -> float:
+    """Element of H P H^T: row of H P times row l of H, whose parts for omega and the pivot are h."""
+    value = G[row + 12 + l] + G[row + 15 + l] + h[0] * G[row] + h[1] * G[row + 1] + h[2] * G[row + 2]
+    return value + h[3] * G[row + 18] + h[4] * G[row + 19] + h[5] * G[row + 20]
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def by_standstill(x: Array, P: Array, work: Array, alpha_m: Three, earth_b: Three, s: Sensor, t: Tuning) -> None:
+    """omega is the Earth's and omega' is bias (E-38)."""
+    C, y = work[COV : COV + 36], work[RESIDUAL : RESIDUAL + 6]
+    for k in range(6 * STATES):
+        work[ROWS + k] = P[k]
+    for i in range(6):
+        for j in range(i + 1):
+            C[6 * i + j] = P[22 * i + j]
+    for i in range(3):
+        y[i], y[3 + i] = earth_b[i] - x[i], alpha_m[i] - x[3 + i]
+        C[7 * i] += t.still_rate
+        for j in range(i + 1):
+            C[6 * (3 + i) + 3 + j] += s.R_alpha[i, j]
+    absorb_six(x, P, work, np.inf)
