@@ -69,6 +69,11 @@ def channels(mask: int) -> list[int]:
     return [i for i in range(8) if mask >> i & 1]
 
 
+def figures(s: AnalogueSettings) -> tuple[float, float, float, float]:
+    """V at 0 g, V per m/s^2, V at rest, V per rad/s."""
+    return s.zero_g_v, s.accel_v_per_g / STANDARD_GRAVITY, s.zero_rate_v, math.degrees(s.gyro_v_per_dps)
+
+
 def missing(frame: Adc, s: AnalogueSettings) -> list[int]:
     """Inputs that the settings want and the frame does not hold."""
     return sorted(s.needed() - set(channels(frame.channel_mask)))

@@ -51,9 +51,10 @@ class Analogue:
         return counts, force, rate
 
 
-def adc_kind(payload: Adc, settings: analogue.AnalogueSettings) -> tuple[int, float]:
-    """What frames of an analogue board must share to be joined: channels in a row, V per count."""
-    return len(analogue.channels(payload.channel_mask)), analogue.volt_per_count(payload.vref_mv, settings.bits)
+def adc_kind(payload: Adc, settings: analogue.AnalogueSettings) -> tuple[int, float, tuple[float, ...]]:
+    """What frames of an analogue board must share to be joined: inputs, V per count, figures of the sensors."""
+    volt = analogue.volt_per_count(payload.vref_mv, settings.bits)
+    return payload.channel_mask, volt, analogue.figures(settings)
 
 
 def messages_of(kind: type, batch: Batch, hello: Hello | None) -> list[tuple[Topic, Message]]:
@@ -75,10 +76,11 @@ def messages_of(kind: type, batch: Batch, hello: Hello | None) -> list[tuple[Top
         force, rate = batch.columns
         return [(IMU, pb.ImuBatch(f_b_mps2=force, omega_ib_b_radps=rate, **common))]
     counts, force, rate = batch.columns
-    channels, volt = batch.kind
-    said: list[tuple[Topic, Message]] = [
-        (ADC, pb.AdcBatch(channels=channels, counts=counts, volt_per_count=volt, **common))
-    ]
+    mask, volt, (zero_g, per_mps2, zero_rate, per_radps) = batch.kind
+    said: list[tuple[Topic, Message]] = [(ADC, pb.AdcBatch(
+        channels=len(analogue.channels(mask)), counts=counts, volt_per_count=volt, channel_mask=mask, zero_g_v=zero_g,
+        accel_v_per_mps2=per_mps2, zero_rate_v=zero_rate, gyro_v_per_radps=per_radps, **common,
+    ))]  # fmt: skip
     if force:
         said.append((IMU, pb.ImuBatch(f_b_mps2=force, omega_ib_b_radps=rate, **common)))
     return said

@@ -259,7 +259,7 @@ class Fault(_message.Message):
     def __init__(self, name: _Optional[str] = ..., text: _Optional[str] = ..., since_utc_ns: _Optional[int] = ..., active: _Optional[bool] = ...) -> None: ...
 
 class AdcBatch(_message.Message):
-    __slots__ = ("header", "first_index", "period_s", "channels", "counts", "volt_per_count", "lost_samples", "frame_sequence", "received_ns")
+    __slots__ = ("header", "first_index", "period_s", "channels", "counts", "volt_per_count", "lost_samples", "frame_sequence", "received_ns", "channel_mask", "zero_g_v", "accel_v_per_mps2", "zero_rate_v", "gyro_v_per_radps")
     HEADER_FIELD_NUMBER: _ClassVar[int]
     FIRST_INDEX_FIELD_NUMBER: _ClassVar[int]
     PERIOD_S_FIELD_NUMBER: _ClassVar[int]
@@ -269,6 +269,11 @@ class AdcBatch(_message.Message):
     LOST_SAMPLES_FIELD_NUMBER: _ClassVar[int]
     FRAME_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     RECEIVED_NS_FIELD_NUMBER: _ClassVar[int]
+    CHANNEL_MASK_FIELD_NUMBER: _ClassVar[int]
+    ZERO_G_V_FIELD_NUMBER: _ClassVar[int]
+    ACCEL_V_PER_MPS2_FIELD_NUMBER: _ClassVar[int]
+    ZERO_RATE_V_FIELD_NUMBER: _ClassVar[int]
+    GYRO_V_PER_RADPS_FIELD_NUMBER: _ClassVar[int]
     header: Header
     first_index: int
     period_s: float
@@ -278,7 +283,12 @@ class AdcBatch(_message.Message):
     lost_samples: int
     frame_sequence: int
     received_ns: int
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., first_index: _Optional[int] = ..., period_s: _Optional[float] = ..., channels: _Optional[int] = ..., counts: _Optional[_Iterable[int]] = ..., volt_per_count: _Optional[float] = ..., lost_samples: _Optional[int] = ..., frame_sequence: _Optional[int] = ..., received_ns: _Optional[int] = ...) -> None: ...
+    channel_mask: int
+    zero_g_v: float
+    accel_v_per_mps2: float
+    zero_rate_v: float
+    gyro_v_per_radps: float
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., first_index: _Optional[int] = ..., period_s: _Optional[float] = ..., channels: _Optional[int] = ..., counts: _Optional[_Iterable[int]] = ..., volt_per_count: _Optional[float] = ..., lost_samples: _Optional[int] = ..., frame_sequence: _Optional[int] = ..., received_ns: _Optional[int] = ..., channel_mask: _Optional[int] = ..., zero_g_v: _Optional[float] = ..., accel_v_per_mps2: _Optional[float] = ..., zero_rate_v: _Optional[float] = ..., gyro_v_per_radps: _Optional[float] = ...) -> None: ...
 
 class RateEstimate(_message.Message):
     __slots__ = ("header", "estimator", "for_sequence", "for_index", "omega_ib_b_radps", "omega_covariance", "alpha_b_radps2", "f_b_mps2", "q_nb", "angle_z_rad", "innovation", "innovation_sigma", "nis", "nis_dof", "still", "p_n_m", "v_n_mps", "bias", "innovation_unit", "sight", "sight_reason", "bound_sigma_radps", "calibration", "excluded_mask")
@@ -639,6 +649,10 @@ class EstimatorCommand(_message.Message):
         ACTION_CALIBRATE_SAVE: _ClassVar[EstimatorCommand.Action]
         ACTION_CALIBRATE_CANCEL: _ClassVar[EstimatorCommand.Action]
         ACTION_USE_CARD: _ClassVar[EstimatorCommand.Action]
+        ACTION_WIRING_START: _ClassVar[EstimatorCommand.Action]
+        ACTION_WIRING_SAVE: _ClassVar[EstimatorCommand.Action]
+        ACTION_WIRING_CANCEL: _ClassVar[EstimatorCommand.Action]
+        ACTION_USE_MAP: _ClassVar[EstimatorCommand.Action]
     ACTION_NONE: EstimatorCommand.Action
     ACTION_MUTE_GNSS: EstimatorCommand.Action
     ACTION_CALIBRATE_START: EstimatorCommand.Action
@@ -646,6 +660,10 @@ class EstimatorCommand(_message.Message):
     ACTION_CALIBRATE_SAVE: EstimatorCommand.Action
     ACTION_CALIBRATE_CANCEL: EstimatorCommand.Action
     ACTION_USE_CARD: EstimatorCommand.Action
+    ACTION_WIRING_START: EstimatorCommand.Action
+    ACTION_WIRING_SAVE: EstimatorCommand.Action
+    ACTION_WIRING_CANCEL: EstimatorCommand.Action
+    ACTION_USE_MAP: EstimatorCommand.Action
     ACTION_FIELD_NUMBER: _ClassVar[int]
     DEVICE_FIELD_NUMBER: _ClassVar[int]
     SECONDS_FIELD_NUMBER: _ClassVar[int]
@@ -657,6 +675,78 @@ class EstimatorCommand(_message.Message):
     card: str
     user: str
     def __init__(self, action: _Optional[_Union[EstimatorCommand.Action, str]] = ..., device: _Optional[str] = ..., seconds: _Optional[float] = ..., card: _Optional[str] = ..., user: _Optional[str] = ...) -> None: ...
+
+class WiringStatus(_message.Message):
+    __slots__ = ("header", "state", "instruction", "progress", "message", "source", "inputs", "turns", "complete", "map", "pose")
+    class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        STATE_IDLE: _ClassVar[WiringStatus.State]
+        STATE_WAITING: _ClassVar[WiringStatus.State]
+        STATE_MOVING: _ClassVar[WiringStatus.State]
+        STATE_FOUND: _ClassVar[WiringStatus.State]
+        STATE_SAVED: _ClassVar[WiringStatus.State]
+    STATE_IDLE: WiringStatus.State
+    STATE_WAITING: WiringStatus.State
+    STATE_MOVING: WiringStatus.State
+    STATE_FOUND: WiringStatus.State
+    STATE_SAVED: WiringStatus.State
+    class Pose(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        POSE_LEVEL: _ClassVar[WiringStatus.Pose]
+        POSE_NOSE_UP: _ClassVar[WiringStatus.Pose]
+        POSE_RIGHT_DOWN: _ClassVar[WiringStatus.Pose]
+        POSE_TURNED_RIGHT: _ClassVar[WiringStatus.Pose]
+    POSE_LEVEL: WiringStatus.Pose
+    POSE_NOSE_UP: WiringStatus.Pose
+    POSE_RIGHT_DOWN: WiringStatus.Pose
+    POSE_TURNED_RIGHT: WiringStatus.Pose
+    class Input(_message.Message):
+        __slots__ = ("name", "reading", "unit", "axis", "inverted", "unused")
+        NAME_FIELD_NUMBER: _ClassVar[int]
+        READING_FIELD_NUMBER: _ClassVar[int]
+        UNIT_FIELD_NUMBER: _ClassVar[int]
+        AXIS_FIELD_NUMBER: _ClassVar[int]
+        INVERTED_FIELD_NUMBER: _ClassVar[int]
+        UNUSED_FIELD_NUMBER: _ClassVar[int]
+        name: str
+        reading: float
+        unit: str
+        axis: str
+        inverted: bool
+        unused: bool
+        def __init__(self, name: _Optional[str] = ..., reading: _Optional[float] = ..., unit: _Optional[str] = ..., axis: _Optional[str] = ..., inverted: _Optional[bool] = ..., unused: _Optional[bool] = ...) -> None: ...
+    class Turn(_message.Message):
+        __slots__ = ("about", "by_force_rad", "by_rate_rad")
+        ABOUT_FIELD_NUMBER: _ClassVar[int]
+        BY_FORCE_RAD_FIELD_NUMBER: _ClassVar[int]
+        BY_RATE_RAD_FIELD_NUMBER: _ClassVar[int]
+        about: str
+        by_force_rad: float
+        by_rate_rad: float
+        def __init__(self, about: _Optional[str] = ..., by_force_rad: _Optional[float] = ..., by_rate_rad: _Optional[float] = ...) -> None: ...
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    STATE_FIELD_NUMBER: _ClassVar[int]
+    INSTRUCTION_FIELD_NUMBER: _ClassVar[int]
+    PROGRESS_FIELD_NUMBER: _ClassVar[int]
+    MESSAGE_FIELD_NUMBER: _ClassVar[int]
+    SOURCE_FIELD_NUMBER: _ClassVar[int]
+    INPUTS_FIELD_NUMBER: _ClassVar[int]
+    TURNS_FIELD_NUMBER: _ClassVar[int]
+    COMPLETE_FIELD_NUMBER: _ClassVar[int]
+    MAP_FIELD_NUMBER: _ClassVar[int]
+    POSE_FIELD_NUMBER: _ClassVar[int]
+    header: Header
+    state: WiringStatus.State
+    instruction: str
+    progress: float
+    message: str
+    source: str
+    inputs: _containers.RepeatedCompositeFieldContainer[WiringStatus.Input]
+    turns: _containers.RepeatedCompositeFieldContainer[WiringStatus.Turn]
+    complete: bool
+    map: str
+    pose: WiringStatus.Pose
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., state: _Optional[_Union[WiringStatus.State, str]] = ..., instruction: _Optional[str] = ..., progress: _Optional[float] = ..., message: _Optional[str] = ..., source: _Optional[str] = ..., inputs: _Optional[_Iterable[_Union[WiringStatus.Input, _Mapping]]] = ..., turns: _Optional[_Iterable[_Union[WiringStatus.Turn, _Mapping]]] = ..., complete: _Optional[bool] = ..., map: _Optional[str] = ..., pose: _Optional[_Union[WiringStatus.Pose, str]] = ...) -> None: ...
 
 class BoardCommand(_message.Message):
     __slots__ = ("name", "value", "user", "ask")
