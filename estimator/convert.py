@@ -11,12 +11,19 @@ from numpy.typing import NDArray
 
 from estimator.ins.fix import Fix, typical_sigma
 from estimator.ins.fuzzy import MEMBERSHIPS, memberships
-from estimator.ins.solution import HEADING, INNOVATIONS, Correction, HorizonChoice, Solution
+from estimator.ins.solution import HEADING, INNOVATIONS, Correction, HorizonChoice, Mode, Solution
+from estimator.stream import Stream
 from messages import gyrofree_pb2 as pb
 
 Array = NDArray[np.float64]
 
 MICRO = 1e-6
+STATES = {
+    Mode.WAITING: "waiting for samples",
+    Mode.LEVELLING: "levelling: stand still for 10 s",
+    Mode.COURSE: "finding heading: drive faster than 4 m/s",
+    Mode.NAVIGATING: "navigating",
+}
 
 
 class BadMessage(ValueError):
@@ -59,6 +66,12 @@ def imu_samples(batch: pb.ImuBatch) -> tuple[Samples, Array]:
             f"{len(rate.values)} of rate"
         )
     return force, rate.values
+
+
+def adc_samples(batch: pb.AdcBatch) -> Samples:
+    """Voltages (n, channels) of a converter's inputs; raises BadMessage."""
+    counts = _rows("adc", batch.header, batch.counts, batch.channels, batch.period_s)
+    return Samples(counts.t_s, counts.values * batch.volt_per_count)
 
 
 def fix_of(message: pb.GnssFix, every: int, clock_offset_s: float) -> Fix:
@@ -180,6 +193,36 @@ def axes_message(header: pb.Header, layout: Any, monitor: Any, now_s: float) -> 
             direction_b=as_list(layout.theta_b[i]),
         )
     return message
+
+
+def status_message(header: pb.Header, stream: Stream, name: str, us: float, version: str) -> pb.EstimatorStatus:
+    """Health of one estimator, without its state; us: measured time per sample."""
+    return pb.EstimatorStatus(
+        header=header,
+        estimator=name,
+        samples=stream.samples,
+        gaps=stream.gaps,
+        missing_samples=stream.missing,
+        us_per_sample=us,
+        version=version,
+    )
+
+
+def navigator_state(status: pb.EstimatorStatus, navigator: Any) -> pb.EstimatorStatus:
+    """The status with what a navigator does and has counted."""
+    status.state = STATES[navigator.mode]
+    status.message = ", ".join(f"fixes {what} {count}" for what, count in navigator.counts.items() if count)
+    return status
+
+
+def rate_state(status: pb.EstimatorStatus, state: Any) -> pb.EstimatorStatus:
+    """The status with what a rate estimator does; state: its newest RateState."""
+    status.state = state.phase or ("standing still" if state.still else "turning")
+    bias = as_list(state.bias)
+    if len(bias) >= 6:
+        status.bias_alpha_radps2[:] = bias[:3]
+        status.bias_f_b_mps2[:] = bias[3:6]
+    return status
 
 
 def pose_message(header: pb.Header, name: str, p_n_m: Iterable[float], q_nb: Iterable[float]) -> FrameTransform:

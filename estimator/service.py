@@ -12,9 +12,11 @@ from collections.abc import Callable
 from importlib import metadata
 from typing import Any, NamedTuple
 
+import numpy as np
 from google.protobuf.message import Message
 
-from estimator import convert
+from estimator import convert, wiring_orders
+from estimator.attitude.axis_map import MapError
 from estimator.attitude.board import AttitudeBoard
 from estimator.attitude.filters import ATTITUDES
 from estimator.calibration.card import CardError
@@ -22,7 +24,7 @@ from estimator.choice import UnknownEstimator, check_names, load_card, make_layo
 from estimator.cost import Cost
 from estimator.ins.board import NavBoard, NavOutput
 from estimator.ins.gyro_free import GyroFreeNavigation
-from estimator.ins.navigation import NAVIGATORS, Correction, Mode, NavigatorConfig
+from estimator.ins.navigation import NAVIGATORS, Correction, NavigatorConfig
 from estimator.orders import CalibrationDesk
 from estimator.rate.board import RateBoard, WrongAxes
 from estimator.settings import EstimatorSettings
@@ -31,6 +33,7 @@ from messages import gyrofree_pb2 as pb
 from messages.bus import BusSettings
 from messages.topics import (
     ACCEL,
+    ADC,
     ATTITUDE,
     AXES,
     CALIBRATION,
@@ -42,6 +45,7 @@ from messages.topics import (
     POSE,
     RATE,
     TACHO,
+    WIRING,
     Topic,
 )
 
@@ -49,14 +53,9 @@ log = logging.getLogger(__name__)
 
 POSE_HZ = 20.0
 VERSION = metadata.version("gyrofree")  # once: it reads files
-INPUTS = (ACCEL, IMU, GNSS, TACHO)
+Batch = pb.AccelBatch | pb.ImuBatch | pb.AdcBatch
+INPUTS = (ACCEL, IMU, ADC, GNSS, TACHO)
 NO_TRANSLATION = (0.0, 0.0, 0.0)  # a cube on its table turns and stays
-STATES = {
-    Mode.WAITING: "waiting for samples",
-    Mode.LEVELLING: "levelling: stand still for 10 s",
-    Mode.COURSE: "finding heading: drive faster than 4 m/s",
-    Mode.NAVIGATING: "navigating",
-}
 
 
 __all__ = ["INPUTS", "Output", "Pipeline", "UnknownEstimator", "make_layout", "run"]
@@ -84,7 +83,7 @@ class Pipeline:
         check_names("attitudes", settings.attitudes, ATTITUDES)
         check_names("gyro_free_navigation", settings.gyro_free_navigation, NAVIGATORS)
         if settings.gyro_free_navigation:
-            check_names("gyro_free_rate", [_believed(settings)], dict.fromkeys(settings.rate))
+            check_names("gyro_free_rate", [settings.believed_rate], dict.fromkeys(settings.rate))
         for layout in (settings.layout, *settings.layouts.values()):
             if layout.file:  # a wrong file is refused at the start, not at the first sample
                 make_layout(layout)
@@ -98,23 +97,34 @@ class Pipeline:
         self._attitudes: dict[str, AttitudeBoard] = {}
         self._clock_offset: dict[str, float] = {}
         self._desk = CalibrationDesk(settings.cards)
+        self._axes = wiring_orders.load(settings)
         self._cost = Cost()
         self._second: dict[tuple[str, str], int] = {}
 
     def on(self, topic: Topic, message: Message) -> list[Output]:
         """Take one message of any topic; raises convert.BadMessage for one that cannot be used."""
-        handler = {ACCEL: self.on_accel, IMU: self.on_imu, GNSS: self.on_gnss, TACHO: self.on_tacho}.get(topic)
+        handler = getattr(self, f"on_{topic.name}") if topic in INPUTS else None
         return handler(message) if handler else []
 
     def order(self, command: pb.EstimatorCommand) -> tuple[pb.Reply, list[Output]]:
         """Do what a person asked the estimator of a device for; never raises for an order that cannot be followed."""
         if command.action == pb.EstimatorCommand.ACTION_MUTE_GNSS:
             return self._mute(command), []
+        if command.action in wiring_orders.ACTIONS:
+            return self._wire(command)
         device, before = command.device, self._desk.used.get(command.device)
         reply, status = self._desk.order(command, make_layout(self._settings.layout_of(device)))
         if self._desk.used.get(device) is not before or command.action == pb.EstimatorCommand.ACTION_USE_CARD:
             self._boards.pop(device, None)  # the estimators begin anew with the other card
         return reply, [] if status is None else [Output(CALIBRATION, device, "", status)]
+
+    def _wire(self, command: pb.EstimatorCommand) -> tuple[pb.Reply, list[Output]]:
+        device, before = command.device, self._axes.used.get(command.device)
+        reply, status = self._axes.order(command)
+        if self._axes.used.get(device) is not before:  # the filters begin anew with the other axes
+            self._vehicles.pop(device, None)
+            self._attitudes.pop(device, None)
+        return reply, [] if status is None else [Output(WIRING, device, "", status)]
 
     def _mute(self, command: pb.EstimatorCommand) -> pb.Reply:
         board = self._navigating(command.device)
@@ -187,8 +197,39 @@ class Pipeline:
             raise convert.BadMessage(f"{device}: {error}") from None
 
     def on_imu(self, batch: pb.ImuBatch) -> list[Output]:
-        """Solutions, poses, corrections that became due and, once per second of data, the health of each filter."""
+        """What the filters make of a batch, by the axis map in use; a map of the converter's inputs leaves it out."""
         samples, rates = convert.imu_samples(batch)
+        device = batch.header.device
+        columns = np.hstack([samples.values, rates])
+        out = self._watch(batch, "imu", columns)
+        if device in self._axes.used:
+            return out + self._mapped(batch, samples.t_s, columns, "imu")
+        return out + self._inertial(batch, samples, rates)
+
+    def on_adc(self, batch: pb.AdcBatch) -> list[Output]:
+        """Counts of an analogue board: for a guided detection, and for the filters where a map of inputs is used."""
+        if not self._axes.wants(batch.header.device, "adc"):
+            return []
+        samples = convert.adc_samples(batch)
+        out = self._watch(batch, "adc", samples.values)
+        return out + self._mapped(batch, samples.t_s, samples.values, "adc")
+
+    def _watch(self, batch: Batch, source: str, values: Any) -> list[Output]:
+        status = self._axes.feed(batch, source, values)
+        return [] if status is None else [Output(WIRING, batch.header.device, "", status)]
+
+    def _mapped(self, batch: Batch, t_s: Any, values: Any, source: str) -> list[Output]:
+        used = self._axes.used.get(batch.header.device)
+        if used is None or used.source != source:
+            return []
+        try:
+            force, rates = used.apply(values)
+        except MapError as error:
+            raise convert.BadMessage(f"{batch.header.device}: {error}") from None
+        return self._inertial(batch, convert.Samples(t_s, force), rates)
+
+    def _inertial(self, batch: Batch, samples: convert.Samples, rates: Any) -> list[Output]:
+        """Solutions, poses, corrections that became due and, once per second of data, the health of each filter."""
         device = batch.header.device
         board = self._vehicles.get(device)
         if board is None:
@@ -197,20 +238,13 @@ class Pipeline:
             self._vehicles[device] = board
         self._clock_offset[device] = batch.header.utc_ns * 1e-9 - batch.header.device_us * 1e-6
         started = self._clock()
-        said = board.feed(
-            batch.header.epoch, batch.first_index, batch.period_s, samples.t_s, samples.values, rates
-        )  # fmt: skip
+        said = board.feed(batch.header.epoch, batch.first_index, batch.period_s, samples.t_s, samples.values, rates)
         self._cost.add(device, self._clock() - started, len(samples.t_s))
         out = self._navigated(batch, samples, board, said, self._settings.navigators)
         return out + self._tilt(batch, samples.values, rates)
 
     def _navigated(
-        self,
-        batch: pb.ImuBatch | pb.AccelBatch,
-        samples: convert.Samples,
-        board: NavBoard,
-        said: list[NavOutput],
-        names: list[str],
+        self, batch: Batch, samples: convert.Samples, board: NavBoard, said: list[NavOutput], names: list[str]
     ) -> list[Output]:
         """What navigation filters said, as messages; once per second of data their health."""
         device, out = batch.header.device, []
@@ -264,14 +298,10 @@ class Pipeline:
         s = self._settings
         config = NavigatorConfig(lever_arm_b=s.vehicle_of(device).lever_arm_b_m)
         names = s.gyro_free_navigation
-        return GyroFreeNavigation(device, config, names, s.nav_limit_hz, _believed(s), s.rate_limit_hz)
+        return GyroFreeNavigation(device, config, names, s.nav_limit_hz, s.believed_rate, s.rate_limit_hz)
 
     def _nav_status(self, header: pb.Header, board: NavBoard, name: str) -> pb.EstimatorStatus:
-        status = self._status(header, board.stream, name)
-        navigator = board.navigators[name]
-        status.state = STATES[navigator.mode]
-        status.message = ", ".join(f"fixes {what} {count}" for what, count in navigator.counts.items() if count)
-        return status
+        return convert.navigator_state(self._status(header, board.stream, name), board.navigators[name])
 
     def _new_second(self, device: str, what: str, t_s: float) -> bool:
         second = int(t_s)
@@ -280,32 +310,12 @@ class Pipeline:
         return changed
 
     def _rate_status(self, header: pb.Header, board: RateBoard, name: str) -> pb.EstimatorStatus:
-        status = self._status(header, board.stream, name)
-        state = board.last[name]
-        status.state = state.phase or ("standing still" if state.still else "turning")
-        status.layout = board.layout.name
-        status.us_per_sample = board.cost_us(name)
-        bias = convert.as_list(state.bias)
-        if len(bias) >= 6:
-            status.bias_alpha_radps2[:] = bias[:3]
-            status.bias_f_b_mps2[:] = bias[3:6]
+        status = convert.rate_state(self._status(header, board.stream, name), board.last[name])
+        status.layout, status.us_per_sample = board.layout.name, board.cost_us(name)
         return status
 
     def _status(self, header: pb.Header, stream: Stream, name: str) -> pb.EstimatorStatus:
-        return pb.EstimatorStatus(
-            header=header,
-            estimator=name,
-            samples=stream.samples,
-            gaps=stream.gaps,
-            missing_samples=stream.missing,
-            us_per_sample=self._cost.take(header.device, name),
-            version=VERSION,
-        )
-
-
-def _believed(settings: EstimatorSettings) -> str:
-    """The rate estimator that feeds navigation."""
-    return settings.gyro_free_rate or (settings.rate or [""])[0]
+        return convert.status_message(header, stream, name, self._cost.take(header.device, name), VERSION)
 
 
 def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) -> None:

@@ -49,6 +49,8 @@ class EstimatorSettings(BaseModel):
     calibration: Path | None = None  # calibration card of a device that calibrations does not name
     calibrations: dict[str, Path] = Field(default_factory=dict)  # calibration cards by device name
     cards: Path = Path("var/cards")  # folder that a guided calibration saves its cards to
+    axes: Path = Path("var/axes")  # folder that a guided detection saves its axis maps to
+    axis_maps: dict[str, Path] = Field(default_factory=dict)  # axis maps in use, by device name
     vehicle: VehicleSettings = VehicleSettings()  # of a device that vehicles does not name
     vehicles: dict[str, VehicleSettings] = Field(default_factory=dict)  # by device name
     use_every_fix: int = Field(default=1, ge=1, le=1000)  # n: filters get one fix in n, the others only score them
@@ -58,6 +60,11 @@ class EstimatorSettings(BaseModel):
     rate_limit_hz: float = Field(default=200.0, gt=0.0, le=1000.0)  # Hz, at most, of each rate/<estimator>
     attitude_limit_hz: float = Field(default=50.0, gt=0.0, le=1000.0)  # Hz, at most, of each attitude/<estimator>
     nav_limit_hz: float = Field(default=20.0, gt=0.0, le=200.0)  # Hz, at most, of nav and pose
+
+    @property
+    def believed_rate(self) -> str:
+        """The rate estimator that feeds gyro-free navigation."""
+        return self.gyro_free_rate or (self.rate or [""])[0]
 
     def layout_of(self, device: str) -> LayoutSettings:
         """Accelerometer layout of a device."""
