@@ -89,6 +89,8 @@ class Spool:
             if not self.journal.append(PUBLISHED, data, time.monotonic_ns(), time.time_ns()):
                 return
             segment, offset = self.journal.place
+            if segment not in self._runs:
+                self._forget_removed()
             _count(self._runs.setdefault(segment, {}), topic, device, run, sequence)
             seen = self._glances.setdefault((topic, device), deque(maxlen=int(OVERVIEW_LENGTH_S / OVERVIEW_S)))
             if not seen or abs(utc_ns - seen[-1].utc_ns) >= OVERVIEW_S * 1e9:
@@ -206,9 +208,13 @@ class Spool:
             entry = entry_of(record)
             _count(found, entry.topic, entry.device, entry.run, entry.sequence)
         with self._lock:
-            for gone in [k for k in self._runs if k < self.journal.first_kept()]:
-                del self._runs[gone]
+            self._forget_removed()
             return dict(self._runs.setdefault(first, found))
+
+    def _forget_removed(self) -> None:
+        kept = self.journal.first_kept()
+        for gone in [first for first in self._runs if first < kept]:
+            del self._runs[gone]
 
     # --- overview
 

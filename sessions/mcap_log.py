@@ -17,6 +17,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import CompressionType, Writer
 
 from messages.topics import Topic
+from sessions.chunk_index import spill
 
 PROFILE = "gyrofree"
 RECORD_LIMIT = 64 * 1024**2  # bytes; a longer record is damage, not data (our chunks are 128 KiB)
@@ -84,9 +85,11 @@ class Sink:
 class McapLog:
     """Appends messages; channels and schemas are made at the first message of a key."""
 
-    def __init__(self, fd: int, chunk_bytes: int) -> None:
+    def __init__(self, fd: int, chunk_bytes: int, folder: Path | None = None) -> None:
+        """folder: where the index of a long recording waits for its end."""
         self._sink = Sink(fd)
         self._writer = Writer(self._sink, chunk_size=chunk_bytes, compression=CompressionType.ZSTD)
+        spill(self._writer, folder)
         self._writer.start(PROFILE)
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}

@@ -16,6 +16,6 @@ class RecorderSettings(BaseModel):
     max_file_bytes: int = Field(default=2 * 1024**3, ge=64 * 1024)  # then a new session continues, bytes
     chunk_bytes: int = Field(default=128 * 1024, ge=4096, le=128 * 1024)  # largest MCAP chunk, uncompressed, bytes
     flush_s: float = Field(default=0.4, gt=0, le=0.5)  # a chunk is closed at least this often, s
-    sync_s: float = Field(default=0.5, gt=0, le=0.5)  # fdatasync this often, s
+    sync_s: float = Field(default=0.5, gt=0, le=0.5)  # fdatasync after each flush, and at least this often, s
     max_pending_bytes: int = Field(default=32 * 1024**2, ge=1024**2)  # held in memory while the disk is full, bytes
     max_inbox: int = Field(default=200_000, ge=1000)  # messages waiting to be written; more are counted as overflow

@@ -64,7 +64,7 @@ class SessionStore:
         self._fd = os.open(folder / RECORDING, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o640)
         try:
             lock(self._fd)
-            self._log = McapLog(self._fd, settings.chunk_bytes)
+            self._log = McapLog(self._fd, settings.chunk_bytes, folder)
             self._log.push()
             write_manifest(folder, manifest)
             sync_folder(folder.parent)
@@ -73,7 +73,7 @@ class SessionStore:
             shutil.rmtree(folder, ignore_errors=True)  # made above, nothing in it yet: no heap of empty sessions
             raise
         self._last_ns = manifest.start_utc_ns  # receive time of the last message, ns since 1970
-        self._stop = threading.Event()
+        self._stop, self._news = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._sync_loop, name="sync", daemon=True)
         self._thread.start()
 
@@ -147,6 +147,7 @@ class SessionStore:
             self._fail("writing", error)
             return
         self._pushed = self._accepted
+        self._news.set()
         self.manifest.bytes = self._log.size
         self._write_error = ""
 
@@ -176,7 +177,9 @@ class SessionStore:
 
     def _sync_loop(self) -> None:
         keys, told = 0, time.monotonic()
-        while not self._stop.wait(self._settings.sync_s):
+        while not self._stop.is_set():
+            self._news.wait(self._settings.sync_s)  # what was handed over is made safe at once: a cut may cost a second
+            self._news.clear()
             pushed = self._pushed
             try:
                 os.fdatasync(self._fd)
@@ -193,6 +196,7 @@ class SessionStore:
     def close(self) -> bool:
         """End the file and write its hash; False when the disk refuses: the session stays open, to be recovered."""
         self._stop.set()
+        self._news.set()
         self._thread.join()
         try:
             self._log.close_chunk()

@@ -38,7 +38,7 @@ def until(condition, what: str):
 class Stack:
     """Router and board in this process, gateway and recorder in their own."""
 
-    def __init__(self, folder: Path, port: int) -> None:
+    def __init__(self, folder: Path, port: int, period_s: float = PERIOD_S) -> None:
         self.folder = folder
         endpoint = f"tcp/127.0.0.1:{port}"
         self.bus = BusSettings(router=endpoint, listen=[endpoint])
@@ -51,8 +51,8 @@ class Stack:
         )
         self.status, self.line = pb.RecorderStatus(), pb.LinkStatus()
         self._stop = threading.Event()
-        items = (BoardAccel(k * PERIOD_S, tuple((k + axis) % 300 for axis in range(12))) for k in range(1 << 30))
-        board = VirtualBoard(self.link, SIMULATED, epoch=3, sample_period_s=PERIOD_S)
+        items = (BoardAccel(k * period_s, tuple((k + axis) % 300 for axis in range(12))) for k in range(1 << 30))
+        board = VirtualBoard(self.link, SIMULATED, epoch=3, sample_period_s=period_s)
         self._board = threading.Thread(target=board.run, args=(items, self._stop), kwargs={"speed": 1.0})
 
     def __enter__(self) -> "Stack":
