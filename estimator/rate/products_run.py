@@ -27,10 +27,13 @@ from estimator.rate.products_kernel import (
     REST_VARIANCE,
     SIGN,
     SIZE,
-    USED, V_N, WORK, Tuning,
+    USED,
+    V_N,
+    WORK,
+    Tuning,
 )  # fmt: skip
 from estimator.rate.products_model import BIASES, FIRST, SECOND, STATES, TURNED
-from estimator.rate.products_step import step
+from estimator.rate.products_step import back, step
 from estimator.rate.still import COUNT, DEPTH, FILLED, Limits, Watch
 
 Array = NDArray[np.float64]
@@ -297,10 +300,8 @@ def advance(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, t_s: float, a:
                 m.arrival[(sample // EVERY) % ARRIVALS] = m.core
                 m.arrival_at[(sample // EVERY) % ARRIVALS] = sample
             if turn > 0:  # back from the end by what omega' was since
-                left = now - sample
                 gained = w.total[now % (2 * DEPTH)] - w.total[sample % (2 * DEPTH)]
-                at = (end[0] - dt * (gained[0] - left * end[3]), end[1] - dt * (gained[1] - left * end[4]),
-                      end[2] - dt * (gained[2] - left * end[5]))  # fmt: skip
+                at = back(end, gained, now - sample, dt)
             for branch in range(m.marks[BRANCHES]):
                 core, out = (m.core, m.out) if branch == 0 else (m.other, m.other_out)
                 step(core, m.work, s, t, w.y[k], at, w.dt[k], not still, fixed, grow, out)

@@ -198,3 +198,10 @@ def _navigate(core: Array, w0: float, w1: float, w2: float, f_b: Three, dt: floa
         v = core[V_N + i] + 0.5 * dt * (core[FORCE + i] + force)
         core[P_N + i] += 0.5 * dt * (core[V_N + i] + v)
         core[V_N + i], core[FORCE + i] = v, force
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def back(end: Array, gained: Array, samples: int, dt: float) -> Three:
+    """omega that many samples before one with state `end`, by the sum `gained` of omega' measured since (E-49)."""
+    return (end[0] - dt * (gained[0] - samples * end[3]), end[1] - dt * (gained[1] - samples * end[4]),
+            end[2] - dt * (gained[2] - samples * end[5]))  # fmt: skip
