@@ -959,3 +959,15 @@ class HistoryItem(_message.Message):
     published_ns: int
     payload: bytes
     def __init__(self, topic: _Optional[str] = ..., run: _Optional[int] = ..., sequence: _Optional[int] = ..., utc_ns: _Optional[int] = ..., published_ns: _Optional[int] = ..., payload: _Optional[bytes] = ...) -> None: ...
+
+class GnssMute(_message.Message):
+    __slots__ = ("header", "after_s", "until_s", "user")
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    AFTER_S_FIELD_NUMBER: _ClassVar[int]
+    UNTIL_S_FIELD_NUMBER: _ClassVar[int]
+    USER_FIELD_NUMBER: _ClassVar[int]
+    header: Header
+    after_s: float
+    until_s: float
+    user: str
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., after_s: _Optional[float] = ..., until_s: _Optional[float] = ..., user: _Optional[str] = ...) -> None: ...

@@ -71,6 +71,7 @@ ATTITUDE = Topic("attitude", pb.AttitudeEstimate, 50, "estimator", "tilt of a si
 AXES = Topic("axes", pb.AxisHealth, 4, "estimator", "health of every accelerometer axis")
 CALIBRATION = Topic("calibration", pb.CalibrationStatus, 2, "estimator", "progress of a guided calibration")
 WIRING = Topic("wiring", pb.WiringStatus, 4, "estimator", "progress of a guided detection of axes and signs")
+MUTE = Topic("mute", pb.GnssMute, 0, "estimator", "an operator's GNSS outage: fixes that are held back")
 NOTE = Topic("note", pb.Note, 0, "any", "remarks on the data by people and programs")
 REPLAY = Topic("replay", pb.ReplayStatus, 5, "replay", "where a replay stands", recorded=False)
 STATUS = Topic("status", pb.RecorderStatus, 1, "recorder", "state of the recording", recorded=False)
@@ -78,7 +79,7 @@ LOG = Topic("log", Log, 0, "any", "warnings worth keeping with the data")
 
 TOPICS: tuple[Topic, ...] = (
     ACCEL, IMU, ADC, TACHO, GNSS, LOCATION, LINK, BOARD, TRUTH, RATE, NAV, INNOVATION, ATTITUDE, POSE, ESTIMATOR, AXES,
-    CALIBRATION, WIRING, NOTE, REPLAY, STATUS, LOG,
+    CALIBRATION, WIRING, NOTE, REPLAY, STATUS, LOG, MUTE,
 )  # fmt: skip
 
 BY_NAME = {topic.name: topic for topic in TOPICS}
