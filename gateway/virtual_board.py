@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from firmware_protocol.codec import FLAG_DROPPED, FLAG_SIMULATED, Deframer, Frame, encode
-from firmware_protocol.frames import Acc12, Ack, Command, Gps, Hello, Imu6, Payload, SensorInfo, Status, Tacho
+from firmware_protocol.frames import Acc12, Ack, Adc, Command, Gps, Hello, Imu6, Payload, SensorInfo, Status, Tacho
 from firmware_protocol.spec import SPEC
 
 log = logging.getLogger(__name__)
@@ -23,6 +23,7 @@ SIMULATED, PLAYED = 1, 2  # board_id
 ACCEL_SCALE_UG = 10  # 1e-5 m/s^2 per count: the last digit of the logs
 GYRO_SCALE_NRAD = 1000  # 1e-6 rad/s per count
 ADXL345_SCALE_NG = 3_900_000
+VREF_MV = 3300  # of the converter
 TACHO_FRAME_S = 0.02  # pulses wait no longer for company
 MAX_PULSES = 32
 GPS_BYTES = 400
@@ -50,6 +51,14 @@ class BoardImu:
 
 
 @dataclass(frozen=True, slots=True)
+class BoardAdc:
+    """One sample of an analogue board: counts of its converter's first inputs."""
+
+    t_s: float
+    counts: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class BoardPulse:
     """One pulse of the tachometer; direction +1, -1, or 0 for a board without a direction channel."""
 
@@ -65,7 +74,9 @@ class BoardBytes:
     data: bytes
 
 
-Item = BoardAccel | BoardImu | BoardPulse | BoardBytes
+_ROWS = {BoardAccel: Acc12, BoardImu: Imu6, BoardAdc: Adc}
+
+Item = BoardAccel | BoardImu | BoardAdc | BoardPulse | BoardBytes
 
 
 class Link(Protocol):
@@ -139,7 +150,7 @@ class VirtualBoard:
         """One item, now."""
         if self._start_s is None:
             self._start_s = item.t_s
-            self._rows_type = Imu6 if isinstance(item, BoardImu) else Acc12  # HELLO goes first and must know
+            self._rows_type = _ROWS.get(type(item), Acc12)  # HELLO goes first and must know
         self._housekeeping(item.t_s)
         match item:
             case BoardAccel():
@@ -147,6 +158,8 @@ class VirtualBoard:
             case BoardImu():
                 row = tuple(round(f / (ACCEL_SCALE_UG * 1e-6)) for f in item.f_b)
                 self._sample(Imu6, item.t_s, row + tuple(round(w / (GYRO_SCALE_NRAD * 1e-9)) for w in item.omega_b))
+            case BoardAdc():
+                self._sample(Adc, item.t_s, item.counts)
             case BoardPulse():
                 if self._waiting_pulses and self._waiting_pulses[0].direction != item.direction:
                     self._send_pulses()
@@ -209,6 +222,9 @@ class VirtualBoard:
         period_ns = round(self.period_s * 1e9)
         if self._rows_type is Acc12:
             self._send(Acc12(first, period_ns, 0x0F, 0, counts), t_s)  # type: ignore[arg-type]
+        elif self._rows_type is Adc:
+            mask = (1 << len(counts[0])) - 1
+            self._send(Adc(first, period_ns, mask, VREF_MV, counts), t_s)
         else:
             self._send(Imu6(first, period_ns, ACCEL_SCALE_UG, GYRO_SCALE_NRAD, counts), t_s)  # type: ignore[arg-type]
 
@@ -235,7 +251,7 @@ class VirtualBoard:
 
     def _hello(self) -> Hello:
         uid, firmware = self._names
-        six = self._rows_type is Imu6
+        six = self._rows_type is not Acc12
         sensor = SensorInfo(model=2 if six else 1, scale_ng=self._scale_ng)
         return Hello(
             minor=1, board_id=self.board_id, sensor_mask=1 if six else 0x0F, n_axes=6 if six else 12, tick_hz=1_000_000,

@@ -5,6 +5,7 @@ import json
 import logging
 import sys
 import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -61,7 +62,8 @@ def demo(
         str,
         typer.Option(
             help="'table': the simulated rotating table. 'emulated': the same table, sensed by the firmware image in "
-            "an emulator. 'drive': the log in --data, played."
+            "an emulator. 'arm': the cube at the end of a turning arm, navigating. 'tilt': an analogue tilt board in a "
+            "hand, its wiring unknown. 'drive': the log in --data, played."
         ),
     ] = "table",
     data: Annotated[Path | None, typer.Option(help="Folder with imu.csv and gnss.csv, for --source drive.")] = None,
@@ -81,6 +83,8 @@ def demo(
     if source == "table":
         faults_of(fault)  # a wrong one is said here, not in the board's log
         board, device, layout = ["simulate", *(w for f in fault or () for w in ("--fault", f))], "cube", "cube"
+    elif source in demonstration.SIMULATED:
+        board, device, layout = demonstration.SIMULATED[source]
     elif source == "emulated":
         cli_board.check()
         board, device, layout = ["board", "--emulate", "--speed", str(speed)], "cube", "cube"
@@ -90,11 +94,10 @@ def demo(
         _check_log(data)
         board, device, layout = ["play", str(data), "--speed", str(speed), "--loop"], "car", "imu"
     else:
-        raise fail(f"--source {source!r}: want 'table', 'emulated' or 'drive'", CONFIG)
-    scale = 1.0 if source == "table" else speed
-    demonstration.run(
-        demonstration.Plan(folder.absolute(), board, device, layout, port, bus_port, record=record, time_scale=scale)
-    )
+        raise fail(f"--source {source!r}: want 'table', 'emulated', 'arm', 'tilt' or 'drive'", CONFIG)
+    scale = speed if source in ("emulated", "drive") else 1.0
+    plan = demonstration.Plan(folder.absolute(), board, device, layout, port, bus_port, record=record, time_scale=scale)
+    demonstration.run(replace(plan, estimator=demonstration.ESTIMATOR.get(source, "")))
 
 
 def _check_log(path: Path, gnss: Path | None = None) -> str:
@@ -195,6 +198,17 @@ def simulate(
     seed: Annotated[int, typer.Option(help="Seed of biases, scale errors and noise.")] = 1,
     device: Annotated[str, typer.Option(help="Device name under which the truth is published.")] = "cube",
     once: Annotated[bool, typer.Option(help="End after one run of the profile.")] = False,
+    arm: Annotated[
+        float | None,
+        typer.Option(
+            min=0.5,
+            max=20.0,
+            help="The cube rides at the end of an arm of this length, m, with a receiver; instead of --profile.",
+        ),
+    ] = None,
+    tilt: Annotated[
+        bool, typer.Option("--tilt", help="Be an analogue tilt board in a hand instead; it follows a guided detection.")
+    ] = False,
     fault: Fault = None,
     csv: Annotated[
         Path | None, typer.Option(help="Be no board: write one run with its truth to this CSV, for `gyrofree run`.")
@@ -224,8 +238,10 @@ def simulate(
 
     def body(stop: threading.Event) -> None:
         from gyrofree import simulate as simulator
+        from gyrofree import simulate_hand
 
-        simulator.run(simulator.Options(link, tcp, profile_name, seed, device, once, faults), settings.bus, stop)
+        options = simulator.Options(link, tcp, profile_name, seed, device, once, faults, arm or 0.0)
+        (simulate_hand if tilt else simulator).run(options, settings.bus, stop)
 
     run_service(body, verbose)
 

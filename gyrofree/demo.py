@@ -33,6 +33,18 @@ class Plan:
     host: str = "127.0.0.1"
     record: bool = True
     time_scale: float = 1.0  # seconds of the log per second
+    estimator: str = ""  # further lines of [estimator]
+
+
+SIMULATED = {  # boards of `gyrofree simulate` besides the table: its arguments, device, layout
+    "arm": (["simulate", "--arm", "3"], "cube", "cube"),
+    "tilt": (["simulate", "--tilt", "--device", "tilt-board"], "tilt-board", "analogue"),
+}
+ESTIMATOR = {
+    "arm": 'rate = ["products-free", "least-squares"]\ngyro_free_rate = "products-free"\n'
+    'gyro_free_navigation = ["huber", "kf"]\nuse_every_fix = 2\n',
+    "tilt": "navigators = []\n",
+}
 
 
 def write_configuration(plan: Plan) -> Path:
@@ -56,7 +68,9 @@ time_scale = {plan.time_scale}
 
 [estimator]
 journal = "{plan.folder / "estimates"}"
-
+axes = "{plan.folder / "axes"}"
+cards = "{plan.folder / "cards"}"
+{plan.estimator}
 [recorder]
 root = "{plan.folder / "sessions"}"
 auto_start = {str(plan.record).lower()}

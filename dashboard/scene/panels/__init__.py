@@ -20,6 +20,7 @@ from dashboard.scene.panels.rates import Rates
 from dashboard.scene.panels.record import Record
 from dashboard.scene.panels.tilt import Tilt
 from dashboard.scene.panels.timeline import Timeline
+from dashboard.scene.panels.wiring import Wiring
 
 PAGES: tuple[type[Panel], ...] = (
     Rates,
@@ -36,6 +37,7 @@ PAGES: tuple[type[Panel], ...] = (
     Health,
     LayoutBench,
     Calibration,
+    Wiring,
     Tilt,
     Race,
 )

@@ -1,0 +1,109 @@
+"""`gyrofree simulate --board tilt`: an analogue tilt board in somebody's hand, on a line that speaks the real wire.
+
+While a guided detection of axes runs for its device, the hand does what the page says; else it tilts the board about.
+Its wiring is drawn from the seed, so that there is something to find.
+"""
+
+import itertools
+import logging
+import threading
+import time
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from estimator.simulation.hand import RATE_HZ, AnalogueWiring, Hand
+from gateway.virtual_board import SIMULATED, BoardAdc, VirtualBoard
+from gyrofree.simulate import Options, TruthPublisher, open_link
+from messages import gyrofree_pb2 as pb
+from messages.bus import BusSettings, BusUnavailable, open_client, subscribe
+from messages.topics import WIRING
+
+log = logging.getLogger(__name__)
+
+CHANNELS = 6  # one of them open
+REST_S, MOVE_S = 1.6, 1.4  # s, of a guided movement: the detection wants a second of rest
+IDLE_REST_S, IDLE_MOVE_S = 1.0, 2.0
+GONE_S = 3.0  # s without a word: nobody guides any more
+POSES = {
+    pb.WiringStatus.POSE_LEVEL: "level",
+    pb.WiringStatus.POSE_NOSE_UP: "nose up",
+    pb.WiringStatus.POSE_RIGHT_DOWN: "right down",
+    pb.WiringStatus.POSE_TURNED_RIGHT: "turned right",
+}
+
+
+class Guide:
+    """What the page asks for, as heard on the bus; nothing while there is no bus or no detection."""
+
+    def __init__(self, bus: BusSettings, device: str, stop: threading.Event) -> None:
+        self._device = device
+        self._wanted: tuple[float, pb.WiringStatus] | None = None
+        threading.Thread(target=self._listen, args=(bus, stop), name="guide", daemon=True).start()
+
+    def _listen(self, bus: BusSettings, stop: threading.Event) -> None:
+        try:
+            session = open_client(bus, stop)
+        except BusUnavailable:
+            return
+        self._kept = session, subscribe(session, WIRING, bus.prefix, self._heard, self._device)
+
+    def _heard(self, _: object, status: pb.WiringStatus) -> None:
+        self._wanted = time.monotonic(), status
+
+    @property
+    def pose(self) -> str:
+        """Pose to go to now; empty: whatever one likes."""
+        if self._wanted is None or time.monotonic() - self._wanted[0] > GONE_S:
+            return ""
+        status = self._wanted[1]
+        running = status.state in (pb.WiringStatus.STATE_WAITING, pb.WiringStatus.STATE_MOVING)
+        return POSES[status.pose] if running else ""
+
+
+def wiring_of(seed: int) -> AnalogueWiring:
+    """A wiring of the board's six inputs that is not the usual one."""
+    draw = np.random.default_rng([seed, 41])
+    inputs = tuple(int(v) for v in draw.permutation(CHANNELS)[:5])
+    return AnalogueWiring(inputs, tuple(int(v) for v in draw.choice([-1, 1], 5)), CHANNELS)
+
+
+def motion(hand: Hand, guide: Guide, seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Samples without end: guided where there is a guide."""
+    draw, at, rest = np.random.default_rng([seed, 42]), "", 0.0
+    while True:
+        rest = rest + 1.0 / RATE_HZ if hand.resting else 0.0
+        wanted = guide.pose
+        if wanted and rest > REST_S and wanted != at:
+            hand.move_to(hand.pose(wanted), MOVE_S)
+            at = wanted
+        elif not wanted and rest > IDLE_REST_S:
+            tilt = Rotation.from_euler("ZYX", draw.uniform(-1.0, 1.0, 3) * [0.5, 0.7, 0.9])
+            hand.move_to(tilt, IDLE_MOVE_S)
+            at = ""
+        yield hand.step()
+
+
+def run(options: Options, bus: BusSettings, stop: threading.Event) -> None:
+    """Be the board until `stop` is set; raises OSError for a path or port in use."""
+    link, port = open_link(options)
+    wiring, hand = wiring_of(options.seed), Hand(options.seed)
+    guide = Guide(bus, options.device, stop)
+    truths = TruthPublisher(bus, options.device, stop)
+    log.info("simulated tilt board, inputs %s, signs %s, on %s", wiring.inputs, wiring.signs, port)
+    epoch = int(time.time()) & 0xFF
+    truths.begin(epoch)
+
+    def items() -> Iterator[BoardAdc]:
+        samples = motion(hand, guide, options.seed)
+        for k in itertools.count():
+            f, w = next(samples)
+            truths.tilt(k, k / RATE_HZ, hand.attitude.as_quat(canonical=True)[[3, 0, 1, 2]], f, w)
+            yield BoardAdc(k / RATE_HZ, tuple(wiring.counts(f[None], w[None])[0].tolist()))
+
+    try:
+        board = VirtualBoard(link, SIMULATED, epoch=epoch, firmware="simulated tilt board")
+        board.run(items(), stop, wait_for_reader=True)
+    finally:
+        link.close()
