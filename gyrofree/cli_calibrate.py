@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from gyrofree.cli_axes import axes
 from gyrofree.cli_options import AsJson
 from gyrofree.cli_run import progress_bar
 from gyrofree.process import EXIT_CONFIG, fail
@@ -19,9 +20,11 @@ from gyrofree.process import EXIT_CONFIG, fail
 app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
-    help="Calibrate accelerometer axes from standing poses and table steps.\n\n"
-    "plan says which poses to take, fit makes a card of the logs, show prints it, apply corrects a log with it.",
+    help="Calibrate accelerometer axes from standing poses and table steps; find the axes of a tilt board.\n\n"
+    "plan says which poses to take, fit makes a card of the logs, show prints it, apply corrects a log with it; axes "
+    "finds out which input of an accelerometer and gyroscope board is which axis.",
 )
+app.command()(axes)
 
 LayoutName = Annotated[str, typer.Option("--layout", help="Name of a layout, or its TOML file.")]
 HalfSide = Annotated[float, typer.Option(help="Built-in layouts: centre to face, m.")]
