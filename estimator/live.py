@@ -96,6 +96,7 @@ class Worker:
             while (item := self._queue.get()) is not None:
                 if isinstance(item, Order):
                     reply, outputs = self.pipeline.order(item.command)
+                    self._save_at = 0.0  # a crash must not forget it
                     for output in outputs:
                         self._put(output)
                     item.answer(reply)

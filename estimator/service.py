@@ -25,6 +25,7 @@ from estimator.cost import Cost
 from estimator.ins.board import NavBoard, NavOutput
 from estimator.ins.gyro_free import GyroFreeNavigation
 from estimator.ins.navigation import NAVIGATORS, Correction, NavigatorConfig
+from estimator.mute_orders import MuteDesk
 from estimator.orders import CalibrationDesk
 from estimator.rate.board import RateBoard, WrongAxes
 from estimator.settings import EstimatorSettings
@@ -41,6 +42,7 @@ from messages.topics import (
     GNSS,
     IMU,
     INNOVATION,
+    MUTE,
     NAV,
     POSE,
     RATE,
@@ -55,10 +57,11 @@ POSE_HZ = 20.0
 VERSION = metadata.version("gyrofree")  # once: it reads files
 Batch = pb.AccelBatch | pb.ImuBatch | pb.AdcBatch
 INPUTS = (ACCEL, IMU, ADC, GNSS, TACHO)
+ORDERS = (MUTE,)  # what the pipeline was told to do: published live, taken from a recording before all its inputs
 NO_TRANSLATION = (0.0, 0.0, 0.0)  # a cube on its table turns and stays
 
 
-__all__ = ["INPUTS", "Output", "Pipeline", "UnknownEstimator", "make_layout", "run"]
+__all__ = ["INPUTS", "ORDERS", "Output", "Pipeline", "UnknownEstimator", "make_layout", "run"]
 
 
 class Output(NamedTuple):
@@ -95,6 +98,7 @@ class Pipeline:
         self._vehicles: dict[str, NavBoard] = {}
         self._gyro_free: dict[str, GyroFreeNavigation] = {}
         self._attitudes: dict[str, AttitudeBoard] = {}
+        self._mutes = MuteDesk()
         self._clock_offset: dict[str, float] = {}
         self._desk = CalibrationDesk(settings.cards)
         self._axes = wiring_orders.load(settings)
@@ -103,13 +107,15 @@ class Pipeline:
 
     def on(self, topic: Topic, message: Message) -> list[Output]:
         """Take one message of any topic; raises convert.BadMessage for one that cannot be used."""
-        handler = getattr(self, f"on_{topic.name}") if topic in INPUTS else None
+        handler = getattr(self, f"on_{topic.name}") if topic in INPUTS or topic in ORDERS else None
         return handler(message) if handler else []
 
     def order(self, command: pb.EstimatorCommand) -> tuple[pb.Reply, list[Output]]:
         """Do what a person asked the estimator of a device for; never raises for an order that cannot be followed."""
         if command.action == pb.EstimatorCommand.ACTION_MUTE_GNSS:
-            return self._mute(command), []
+            offset = self._clock_offset.get(command.device, 0.0)
+            reply, mute = self._mutes.order(command, self._navigating(command.device), offset)
+            return reply, [] if mute is None else [Output(MUTE, command.device, "", mute)]
         if command.action in wiring_orders.ACTIONS:
             return self._wire(command)
         device, before = command.device, self._desk.used.get(command.device)
@@ -126,14 +132,10 @@ class Pipeline:
             self._attitudes.pop(device, None)
         return reply, [] if status is None else [Output(WIRING, device, "", status)]
 
-    def _mute(self, command: pb.EstimatorCommand) -> pb.Reply:
-        board = self._navigating(command.device)
-        if board is None:
-            return pb.Reply(ok=False, message=f"{command.device} does not navigate: it has sent no inertial samples")
-        try:
-            return pb.Reply(ok=True, message=board.mute(command.seconds))
-        except ValueError as error:
-            return pb.Reply(ok=False, message=str(error))
+    def on_mute(self, message: pb.GnssMute) -> list[Output]:
+        """An outage that was ordered when the recording was made."""
+        self._mutes.take(message)
+        return []
 
     def on_tacho(self, message: pb.TachoRate) -> list[Output]:
         """A report of the tachometer: table runs of a guided calibration need it."""
@@ -235,7 +237,7 @@ class Pipeline:
         if board is None:
             config = NavigatorConfig(lever_arm_b=self._settings.vehicle_of(device).lever_arm_b_m)
             board = NavBoard(device, config, self._settings.navigators, self._settings.nav_limit_hz)
-            self._vehicles[device] = board
+            self._vehicles[device] = self._mutes.attend(device, board)
         self._clock_offset[device] = batch.header.utc_ns * 1e-9 - batch.header.device_us * 1e-6
         started = self._clock()
         said = board.feed(batch.header.epoch, batch.first_index, batch.period_s, samples.t_s, samples.values, rates)
@@ -283,6 +285,7 @@ class Pipeline:
         device = message.header.device
         if device in self._boards and device not in self._gyro_free and self._settings.gyro_free_navigation:
             self._gyro_free[device] = self._gyro_free_navigation(device)
+            self._mutes.attend(device, self._gyro_free[device].board)
         board = self._navigating(device)
         if board is not None and device in self._clock_offset:
             fix = convert.fix_of(message, self._settings.use_every_fix, self._clock_offset[device])

@@ -21,7 +21,7 @@ from google.protobuf.message import Message
 from messages import gyrofree_pb2 as pb
 from messages.topics import ACCEL, IMU, INNOVATION, NAV, NOTE, RATE, Address
 from sessions.replay import INPUTS, LONGEST_NAME, SUFFIX, Input, rename, renamed
-from sessions.reproduce import PIPELINE_INPUTS, Pipeline
+from sessions.reproduce import PIPELINE_INPUTS, Pipeline, give_orders
 from sessions.source import Source
 
 log = logging.getLogger(__name__)
@@ -71,7 +71,7 @@ class Playback:
         self._states: dict[float, tuple[int, bytes]] = {}  # position -> log time to go on from, pickled pipeline
         self._steps = 0
         self._first = self._first_used() if make_pipeline is not None else {}
-        self._begin(self.source.start_ns, self._make() if self._make else None)
+        self._begin(self.source.start_ns, self._fresh())
         self._target: float | None = min(at_s, self.source.length_s) if at_s > 0.0 else None
         self._ended = False
 
@@ -195,6 +195,10 @@ class Playback:
     def _seconds(self, item: Input) -> float:
         return (item.log_ns - self.source.start_ns) / 1e9
 
+    def _fresh(self) -> Pipeline | None:
+        """A pipeline that has taken nothing yet but what people ordered."""
+        return give_orders(self._path, self._make()) if self._make is not None else None
+
     def _begin(self, from_ns: int, pipeline: Pipeline | None) -> None:
         self._items = self.source.items(from_ns)
         self._pipeline = pipeline
@@ -272,7 +276,7 @@ class Playback:
         if self._next is not None and self.position_s <= publish_from and (kept is None or kept <= self.position_s):
             return
         if kept is None:
-            self._begin(self.source.start_ns, self._make())
+            self._begin(self.source.start_ns, self._fresh())
         else:
             from_ns, state = self._states[kept]
             self._begin(from_ns, pickle.loads(state))

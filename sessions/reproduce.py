@@ -17,11 +17,12 @@ from typing import Protocol
 
 from google.protobuf.message import DecodeError, Message
 
-from messages.topics import ACCEL, GNSS, IMU, INNOVATION, NAV, RATE, TACHO, Topic, TopicError, parse
+from messages.topics import ACCEL, GNSS, IMU, INNOVATION, MUTE, NAV, RATE, TACHO, Topic, TopicError, parse
 from sessions.mcap_log import Damage, read
 
 ESTIMATES: tuple[Topic, ...] = (RATE, NAV, INNOVATION)
 PIPELINE_INPUTS: tuple[Topic, ...] = (ACCEL, IMU, TACHO, GNSS)
+PIPELINE_ORDERS: tuple[Topic, ...] = (MUTE,)  # they name the data that they are about: given before all inputs
 
 
 class Pipeline(Protocol):
@@ -74,6 +75,7 @@ def reproduce(path: Path, pipeline: Pipeline) -> Report:
     computed: dict[str, dict[tuple, bytes]] = defaultdict(dict)
     damage = Damage()
     first = _first_used(path)
+    give_orders(path, pipeline)
     inputs = refused = 0
     for row in read(path, damage):
         try:
@@ -101,6 +103,18 @@ def reproduce(path: Path, pipeline: Pipeline) -> Report:
     keys = sorted(recorded.keys() | computed.keys())
     compared = {key: _compare(parse(key).topic, recorded[key], computed[key]) for key in keys}
     return Report(compared, inputs, refused, str(damage))
+
+
+def give_orders(path: Path, pipeline: Pipeline) -> Pipeline:
+    """Tell a new pipeline what people ordered while this recording was made; the pipeline itself. Raises OSError."""
+    for row in read(path, Damage()):
+        try:
+            topic = parse(row.key).topic
+            if topic in PIPELINE_ORDERS:
+                pipeline.on(topic, topic.type.FromString(row.payload))
+        except (TopicError, DecodeError):
+            continue
+    return pipeline
 
 
 def _first_used(path: Path) -> dict[tuple[str, int], int]:

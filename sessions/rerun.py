@@ -11,7 +11,7 @@ from pathlib import Path
 from messages.topics import ATTITUDE, AXES, ESTIMATOR, POSE, parse
 from sessions.manifest import SESSION_ID, Manifest, SessionError, check_id
 from sessions.mcap_log import Damage
-from sessions.reproduce import ESTIMATES, PIPELINE_INPUTS, Pipeline
+from sessions.reproduce import ESTIMATES, PIPELINE_INPUTS, Pipeline, give_orders
 from sessions.settings import RecorderSettings
 from sessions.store import SessionStore, versions
 from sessions.table import Progress, Selection, messages, silent
@@ -29,6 +29,7 @@ def estimates_again(
     """
     counts: dict[str, int] = {}
     size, seen = max(1, path.stat().st_size), 0
+    give_orders(path, pipeline)
     for row, topic, message in messages(path, Selection(), Damage()):
         seen += len(row.payload) + 40
         if topic not in COMPUTED or name:
@@ -102,5 +103,3 @@ def rerun_id(path: Path, name: str) -> str:
     base = path.parent.name if SESSION_ID.fullmatch(path.parent.name) else "00000000-000000"
     wanted = f"{base}-{name or 'rerun'}"
     return wanted if SESSION_ID.fullmatch(wanted) else f"{base[:15]}-{name or 'rerun'}"
-
-

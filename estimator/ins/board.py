@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.ins.fix import Fix
+from estimator.ins.mute import Mute, Mutes, order_for
 from estimator.ins.navigation import NAVIGATORS, Correction, NavigatorConfig, Solution
 from estimator.stream import Stream, every, worth_a_line
 
 log = logging.getLogger(__name__)
 
 Array = NDArray[np.float64]
-
-LONGEST_MUTE = 600.0  # s
 
 
 @dataclass(frozen=True)
@@ -39,8 +38,9 @@ class NavBoard:
         self.navigators: dict[str, Any] = {}
         self.config, self._names = config, names  # no closures: a process that goes on after a crash pickles this
         self._limit = limit_hz
-        self._newest = -math.inf  # s, time of the newest sample
-        self._muted_until = -math.inf
+        self.mutes = Mutes()
+        self._newest = -math.inf  # s, time of the newest sample or fix
+        self._epoch = 0
 
     def make(self, name: str) -> Any:
         """A new navigator of one of the names."""
@@ -59,7 +59,8 @@ class NavBoard:
             log.warning("%s: %d samples missing before %d (gap %d)", self.device, admission.missing, first_index,
                         self.stream.gaps)  # fmt: skip
         step = every(period_s, self._limit)
-        self._newest = float(t_s[-1])
+        self._newest = float(t_s[-1]) if epoch != self._epoch else max(self._newest, float(t_s[-1]))
+        self._epoch = epoch
         out = []
         for row in range(len(t_s)):
             index = first_index + row
@@ -74,6 +75,7 @@ class NavBoard:
 
     def fix(self, fix: Fix) -> None:
         """Hand a fix to every filter; one that comes before the first sample has nothing to correct."""
+        self._newest = max(self._newest, fix.t)
         if self.muted(fix.t):
             fix = replace(fix, withheld=True, muted=True)
         for navigator in self.navigators.values():
@@ -81,14 +83,13 @@ class NavBoard:
 
     def muted(self, t: float) -> bool:
         """Whether fixes of time t, s, are held back."""
-        return t < self._muted_until
+        return self.mutes.held(self._epoch, t)
 
-    def mute(self, seconds: float) -> str:
-        """Hold the fixes of the next seconds back, to see how the filters do without; 0 ends it. Says what was done.
+    def mute(self, seconds: float) -> Mute:
+        """Hold the fixes of the next seconds back, to see how the filters do without; 0 ends it. Gives the order.
 
         The filters are still scored on them. Raises ValueError for a length that makes no sense.
         """
-        if not 0.0 <= seconds <= LONGEST_MUTE:
-            raise ValueError(f"mute GNSS for {seconds:g} s: want 0 to {LONGEST_MUTE:g} s")
-        self._muted_until = self._newest + seconds if seconds else -math.inf
-        return f"GNSS of {self.device} muted for {seconds:g} s" if seconds else f"GNSS of {self.device} is used again"
+        order = order_for(seconds, self._epoch, self._newest)
+        self.mutes.add(order)
+        return order
