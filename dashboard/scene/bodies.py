@@ -12,6 +12,7 @@ from dashboard.scene.palette import GREY, ORANGE, YELLOW, estimator_title, rgb
 Nodes = dict[str, object]  # handles by name
 
 GROUND_BELOW = 1.0  # m below a vehicle, so that fixes scattered in height are not cut by the grid's lines
+BOARD = (1.5, 1.0, 0.12)  # half a tilt board, drawn as large as the cube
 LABEL_CORNERS = ((1, 1, 1.1), (-1, -1, 1.35), (1, -1, 1.6), (-1, 1, 1.85))  # apart, so that names do not hide another
 
 
@@ -80,6 +81,36 @@ def cube(scene: SceneApi, nodes: Nodes, body: str, colour: str, name: str, index
     )
     if main:
         _rate_arrow(scene, nodes, body)
+
+
+def board(scene: SceneApi, body: str, colour: str, name: str, index: int) -> None:
+    """One filter's tilt board below the frame `body`, forward-right-down; number 0 is filled and shows its nose."""
+    scene.add_line_segments(f"{body}/edges", geo.box_edges(BOARD), rgb(colour), thickness=3.0, thickness_units="screen")
+    if index == 0:
+        scene.add_box(
+            f"{body}/faces",
+            color=rgb(colour),
+            dimensions=tuple(2.0 * half for half in BOARD),
+            opacity=0.5,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        scene.add_arrows(
+            f"{body}/nose",
+            np.array([[[BOARD[0], 0, 0], [BOARD[0] + 0.7, 0, 0]]], dtype=np.float32),
+            rgb(ORANGE),
+            shaft_radius=0.05,
+            head_radius=0.13,
+            head_length=0.3,
+        )
+    x, y, z = LABEL_CORNERS[index % len(LABEL_CORNERS)]
+    scene.add_label(
+        f"{body}/label",
+        estimator_title(name),
+        position=(x * BOARD[0], y * BOARD[1], -z * 0.6),
+        anchor="bottom-center",
+        font_screen_scale=0.8,
+    )
 
 
 def _rate_arrow(scene: SceneApi, nodes: Nodes, body: str) -> None:

@@ -4,6 +4,8 @@ n is north-east-down everywhere outside. The node '/world' alone turns n into vi
 up), so every node below it carries its quaternion and position as they stand in the messages.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from estimator.layouts.layout import CUBE
@@ -168,3 +170,22 @@ MODES = {
     pb.NavSolution.MODE_COURSE: "waiting for speed",
     pb.NavSolution.MODE_NAVIGATING: "navigating",
 }
+
+
+def yaw_of(q_nb: Sequence[float]) -> float:
+    """Heading of q_nb (4,) w x y z, rad; NaN for none."""
+    if len(q_nb) != 4:
+        return float("nan")
+    w, x, y, z = q_nb
+    return float(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
+
+
+def facing(q_nb: Sequence[float], other: Sequence[float]) -> tuple[float, ...] | None:
+    """q_nb (4,) turned about the vertical to the heading of another; None where it is no rotation."""
+    q = quaternion(q_nb)
+    if q is None or quaternion(other) is None:
+        return q
+    half = 0.5 * (yaw_of(other) - yaw_of(q_nb))
+    c, s = float(np.cos(half)), float(np.sin(half))
+    w, x, y, z = q
+    return c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w

@@ -15,6 +15,7 @@ FIX = ORANGE  # GNSS
 REJECTED = VERMILLION  # a fix the filter did not believe
 _ESTIMATORS = {
     "products-ekf": SKY,
+    "products-free": SKY,
     "least-squares": VERMILLION,
     "ekf": SKY,
     "huber-nhc": SKY,
@@ -22,10 +23,12 @@ _ESTIMATORS = {
     "fpe-fuzzy": PURPLE,
 }
 _FURTHER = (PURPLE, YELLOW, ORANGE, BLUE, VERMILLION, SKY)
+GYRO_FREE = "gyro-free-"  # before the name of a filter that runs on a cube's own rate
 # Names for people; anything else is shown as it is called on the bus.
 _TITLES = {
     "products-ekf": "products filter",
     "least-squares": "least squares",
+    "products-free": "products, free body",
     "products-ukf": "products, unscented",
     "products-rls": "products, recursive",
     "products-mhe": "products, moving horizon",
@@ -60,6 +63,8 @@ def estimator_colour(name: str, among: Iterable[str] = ()) -> str:
 
 def estimator_title(name: str) -> str:
     """The estimator's name for people."""
+    if name.startswith(GYRO_FREE):
+        return f"gyro-free, {_TITLES.get(name.removeprefix(GYRO_FREE), name.removeprefix(GYRO_FREE))}"
     return _TITLES.get(name, name)
 
 

@@ -11,6 +11,7 @@ a node's quaternion (w, x, y, z) is the q_nb of the message and its position is 
     /world/estimate/<estimator>/body/rate, .../rate_label          arrow of omega_ib_b, on the main estimator only
     /world/estimate/<estimator>/trajectory/<piece>                 vehicles
     /world/estimate/<estimator>/ellipsoid                          3-sigma position, at the body
+    (a board that only tilts: attitude/<estimator>, all with the heading of the truth or of the first)
     /world/table                        the table below the cube, turning with the truth, else with the main estimate
     /world/fixes/<piece>                GNSS fixes
     /world/fixes/rejected/<piece>       those of them that the main estimator did not believe
@@ -87,19 +88,21 @@ class SceneView:
 
     def update(self, device: Device) -> None:
         """Poses from the newest messages. Call under the store's lock, 20 to 30 times a second."""
-        vehicle = device.is_vehicle
-        estimators = device.estimators("nav" if vehicle else "rate")
+        body = device.body
+        estimators = device.estimators(body)
         truth = device.get("truth") is not None
-        built = (device.name, device.generation, vehicle, tuple(estimators), truth, self._choice.dark)
+        built = (device.name, device.generation, body, tuple(estimators), truth, self._choice.dark)
         if built != self._built:
-            first = not self._built or self._built[2] != vehicle
+            first = not self._built or self._built[2] != body
             self.forget()
             self._built = built
-            self._build(vehicle, estimators, truth)
+            self._build(body, estimators, truth)
             if first:
-                self.reset_camera(vehicle)
-        if vehicle:
+                self.reset_camera(body == "nav")
+        if body == "nav":
             self._update_vehicle(device, estimators)
+        elif body == "attitude":
+            self._update_board(device, estimators)
         else:
             self._update_cube(device, estimators)
         for node, layer in self._layers():
@@ -109,6 +112,8 @@ class SceneView:
 
     def update_tracks(self, device: Device) -> None:
         """Trajectories and fixes; only pieces that grew are sent. Call under the store's lock."""
+        if device.body != "nav":
+            return  # a cube stands on its table, whatever way it went
         for name, track in device.tracks.items():
             if name == "fixes":
                 self._track("/world/fixes", track, rgb(FIX), FIX_SIZE)
@@ -128,8 +133,8 @@ class SceneView:
         self._scene.add_light_ambient("/lights/ambient", intensity=1.0)
         self._scene.add_light_directional("/lights/sun", intensity=1.5, position=(3.0, -4.0, 8.0))
 
-    def _build(self, vehicle: bool, estimators: list[str], truth: bool) -> None:
-        scene, dark = self._scene, self._choice.dark
+    def _build(self, kind: str, estimators: list[str], truth: bool) -> None:
+        scene, dark, vehicle = self._scene, self._choice.dark, kind == "nav"
         self._nodes["/world"] = scene.add_frame("/world", show_axes=False, wxyz=geo.Q_DISPLAY_N, visible=self._shown)
         bodies.ground(scene, self._nodes, vehicle, dark)
         for index, name in enumerate(estimators):
@@ -142,17 +147,19 @@ class SceneView:
                 self._nodes[path] = scene.add_icosphere(
                     path, radius=1.0, color=rgb(colour), opacity=0.22, cast_shadow=False, visible=False
                 )
+            elif kind == "attitude":
+                bodies.board(scene, body, colour, name, index)
             else:
                 bodies.cube(scene, self._nodes, body, colour, name, index)
                 if index == 0:
                     self._arrows = AxisArrows(scene, self._nodes, body)
-        if not vehicle:
+        if kind == "rate":
             bodies.table(scene, self._nodes, dark)
         if truth:
             self._nodes["/world/truth"] = scene.add_frame("/world/truth", show_axes=False)
             scene.add_line_segments(
                 "/world/truth/edges",
-                geo.box_edges((1.015,) * 3),
+                geo.box_edges((1.015,) * 3 if kind == "rate" else bodies.BOARD),
                 rgb(truth_colour(dark)),
                 thickness=2.0,
                 thickness_units="screen",
@@ -185,6 +192,15 @@ class SceneView:
             self._arrows.update(health.message)
         if estimators:
             self._update_rate_arrow(f"/world/estimate/{estimators[0]}/body/rate", device, estimators[0])
+
+    def _update_board(self, device: Device, estimators: list[str]) -> None:
+        """Filters that know no north start at any heading: all are turned to the truth's, or to the first one's."""
+        truth = device.get("truth")
+        north = truth.message.q_nb if truth is not None else device.get("attitude", estimators[0]).message.q_nb
+        if truth is not None:
+            self._set("/world/truth", q=geo.quaternion(north))
+        for name in estimators:
+            self._set(f"/world/estimate/{name}/body", q=geo.facing(device.get("attitude", name).message.q_nb, north))
 
     def _update_rate_arrow(self, path: str, device: Device, estimator: str) -> None:
         node, label = self._nodes.get(path), self._nodes.get(f"{path}_label")

@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from google.protobuf.message import Message
 
-from dashboard.scene.geometry import Track, ned_from_geodetic
+from dashboard.scene.geometry import Track, ned_from_geodetic, yaw_of
 from dashboard.scene.ring import Ring
 from dashboard.scene.tilt import tilt_rows
 from messages import gyrofree_pb2 as pb
 from messages import topics as tp
 
-LEADERS = ("products-ekf", "huber-nhc", "ekf")  # estimators that stand first wherever they run
+LEADERS = ("products-ekf", "products-free", "huber-nhc", "ekf")  # estimators that stand first wherever they run
 HISTORY_S = 620.0  # kept in the rings; the longest window a view offers is 600 s
 LATE_JOIN_S = 2.0  # repaired stretches nearer than this are one
 MARKS = 200  # notes and marks of a device that are drawn
@@ -30,7 +30,7 @@ SLOW_STALE_S = {"link": 3.0, "status": 3.0, "estimator": 3.0, "board": 30.0, "gn
 RATE_OMEGA, RATE_SIGMA, RATE_F = slice(0, 3), slice(3, 6), slice(6, 9)
 RATE_ANGLE, RATE_NIS, RATE_POSITION = 9, 10, slice(11, 14)
 RATE_INNOVATION, RATE_INNOVATION_SIGMA, RATE_NIS_DOF = slice(14, 20), slice(20, 26), 26
-RATE_SIGHT, RATE_BOUND = slice(27, 30), slice(30, 33)
+RATE_SIGHT, RATE_BOUND, RATE_YAW = slice(27, 30), slice(30, 33), 33
 TRUTH_OMEGA, TRUTH_F, TRUTH_ANGLE = slice(0, 3), slice(3, 6), 6
 NAV_POSITION, NAV_VELOCITY, NAV_SIGMA_POSITION, NAV_YAW = slice(0, 3), slice(3, 6), slice(6, 9), 9
 NAV_HORIZON, NAV_CRISP, NAV_INPUTS, NAV_MEMBERSHIP = 10, 11, slice(12, 14), slice(14, 20)
@@ -71,8 +71,22 @@ class Device:
 
     @property
     def is_vehicle(self) -> bool:
-        """A six-axis board that navigates, as against a cube on its table."""
-        return ("imu", "") in self.latest or any(topic == "nav" for topic, _ in self.latest)
+        """A board with gyroscopes, as against a cube of accelerometers, which may navigate too."""
+        if ("imu", "") in self.latest or ("adc", "") in self.latest:
+            return True
+        return ("accel", "") not in self.latest and self.navigates
+
+    @property
+    def body(self) -> str:
+        """Topic of the estimates that move its body in the scene: nav of a vehicle, attitude of a board, else rate."""
+        if not self.is_vehicle:
+            return "rate"
+        return "attitude" if not self.navigates and self.estimators("attitude") else "nav"
+
+    @property
+    def navigates(self) -> bool:
+        """Some navigation filter runs for it."""
+        return any(topic == "nav" for topic, _ in self.latest)
 
     def estimators(self, topic: str) -> list[str]:
         """Names of the estimators heard on a topic; the leading one first."""
@@ -91,7 +105,7 @@ class Device:
     def window(self, topic: str, estimator: str, t0: float, t1: float) -> tuple[np.ndarray, np.ndarray]:
         """Ring rows of a topic in a window; empty arrays when there are none. Call under the store's lock."""
         ring = self.rings.get((topic, estimator))
-        return ring.window(t0, t1) if ring else (np.empty(0), np.empty((0, 32)))
+        return ring.window(t0, t1) if ring else (np.empty(0), np.empty((0, 34)))
 
 
 class Store:
@@ -243,17 +257,15 @@ def _rate(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.RateE
     nis = m.nis if m.nis_dof else np.nan
     row = _three(m.omega_ib_b_radps) + _sigmas(m.omega_covariance) + _three(m.f_b_mps2) + [m.angle_z_rad, nis]
     row += _three(m.p_n_m) + _six(m.innovation) + _six(m.innovation_sigma) + [m.nis_dof]
-    row += _three(m.sight) + _three(m.bound_sigma_radps)
-    _ring(device, topic, estimator, 33).append(t, row)
+    row += _three(m.sight) + _three(m.bound_sigma_radps) + [yaw_of(m.q_nb)]
+    _ring(device, topic, estimator, 34).append(t, row)
 
 
 def _nav(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.NavSolution) -> None:
     if len(m.p_ned_m) != 3 or m.mode < pb.NavSolution.MODE_COURSE:
         return
     device.origin = m.origin_latitude_deg, m.origin_longitude_deg, m.origin_height_m
-    w, x, y, z = m.q_nb if len(m.q_nb) == 4 else (1.0, 0.0, 0.0, 0.0)
-    yaw = float(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
-    row = list(m.p_ned_m) + _three(m.v_n_mps) + _sigmas(m.position_covariance) + [yaw]
+    row = list(m.p_ned_m) + _three(m.v_n_mps) + _sigmas(m.position_covariance) + [yaw_of(m.q_nb)]
     if m.HasField("horizon"):
         row.append(m.horizon.n)
         if len(m.horizon.inputs) == 2 and len(m.horizon.membership) == 6:  # fuzzy

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import viser
 
 from dashboard.scene.feed import Feed
-from dashboard.scene.panels import PAGES, Devices, Position, Record, Snapshot, Timeline
+from dashboard.scene.panels import PAGES, Devices, Position, Record, Snapshot, Tilt, Timeline
 from dashboard.scene.scene import LAYERS, Choice, SceneView
 from dashboard.scene.store import Device, Store
 from messages import gyrofree_pb2 as pb
@@ -83,7 +83,8 @@ class View:
             t0 = max(t1 - self._window_s, device.t_first)
             snapshot = Snapshot(self._store, device, t0, max(t1, t0 + 1.0), now, self._choice.dark)
             if not self._page_chosen:
-                self._open(PAGES.index(Position) if device.is_vehicle else 0)
+                first = {"nav": Position, "attitude": Tilt, "rate": PAGES[0]}[device.body]
+                self._open(PAGES.index(first))
             if self._paused_at is None:
                 self._devices.update(snapshot)
             self._pages[self._page].update(snapshot)
@@ -171,7 +172,7 @@ class View:
     def _reset_camera(self) -> None:
         with self._lock, self._store.lock:
             device = self._device()
-            self.scene.reset_camera(device is not None and device.is_vehicle)
+            self.scene.reset_camera(device is not None and device.body == "nav")
 
     def _choose(self, name: str) -> None:
         with self._lock:

@@ -42,4 +42,4 @@ PAGES: tuple[type[Panel], ...] = (
     Race,
 )
 
-__all__ = ["PAGES", "Devices", "Panel", "Position", "Record", "Snapshot", "Timeline"]
+__all__ = ["PAGES", "Devices", "Panel", "Position", "Record", "Snapshot", "Tilt", "Timeline"]

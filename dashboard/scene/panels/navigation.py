@@ -1,11 +1,12 @@
 """Navigation filters against each other: the map, the race on unseen fixes, and the button that takes GNSS away."""
 
-
 import numpy as np
 import viser
 
+from dashboard.scene.chart import Curve
 from dashboard.scene.map import map_svg
-from dashboard.scene.palette import estimator_colour, estimator_title, number, rows
+from dashboard.scene.palette import GREY, GYRO_FREE, estimator_colour, estimator_title, number, rows
+from dashboard.scene.panels import drift
 from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve
 from dashboard.scene.store import (
     GNSS_POSITION,
@@ -45,8 +46,9 @@ class Navigation(Panel):
         self._device = s.device.name
         names = s.device.estimators("nav")
         if not names:
-            note = '<p class="gf-note">No navigation yet: it needs a six-axis board and a GNSS receiver.</p>'
-            self._top = self.html(note, self._top)
+            note = "No navigation yet: it needs a GNSS receiver, and a six-axis board, or a cube for which "
+            note += "[estimator] gyro_free_navigation names filters."
+            self._top = self.html(f'<p class="gf-note">{note}</p>', self._top)
             return
         messages = {name: s.device.get("nav", name).message for name in names}
         self._muted = any(m.gnss_muted for m in messages.values())
@@ -55,7 +57,12 @@ class Navigation(Panel):
             self._button.label = label
         if not self._button.visible:
             self._button.visible = True
-        self._top = self.html(self._map(s, names) + self._race(s, names), self._top)
+        alone = self._alone(s, names)
+        drifted = rows(drift.table_of(alone)) if alone else ""
+        self._top = self.html(self._map(s, names) + self._race(s, names) + drifted, self._top)
+        if alone:
+            title = "Without fixes since it began to move: horizontal error"
+            self.show("alone", title, "m", drift.curves_of(alone), s, height=170)
         curves = []
         for name in names:
             t, r = s.rows("nav", name)
@@ -69,8 +76,18 @@ class Navigation(Panel):
             unseen = np.isfinite(error)
             if unseen.any():
                 curves.append(estimator_curve(s, "innovation", name, t[unseen], error[unseen]))
+        ahead = drift.outage(messages[names[0]], s.device.get("nav", names[0]).t) if self._muted else None
+        if ahead is not None:
+            curves.append(Curve("equation (27), 1σ biases", GREY, *ahead, dash=True))
         if curves:
             self.show("error", "Horizontal error on fixes held back", "m", curves, s, height=170, digits=2)
+
+    @staticmethod
+    def _alone(s: Snapshot, names: list[str]) -> drift.Unaided | None:
+        """What the cube's own navigation does without fixes, where its rate feeds a filter."""
+        rates = s.device.estimators("rate")
+        lead = next((name for name in names if name.startswith(GYRO_FREE)), "")
+        return drift.unaided(s, rates[0], lead) if rates and lead else None
 
     def _map(self, s: Snapshot, names: list[str]) -> str:
         ways = []

@@ -18,7 +18,7 @@ class Position(Panel):
     _table = None
 
     def update(self, s: Snapshot) -> None:
-        vehicle = s.device.is_vehicle
+        vehicle = s.device.navigates
         self._table = self.html(self._numbers(s) if vehicle else _cube_note(s), self._table)
         for k, axis in enumerate(NAMES):
             curves = []

@@ -18,7 +18,7 @@ STATES = {
     STATUS.STATE_SAVED: "saved and in use",
 }
 BUTTONS = (  # label, order, icon, colour
-    ("Find axes and signs", ACTION.ACTION_WIRING_START, viser.Icon.ROTATE_3D, (30, 110, 165)),
+    ("Find axes and signs", ACTION.ACTION_WIRING_START, viser.Icon.ROTATE_RECTANGLE, (30, 110, 165)),
     ("Save map and use it", ACTION.ACTION_WIRING_SAVE, viser.Icon.DEVICE_FLOPPY, (0, 120, 90)),
     ("Cancel", ACTION.ACTION_WIRING_CANCEL, viser.Icon.X, "gray"),
     ("Use the board's own axes again", ACTION.ACTION_USE_MAP, viser.Icon.ARROW_BACK_UP, "gray"),
