@@ -96,20 +96,26 @@ class Worker:
             while (item := self._queue.get()) is not None:
                 if isinstance(item, Order):
                     reply, outputs = self.pipeline.order(item.command)
-                    self._save_at = 0.0  # a crash must not forget it
                     for output in outputs:
                         self._put(output)
+                    self._keep(at_once=True)  # before the answer: what was answered survives a crash
                     item.answer(reply)
                     continue
                 ready = self.mender.take(item) if isinstance(item, Arrival) else self.mender.answer(*item)
                 for arrival in ready:
                     self._handle(arrival)
-                if self._save is not None and time.monotonic() >= self._save_at:
-                    self._save_at = time.monotonic() + SAVE_S
-                    self._save(self)
+                self._keep()
         except BaseException as error:
             self.failure = error
             stop.set()
+
+    def _keep(self, at_once: bool = False) -> None:
+        """Save the state when it is time; while a gap is being filled that waits. An order stands in no input."""
+        if at_once:
+            self._save_at = 0.0
+        if self._save is not None and time.monotonic() >= self._save_at and not self.mender.asking:
+            self._save_at = time.monotonic() + SAVE_S
+            self._save(self)
 
     def _handle(self, arrival: Arrival) -> None:
         message = decode(arrival.topic, arrival.payload)

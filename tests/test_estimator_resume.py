@@ -2,11 +2,18 @@
 
 import threading
 
+import pytest
 from test_estimator_service import accel_batches
 
+from estimator.calibration.card import make_card, write_card
+from estimator.calibration.fit import fit
+from estimator.calibration.poses import collect, find, plan
+from estimator.layouts.catalogue import find as find_layout
 from estimator.live import SavedState, Worker
 from estimator.service import Output, Pipeline
 from estimator.settings import EstimatorSettings
+from estimator.simulation.imperfect import device as imperfect
+from estimator.simulation.imperfect import tumble
 from messages import gyrofree_pb2 as pb
 from messages.bus import Publishers
 from messages.mending import Arrival, Question
@@ -107,3 +114,49 @@ def test_what_nobody_kept_is_a_gap_for_the_estimators_and_no_end():
     assert worker.mender.counts() == {"cube/accel": (0, 30)}
     indices = {o.message.for_index for o in outputs if o.topic is RATE}  # five samples in a batch
     assert max(indices) >= 495 and not any(250 <= index < 400 for index in indices)
+
+
+def life(folder, settings: EstimatorSettings) -> tuple[Worker, Spool]:
+    """One life of an estimator, from the saved state when there is one."""
+    spool = Spool(folder)
+    publishers, state = Publishers(None, "p", spool), SavedState(folder, settings, "1")
+    publishers.resume()
+    pipeline, taken, sequences = state.load() or (Pipeline(settings), {}, {})
+    if sequences:
+        publishers.repeat(sequences)
+    worker = Worker(pipeline, put_into(publishers), save=lambda worker: state.save(worker, publishers))
+    for (device, name), (run, last) in taken.items():
+        worker.mender.seed(device, name, run, last)
+    return worker, spool
+
+
+@pytest.mark.parametrize("cards", [1, 2])
+def test_an_estimator_killed_right_after_an_order_goes_on_with_the_card_that_was_ordered(tmp_path, cards):
+    layout = find_layout("cube", 0.05)
+    readings = tumble(imperfect(layout, 11), plan(14))
+    found, noise = find(readings, 0.01)
+    solved = fit(layout, collect(readings, found), noise=noise)
+    settings = EstimatorSettings(navigators=[], rate=["products-ekf"], cards=tmp_path / "cards")
+    named = []
+    for k in range(cards):
+        date = f"2026-01-0{k + 1}T03:04:05Z"
+        card = make_card(solved, layout, layout.axis_names, device="cube", date=date, poses=14)
+        write_card(card, settings.cards / f"{card.id}.toml")
+        named.append(card.id)
+    inputs, folder = arrivals(), tmp_path / "estimates"
+    first, spool = life(folder, settings)
+    work(first, inputs[:20])
+    answers: list[pb.Reply] = []
+    for name in named:
+        action = pb.EstimatorCommand.ACTION_USE_CARD
+        first.order(pb.EstimatorCommand(action=action, device="cube", card=name), answers.append)
+    work(first, [])  # killed before the next sample
+    assert [answer.ok for answer in answers] == [True] * cards
+    spool.close()
+    second, spool = life(folder, settings)
+    work(second, inputs[20:60])
+    said = [pb.RateEstimate.FromString(p) for topic, _, p in published(spool) if topic == "rate/products-ekf"]
+    assert [m.for_index for m in said] == sorted({m.for_index for m in said})
+    assert [m.header.sequence for m in said] == list(range(1, len(said) + 1))
+    assert [m.calibration for m in said] == [""] * 100 + [named[-1]] * 200  # five samples in a batch
+    spool.close()
