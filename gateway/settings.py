@@ -43,7 +43,7 @@ class GatewaySettings(BaseModel):
     published_bytes: int = Field(default=1 << 30, ge=1 << 20)  # bytes of published messages kept per device ...
     published_age_s: float = Field(default=7200.0, ge=60.0)  # ... and s, for consumers that missed some
     segment_bytes: int = Field(default=4 << 20, ge=1 << 16)  # bytes; a history query reads whole segments
-    sync_s: float = Field(default=0.5, gt=0.0, le=60.0)  # s between fdatasync calls: what a power cut may cost
+    sync_s: float = Field(default=0.25, gt=0.0, le=60.0)  # s between fdatasync calls: what a power cut may cost
 
     @model_validator(mode="after")
     def _names_differ(self) -> "GatewaySettings":

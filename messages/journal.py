@@ -48,7 +48,7 @@ class Journal:
         folder: Path,
         max_bytes: int = 2 << 30,
         segment_bytes: int = 4 << 20,
-        sync_s: float = 0.5,
+        sync_s: float = 0.25,
         max_age_s: float = 0.0,
     ) -> None:
         """Finished segments are removed, oldest first, above max_bytes and when older than max_age_s (0: any age)."""
