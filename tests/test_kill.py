@@ -27,10 +27,10 @@ PATIENCE = 60.0  # s; generous, the tests wait for states
 PERIOD_S = 0.01
 
 
-def until(condition, what: str):
-    end = time.monotonic() + PATIENCE
+def until(condition, what: str, patience: float = PATIENCE):
+    end = time.monotonic() + patience
     while not (value := condition()):
-        assert time.monotonic() < end, f"waited {PATIENCE:g} s for {what}"
+        assert time.monotonic() < end, f"waited {patience:g} s for {what}"
         time.sleep(0.05)
     return value
 
