@@ -9,7 +9,7 @@ from fastapi.staticfiles import StaticFiles
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp
 
-from dashboard import api, pages, proxy, session_api, session_pages
+from dashboard import api, compare_api, intake_api, pages, proxy, session_api, session_pages
 from dashboard.front import Front
 from dashboard.guard import Guard
 from dashboard.users import UsersError
@@ -24,7 +24,9 @@ def create_app(front: Front) -> ASGIApp:
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
     app.include_router(proxy.router(front.settings, front.gate, front.scene_port, front.open_widgets))
     app.include_router(api.routes, responses={401: {"description": "not signed in"}})
+    app.include_router(intake_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(session_api.routes, responses={401: {"description": "not signed in"}})
+    app.include_router(compare_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(pages.routes)
     app.include_router(session_pages.routes)
     app.add_exception_handler(RequestValidationError, _not_valid)

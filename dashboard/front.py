@@ -9,7 +9,9 @@ from fastapi import HTTPException, Request
 from dashboard.auth import Gate, Role, Session, User, same_token
 from dashboard.control import BusWatch, RecorderControl, Replay
 from dashboard.jobs import Jobs
+from dashboard.readings import Readings
 from dashboard.settings import DashboardSettings
+from dashboard.uploads import Uploads
 from sessions.catalogue import Catalogue
 
 audit = logging.getLogger("dashboard.audit")
@@ -27,6 +29,8 @@ class Front:
     recorder: RecorderControl | None = None
     replay: Replay | None = None
     jobs: Jobs | None = None
+    readings: Readings = field(default_factory=Readings)
+    uploads: Uploads = field(default_factory=Uploads)
     open_widgets: Callable[[], Collection[str]] = field(default=lambda: ())
 
 

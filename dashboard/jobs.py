@@ -34,6 +34,7 @@ class Job:
     ended: float | None = None
     state: str = "waiting"  # waiting, running, done, failed
     message: str = ""  # why it failed
+    made: str = ""  # id of the session it made
 
     @property
     def seconds(self) -> float:
@@ -52,9 +53,10 @@ class Job:
 
 
 class Jobs:
-    """The queue; `command` is what stands before the job's own arguments, as [python, -m, gyrofree]."""
+    """The queue; `command` stands before a job's own arguments, as [python, -m, gyrofree], `options` behind them."""
 
-    def __init__(self, command: Sequence[str]) -> None:
+    def __init__(self, command: Sequence[str], options: Sequence[str] = ()) -> None:
+        self._options = list(options)
         self._command = [*(["nice", "-n", "15"] if shutil.which("nice") else []), *command]
         self._scratch = Path(tempfile.mkdtemp(prefix="gyrofree-jobs-"))
         self._numbers = itertools.count(1)
@@ -65,9 +67,13 @@ class Jobs:
         self._closed = False
 
     def start(
-        self, kind: str, session: str, arguments: Sequence[str], user: str, accept: tuple[int, ...] = (0,)
-    ) -> Job:
-        """Queue `<command> <arguments> --out <folder>`; exit codes in `accept` are well. Raises ControlError."""
+        self, kind: str, session: str, arguments: Sequence[str], user: str, accept: tuple[int, ...] = (0,),
+        makes: str = "files",
+    ) -> Job:  # fmt: skip
+        """Queue `<command> <arguments>`; exit codes in `accept` are well. Raises ControlError.
+
+        One that makes `files` gets `--out <folder>`; one that makes a `session` prints its id.
+        """
         with self._lock:
             if sum(job.ended is None for job in self._jobs.values()) >= 8:
                 raise ControlError("eight jobs wait already: try again when some are done")
@@ -76,7 +82,7 @@ class Jobs:
             self._jobs[number] = job
             while len(self._jobs) > KEPT and next(iter(self._jobs.values())).ended is not None:
                 shutil.rmtree(self._jobs.popitem(last=False)[1].out, ignore_errors=True)
-        work = (job, list(arguments), accept)
+        work = (job, list(arguments), accept, makes)
         threading.Thread(target=self._run, args=work, name=f"job {number}", daemon=True).start()
         return job
 
@@ -91,19 +97,22 @@ class Jobs:
             self._process.terminate()
         shutil.rmtree(self._scratch, ignore_errors=True)
 
-    def _run(self, job: Job, arguments: list[str], accept: tuple[int, ...]) -> None:
+    def _run(self, job: Job, arguments: list[str], accept: tuple[int, ...], makes: str) -> None:
         with self._turn:
             if self._closed:
                 return
             job.state = "running"
             job.out.mkdir(parents=True, exist_ok=True)
             try:
+                out = ["--out", str(job.out)] if makes == "files" else []
                 self._process = subprocess.Popen(
-                    [*self._command, *arguments, "--out", str(job.out)],
-                    stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                    [*self._command, *arguments, *out, *self._options],
+                    stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                 )  # fmt: skip
-                _, said = self._process.communicate(timeout=LONGEST_S)
+                printed, said = self._process.communicate(timeout=LONGEST_S)
                 well = self._process.returncode in accept
+                if well and makes == "session":
+                    job.made = (printed.split() or [""])[-1]
                 job.message = "" if well else (said.strip().splitlines() or ["it ended without a word"])[-1]
             except (OSError, subprocess.TimeoutExpired) as error:
                 well, job.message = False, str(error)

@@ -139,6 +139,8 @@ def run(
                     replay.stop()
                 if jobs is not None:
                     jobs.close()
+                front.readings.close()
+                front.uploads.close()
                 handle.stop()
         finally:
             session.close()

@@ -37,6 +37,7 @@ class JobOut(BaseModel):
     seconds: float
     bytes: int = Field(description="written so far")
     message: str
+    made: str = Field(description="id of the session it made; empty for other jobs")
 
 
 class ExportOrder(Strict):
@@ -61,7 +62,7 @@ def job_out(job: Job) -> JobOut:
     """A job as JSON."""
     return JobOut(
         number=job.number, kind=job.kind, session=job.session, state=job.state, seconds=job.seconds, bytes=job.bytes,
-        message=job.message,
+        message=job.message, made=job.made,
     )  # fmt: skip
 
 
@@ -71,7 +72,8 @@ def _jobs(front: Front) -> Jobs:
     return front.jobs
 
 
-def _start(front: Front, *order, **options) -> JobOut:
+def start_job(front: Front, *order, **options) -> JobOut:
+    """Queue a job (jobs.Jobs.start); HTTP 409 when there are too many, 503 without a command for them."""
     try:
         return job_out(_jobs(front).start(*order, **options))
     except ControlError as error:
@@ -88,7 +90,7 @@ def report_path(front: Front, session: str, form: str) -> Path:
 def make_report(request: Request, session: str, who: Operator) -> JobOut:
     front = front_of(request)
     path = file_of(front, session)
-    return _start(front, "report", session, ["report", str(path)], who.name, accept=(0, 1))  # 1: a limit is broken
+    return start_job(front, "report", session, ["report", str(path)], who.name, accept=(0, 1))  # 1: a limit is broken
 
 
 @routes.get("/sessions/{session}/report.{form}", summary="The report, once it is made: html, pdf or json")
@@ -108,7 +110,7 @@ def make_export(request: Request, session: str, body: ExportOrder, who: Operator
     arguments = ["export", str(file_of(front, session)), "--format", body.format, "--from", f"{body.start_s:g}"]
     arguments += ["--to", f"{body.end_s:g}"] if body.end_s is not None else []
     arguments += ["--topics", ",".join(body.topics)] if body.topics else []
-    return _start(front, f"export-{body.format}", session, arguments, who.name)
+    return start_job(front, f"export-{body.format}", session, arguments, who.name)
 
 
 @routes.get("/jobs/{number}", summary="How far a job is")

@@ -182,7 +182,7 @@ def dashboard(config: Config = None, verbose: Verbose = False) -> None:
 
         replayer = [sys.executable, "-m", "gyrofree", "replay", "--stay"]
         replayer += ["--config", str(config)] if config else []
-        jobs = Jobs([sys.executable, "-m", "gyrofree"])
+        jobs = Jobs([sys.executable, "-m", "gyrofree"], ["--config", str(config)] if config else [])
         service.run(settings.dashboard, settings.bus, stop, replay=ProcessReplay(replayer), jobs=jobs)
 
     run_service(body, verbose)

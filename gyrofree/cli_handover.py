@@ -2,11 +2,14 @@
 
 import functools
 import json
+import tomllib
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from pydantic import ValidationError
 
+from estimator.settings import EstimatorSettings
 from gyrofree.cli_options import AsJson, Config, settings_of
 from gyrofree.cli_run import progress_bar
 from gyrofree.cli_sessions import AnySession, catalogue_of, file_of
@@ -79,6 +82,7 @@ def import_log(
     gnss: Annotated[Path | None, typer.Option(help="CSV of GNSS epochs beside a single CSV of samples.")] = None,
     device: Annotated[str, typer.Option(help="Device name for the samples.")] = "log",
     name: Annotated[str, typer.Option(help="Added to the session's id.")] = "import",
+    as_json: AsJson = False,
     config: Config = None,
 ) -> None:
     """Make a session of a log: its samples, and the estimates of the configured estimators on them."""
@@ -91,7 +95,7 @@ def import_log(
         folder = _estimated(settings, rows, f"20240101-000000-{name}", f"made of {log.name}", settings.recorder.root)
     except (PlayError, SessionError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
-    print(folder.name)
+    print(json.dumps({"session": folder.name}) if as_json else folder.name)
 
 
 def _estimated(settings, rows, session: str, note: str, root: Path) -> Path:
@@ -114,6 +118,11 @@ def rerun(
     navigators: Annotated[str, typer.Option(help="Navigation filters to run, separated by commas.")] = "",
     name: Annotated[str, typer.Option(help="Added to the new session's id and to the new estimators' names.")] = "new",
     beside: Annotated[bool, typer.Option("--beside/--instead", help="Keep the old estimates beside.")] = True,
+    changed: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="KEY=VALUE of [estimator] for this run, as layout.half_side_m=0.0493; repeatable."),
+    ] = None,
+    as_json: AsJson = False,
     config: Config = None,
 ) -> None:
     """Run a session's inputs through other estimators or another configuration, as a new session.
@@ -129,16 +138,44 @@ def rerun(
     chosen = {"rate": estimators, "navigators": navigators}
     changes = {key: [one.strip() for one in text.split(",")] for key, text in chosen.items() if text}
     try:
-        pipeline = Pipeline(settings.estimator.model_copy(update=changes))
+        estimator = with_changes(settings.estimator.model_copy(update=changes), changed or [])
+        settings = settings.model_copy(update={"estimator": estimator})
+        pipeline = Pipeline(estimator)
         with progress_bar() as progress:
             rows = estimates_again(path, pipeline, name if beside else "", progress)
-            note = f"{path.parent.name} again: {', '.join(sum(changes.values(), [])) or 'this configuration'}"
+            what = ", ".join([*sum(changes.values(), []), *(changed or [])]) or "this configuration"
+            note = f"{path.parent.name} again: {what}"
             folder = write_session(
                 catalogue_of(settings).root, rerun_id(path, name), rows, note, settings.model_dump(mode="json")
             )
-    except (UnknownEstimator, SessionError, OSError) as error:
+    except (UnknownEstimator, SessionError, ValueError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
-    print(folder.name)
+    print(json.dumps({"session": folder.name}) if as_json else folder.name)
+
+
+def with_changes(settings: EstimatorSettings, changes: list[str]) -> EstimatorSettings:
+    """Settings with `key=value` texts applied, values as in TOML (a bare word is a string); raises ValueError."""
+    data = settings.model_dump()
+    for text in changes:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        try:
+            parsed = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            parsed = value
+        place, *inner = key.split(".")
+        table, name = data, place
+        for part in inner:
+            table, name = table.get(name) if isinstance(table, dict) else None, part
+        if not equals or not isinstance(table, dict) or name not in table:
+            raise ValueError(
+                f"--set {text!r}: want KEY=VALUE with a key of [estimator], like layout.half_side_m=0.0493"
+            )
+        table[name] = parsed
+    try:
+        return EstimatorSettings.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise ValueError(f"--set {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
 
 
 def reprocess(

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Column, Table
 
+from gyrofree.cli_compare import compare
 from gyrofree.cli_options import AsJson, Config, settings_of, show_table
 from gyrofree.cli_run import progress_bar
 from gyrofree.config import Settings
@@ -20,6 +21,7 @@ from sessions.catalogue import Catalogue
 from sessions.manifest import SessionError
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Recorded sessions: list, look, verify, delete.")
+app.command("compare")(compare)
 Session = Annotated[str, typer.Argument(help="Id of a session; `gyrofree sessions list` shows them.")]
 AnySession = Annotated[str, typer.Argument(help="Id of a session, or path of an MCAP file.")]
 

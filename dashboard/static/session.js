@@ -1,4 +1,5 @@
-// The page of one session: replay, report, export, notes, labels, deletion.
+// The page of one session: plots, replay, report, export, notes, labels, deletion.
+import { Overlay } from "/static/overlay.js";
 import { call, toast } from "/static/rest.js";
 
 const session = document.querySelector("main").dataset.session;
@@ -43,7 +44,7 @@ for (const button of document.querySelectorAll("[data-from]")) {
 }
 
 // A link to a moment, /sessions/ID?t=12.5, offers to replay from there.
-const moment = Number(new URLSearchParams(location.search).get("t"));
+let moment = Number(new URLSearchParams(location.search).get("t"));
 if (moment > 0 && by("replay")) by("replay").textContent = `Replay from ${moment} s`;
 
 by("report")?.addEventListener("click", (event) => guarded(event.target, async () => {
@@ -88,3 +89,22 @@ by("delete")?.addEventListener("click", (event) => guarded(event.target, async (
   await call(`${path}/delete`, {});
   location.assign("/sessions");
 }));
+
+// The session's own curves; a click sets the moment that a remark, or a replay, is about.
+if (by("plots")) {
+  const overlay = new Overlay(by("plots"), [session], () => ({ everything: "true" }), {
+    state: (text, fault = false) => {
+      by("plot-state").textContent = text;
+      by("plot-state").className = fault ? "fault" : "dim";
+    },
+    data: (answer) => { document.body.dataset.plotted = answer.state; },
+    click: (t) => {
+      if (t < 0) return;
+      moment = Math.round(t * 100) / 100;
+      if (by("note")) by("note").at_s.value = moment;
+      if (by("replay")) by("replay").textContent = `Replay from ${moment} s`;
+      history.replaceState(null, "", `?t=${moment}`);
+    },
+  });
+  overlay.load();
+}

@@ -1,4 +1,4 @@
-// Replay buttons of the list of sessions.
+// The list of sessions: replay, and up to four of them over one another.
 import { call, toast } from "/static/rest.js";
 
 document.addEventListener("click", async (event) => {
@@ -13,3 +13,25 @@ document.addEventListener("click", async (event) => {
     button.disabled = false;
   }
 });
+
+const MOST = 4;
+const compare = document.getElementById("compare");
+const boxes = [...document.querySelectorAll("[data-compare]")];
+const chosen = []; // in the order of ticking: the first one stays where it is
+
+function showChosen() {
+  compare.disabled = chosen.length < 2;
+  compare.textContent = chosen.length ? `Compare ${chosen.length}` : "Compare";
+  for (const box of boxes) box.disabled = chosen.length >= MOST && !box.checked;
+}
+
+for (const box of boxes) {
+  if (box.checked) chosen.push(box.dataset.compare); // the browser kept it
+  box.addEventListener("change", () => {
+    if (box.checked) chosen.push(box.dataset.compare);
+    else chosen.splice(chosen.indexOf(box.dataset.compare), 1);
+    showChosen();
+  });
+}
+showChosen();
+compare.addEventListener("click", () => location.assign(`/compare?ids=${chosen.join(",")}`));

@@ -1,0 +1,73 @@
+// The page of sessions over one another.
+import { Overlay } from "/static/overlay.js";
+
+const page = document.querySelector("main");
+const ids = page.dataset.ids.split(",");
+const form = document.getElementById("aligning");
+const state = document.getElementById("state");
+const given = new Map(); // session -> offset by hand
+const n = (value, digits) => (value === null || value === undefined ? "–" : value.toFixed(digits));
+const deg = (value) => (value === undefined ? "–" : ((value * 180) / Math.PI).toPrecision(3));
+
+const more = () => {
+  const query = { align: form.align.value };
+  if (form.everything.checked) query.everything = "true";
+  if (given.size) query.offsets = [...given].map(([id, s]) => `${id}:${s}`).join(",");
+  return query;
+};
+
+const overlay = new Overlay(page, ids, more, { state: say, data: showTables, click: () => {} });
+
+function say(text, fault = false) {
+  state.textContent = text;
+  state.className = fault ? "fault" : "dim";
+}
+
+const HOW = { reference: "the others are moved", clock: "one board's clock", tacho: "tachometer", rate: "rate of turn", start: "by their starts", given: "by hand" };
+
+function showTables(answer) {
+  answer.sessions.forEach((session, k) => {
+    const row = document.querySelector(`tr[data-session="${session.id}"]`);
+    const input = row.querySelector("input");
+    if (input && document.activeElement !== input) input.value = session.offset_s.toFixed(4);
+    const set = (name, text) => { row.querySelector(`[data-cell=${name}]`).textContent = text; };
+    set("by", HOW[session.by]);
+    const rival = session.quality === "ambiguous" ? `, ${n(session.rival_s, 2)} s fits as well` : "";
+    set("quality", `${session.quality}${session.correlation === null ? "" : `, r ${n(session.correlation, 4)}`}${rival}`);
+    const errors = answer.errors[k][session.line];
+    set("error", errors ? `${["x", "y", "z"].map((c) => deg(errors.rms_radps[c])).join(" / ")} (${errors.against})` : "–");
+  });
+  const body = document.querySelector("#differences tbody");
+  body.replaceChildren(...answer.differences.map((d) => line([
+    `${d.session}: ${d.line.split("/").slice(1).join(" ")}`, d.against.split("/").slice(1).join(" "),
+    deg(d.rms_radps.x), deg(d.rms_radps.y), deg(d.rms_radps.z), `${d.seconds.toFixed(1)} s`,
+  ])), ...answer.track_differences.map((d) => line([
+    `${d.session}: ${d.track.split("/").slice(1).join(" ")}`, "track: north / east / down, m",
+    ...d.rms_ned_m.map((v) => v.toPrecision(3)), `${d.seconds.toFixed(1)} s`,
+  ])));
+  document.body.dataset.plotted = answer.state;
+}
+
+function line(cells) {
+  const row = document.createElement("tr");
+  row.append(...cells.map((text, k) => {
+    const cell = document.createElement("td");
+    cell.textContent = text;
+    cell.className = k > 1 ? "n" : "id";
+    return cell;
+  }));
+  return row;
+}
+
+form.addEventListener("change", () => {
+  given.clear();
+  overlay.load();
+});
+document.getElementById("sessions").addEventListener("change", (event) => {
+  const value = Number(event.target.value);
+  if (event.target.value === "" || !Number.isFinite(value)) given.delete(event.target.dataset.offset);
+  else given.set(event.target.dataset.offset, value);
+  overlay.load();
+});
+document.getElementById("whole").addEventListener("click", () => overlay.group.look(...overlay.group.span));
+overlay.load();
