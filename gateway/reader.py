@@ -107,10 +107,19 @@ class Reader:
     def _open(self) -> Port:
         """The port, as an earlier life of this gateway left it or newly opened. Raises PortError, ValueError."""
         left = self._keeper.take(self.url)
-        port = open_port(self.url, self.baud) if left is None else adopt_port(self.url, left)
-        if port.keepable and left is None:
-            self._keeper.keep(self.url, port.fileno())
-        return port
+        if left is None:
+            port = open_port(self.url, self.baud)
+            if port.keepable:
+                self._keeper.keep(self.url, port.fileno())
+            return port
+        offset_ns = time.time_ns() - time.monotonic_ns()
+        for data, monotonic_ns in left.read:
+            self._take(data, monotonic_ns, monotonic_ns + offset_ns)
+        return adopt_port(self.url, left.fd)
+
+    def _take(self, data: bytes, monotonic_ns: int, utc_ns: int) -> None:
+        self._journal.append(self._channel, data, monotonic_ns, utc_ns)
+        self._out.put(Chunk(self._channel, data, monotonic_ns))
 
     def _read_until_lost(self, port: Port) -> None:
         poller = select.poll()
@@ -123,9 +132,7 @@ class Reader:
             data = port.read()
             if not data:
                 continue
-            monotonic_ns = time.monotonic_ns()
-            self._journal.append(self._channel, data, monotonic_ns, time.time_ns())
-            self._out.put(Chunk(self._channel, data, monotonic_ns))
+            self._take(data, time.monotonic_ns(), time.time_ns())
 
     def _say(self, message: str) -> None:
         if message != self.message:

@@ -19,7 +19,7 @@ from collections.abc import Callable
 
 import typer
 
-from gateway.keeper import Keeper
+from gateway.keeper import Catcher, Keeper, Left
 
 HANDOVER_S = 6.0
 LOOK_S = 0.2
@@ -32,10 +32,11 @@ log = logging.getLogger(__name__)
 
 
 class Ward(Keeper):
-    """The child's side: gives its open ports away, and has those that an earlier child left."""
+    """The child's side: gives its open ports away, and reads from its first moment those that an earlier child left."""
 
     def __init__(self, line: socket.socket, kept: dict[str, int]) -> None:
-        self._line, self._kept = line, dict(kept)
+        self._line = line
+        self._kept = {url: Catcher(fd) for url, fd in kept.items()}
 
     def keep(self, url: str, fd: int) -> None:
         """Hold an open port for whoever comes after us."""
@@ -45,9 +46,10 @@ class Ward(Keeper):
         """Let a port go that was lost or closed, so that it can be opened anew."""
         self._say(DROP + url.encode())
 
-    def take(self, url: str) -> int | None:
-        """Descriptor of a port that an earlier life left open, once; None when there is none."""
-        return self._kept.pop(url, None)
+    def take(self, url: str) -> Left | None:
+        """A port that an earlier life left open, once; None when there is none."""
+        catcher = self._kept.pop(url, None)
+        return None if catcher is None else catcher.stop()
 
     def holds(self, url: str) -> bool:
         """True while `take` has something to give."""

@@ -14,7 +14,7 @@ from firmware_protocol.codec import encode
 from firmware_protocol.frames import Acc12, Gps, Tacho
 from gateway.board_link import PtyLink
 from gateway.device import DeviceLink
-from gateway.keeper import Keeper
+from gateway.keeper import Keeper, Left
 from gateway.reader import Chunk, Reader
 from gateway.resume import REACH_BYTES, newest, resume
 from gateway.settings import DeviceSettings, GatewaySettings
@@ -80,8 +80,8 @@ class Held(Keeper):
     def __init__(self) -> None:
         self.out, self.into = os.pipe()
 
-    def take(self, url: str) -> int | None:
-        return self.out
+    def take(self, url: str) -> Left | None:
+        return Left(self.out, [])
 
     def holds(self, url: str) -> bool:
         return True
@@ -118,6 +118,7 @@ def test_at_whatever_byte_it_was_killed_each_sample_is_published_once(tmp_path, 
             life.die()
             unseen_ns = begun + int(byte_ns * (at - 600))  # here the board speaks faster than its clock says
             monkeypatch.setattr("gateway.resume.MARGIN_S", (time.monotonic_ns() - unseen_ns) / 1e9)
+            monkeypatch.setattr("gateway.resume.REACH_S", 1e6)  # however slow this machine is
             life = again(tmp_path)
     life.link._send_held()
     said = life.published()
@@ -150,9 +151,11 @@ from gateway.ports import adopt_port, open_port
 from gyrofree.guardian import guard
 def serve(keeper):
     left = keeper.take({path!r})
-    port = open_port({path!r}) if left is None else adopt_port({path!r}, left)
+    port = open_port({path!r}) if left is None else adopt_port({path!r}, left.fd)
     keeper.keep({path!r}, port.fileno())
     print("opened" if left is None else "inherited", os.getpid(), flush=True)
+    for data, _ in () if left is None else left.read:
+        print("read", data.decode(), flush=True)
     while True:
         select.select([port.fileno()], [], [])
         data = port.read()
