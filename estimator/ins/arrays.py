@@ -41,3 +41,11 @@ def identity(a: NDArray) -> None:
         for j in range(a.shape[1]):
             a[i, j] = 0.0
         a[i, i] = 1.0
+
+
+@njit(cache=True)
+def add(target: NDArray, source: NDArray, n: int) -> None:
+    """Add the first n rows and columns of a matrix to those of target."""
+    for i in range(n):
+        for j in range(n):
+            target[i, j] += source[i, j]

@@ -28,6 +28,7 @@ class ImuNoise:
     sigma_bias_accel: float = 0.03  # m/s^2, Gauss-Markov
     sigma_bias_gyro: float = math.radians(0.05)  # rad/s, Gauss-Markov
     tau: float = 300.0  # s, of both
+    shake: float = 1.0  # share of the readings' shaking from sample to sample that is noise to navigation (E-51)
     position: float = 1e-3  # m/sqrt(s), keeps the position covariance from closing completely
 
     def vector(self) -> Array:

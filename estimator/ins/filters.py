@@ -50,9 +50,7 @@ class FilterConfig:
     horizon: int = 0  # fixes, 1 to 10; 0: fuzzy
     arrival: Literal["p0", "mean", "kf"] = "mean"
     kappa: float = 4.0  # on the mean covariance
-    mean_covariance: tuple[tuple[float, ...], ...] | None = (
-        None  # (n, n) of a calibration run; None: this one's
-    )
+    mean_covariance: tuple[tuple[float, ...], ...] | None = None  # (n, n) of a calibration run; None: this one's
     literal: bool = False  # fuzzy inputs as read, not conditioned
     rules: fuzzy.FuzzyRules = fuzzy.RULES
     huber: float = math.inf  # Mahalanobis distance of position or velocity from which a fix is weighted down
@@ -113,6 +111,7 @@ FILTERS: dict[str, FilterConfig] = {
     "kf-fading": FilterConfig(fading=1.05),
     "kf-scale": FilterConfig(scale=True, latency=True),
     "kf-latency": FilterConfig(latency=True),
+    "kf-still": FilterConfig(latency=True, constraints=Constraints(standstill=True)),
     "huber": _ROBUST,
     "huber-nhc": replace(_ROBUST, constraints=_CAR),
     "mhe-robust": replace(_ROBUST, window="robust", horizon=10),

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 PREFIX = "gyro-free-"  # before a filter's name: its inertial unit has no gyroscopes
 GRAVITY = 9.80665  # m/s^2
 NOISE = ImuNoise(
-    accel=0.1, gyro=math.radians(0.6), sigma_bias_accel=0.1, sigma_bias_gyro=math.radians(6.0), tau=10.0
+    accel=0.1, gyro=math.radians(0.6), sigma_bias_accel=0.1, sigma_bias_gyro=math.radians(6.0), tau=10.0, shake=0.0
 )  # of the estimates, not of the readings; 0.5 % of scale error under 1 g is such a rate error in a cube of 10 cm
 CORRELATED = 1.0  # s, for how long the error that a covariance tells of is one and the same
 LARGEST = math.radians(60.0)  # rad/s; a rate that is less certain than that is not known at all

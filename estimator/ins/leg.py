@@ -8,13 +8,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from estimator.ins.arrays import copy1, copy2, fill2, identity
+from estimator.ins.arrays import add, copy1, copy2, fill2, identity
 from estimator.ins.earth import radii
 from estimator.ins.error_model import ImuNoise
 from estimator.ins.mechanise import (
     ACC,
     F1,
     INTERVAL,
+    LAST,
     LENGTH,
     M1,
     M2,
@@ -30,8 +31,8 @@ from estimator.ins.mechanise import (
     W1,
     mechanise,
 )
-from estimator.ins.strapdown import orthonormalise
-from estimator.ins.transition import CORE, MOVING, Leg, Model, transition
+from estimator.ins.strapdown import orthonormalise, rotation
+from estimator.ins.transition import CORE, MOVING, Leg, Model, shaken, transition
 
 Array = NDArray[np.float64]
 
@@ -54,7 +55,15 @@ def make_model(noise: ImuNoise, scale: bool = False, lag: bool = False, car: boo
             density += [0.0] * len(more)
             decay += [0.0] * len(more)
     return Model(
-        len(density), np.array(density), np.array(decay), np.array(place), np.array(sign), first[0], first[1], first[2]
+        len(density),
+        np.array(density),
+        np.array(decay),
+        np.array(place),
+        np.array(sign),
+        first[0],
+        first[1],
+        first[2],
+        noise.shake,
     )
 
 
@@ -134,18 +143,21 @@ def close(leg: Leg, m: Model) -> None:
         Top[j, j] = d[j]
     # Phi_i (Q + T/2 G) Phi_i^T + T/2 G is the trapezoid with one product less
     Q = leg.Q
+    shaken(acc, m, T, leg.work[4])
     for i in range(n):
         Q[i, i] += 0.5 * T * m.noise[i]
+    add(Q, leg.work[4], 6)
     np.dot(Top, Q, scratch)
     np.dot(scratch, Top.T, Q)
     for i in range(n):
         for j in range(i):
             Q[j, i] = Q[i, j]
         Q[i, i] += 0.5 * T * m.noise[i]
+    add(Q, leg.work[4], 6)
     np.dot(Top, leg.Phi, scratch)
     copy2(scratch, leg.Phi)
     orthonormalise(leg.x)
-    for k in range(S1, ACC):
+    for k in range(S1, LAST):
         acc[k] = 0.0
 
 
@@ -192,34 +204,12 @@ def reset(x: Array, c: Array, m: Model) -> None:
         x[3 + i] -= c[3 + i]
     for j in range(m.n - MOVING):
         x[m.place[j]] += m.sign[j] * c[MOVING + j]
-    R = _exp(c)
+    R = np.empty((3, 3))
+    rotation(c[0], c[1], c[2], R)
     for j in range(6, 9):
         a, b, d = x[j], x[j + 3], x[j + 6]
         for i in range(3):
             x[3 * i + j] = R[i, 0] * a + R[i, 1] * b + R[i, 2] * d
-
-
-@njit(cache=True)
-def _exp(v: Array) -> Array:
-    """Rotation matrix of a rotation vector (3,)."""
-    a2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
-    if a2 < 1e-8:
-        s, k = 1.0 - a2 / 6.0, 0.5 - a2 / 24.0
-    else:
-        angle = np.sqrt(a2)
-        s, k = np.sin(angle) / angle, (1.0 - np.cos(angle)) / a2
-    R = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            R[i, j] = k * v[i] * v[j]
-        R[i, i] += 1.0 - k * a2
-    R[0, 1] -= s * v[2]
-    R[1, 0] += s * v[2]
-    R[0, 2] += s * v[1]
-    R[2, 0] -= s * v[1]
-    R[1, 2] -= s * v[0]
-    R[2, 1] += s * v[0]
-    return R
 
 
 @njit(cache=True)

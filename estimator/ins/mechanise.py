@@ -30,7 +30,10 @@ TICK_LENGTH, TIME, SINCE = 18, 19, 20  # s in the open tick; s, time of x; s sin
 # 21..32: L, h, sin L, cos L, tan L, 1/n, 1/e, g, dg/dh, dg/dL, dn/dL, de/dL
 # over the ticks of the open interval: f_n and C once and twice integrated, [f_n x] U1 likewise, f, w, length
 S1, U1, U2, M1, M2, S2, F1, W1, LENGTH = 33, 36, 45, 54, 63, 72, 75, 78, 81
-ACC = 82
+# the last whole sample, f then w, and what the readings shake: noise density squared of each of the six (E-51)
+LAST, SHAKE = 82, 88
+ACC = 94
+SHAKE_MEMORY = 1.0  # s
 
 
 @njit(cache=True)
@@ -66,7 +69,12 @@ def mechanise(x: Array, acc: Array, t: Array, f: Array, w: Array, start: int, st
     )  # fmt: skip
     q0, q1, q2, r0, r1, r2 = acc[12], acc[13], acc[14], acc[15], acc[16], acc[17]
     length, time = acc[18], acc[19]
+    l0, l1, l2, l3, l4, l5 = acc[82], acc[83], acc[84], acc[85], acc[86], acc[87]
+    v0, v1, v2, v3, v4, v5 = acc[88], acc[89], acc[90], acc[91], acc[92], acc[93]
     k = start
+    if l0 == 0.0 and l1 == 0.0 and l2 == 0.0 and k < stop:  # nothing seen yet
+        j = k - 1 if k > 0 else k
+        l0, l1, l2, l3, l4, l5 = f[j, 0], f[j, 1], f[j, 2], w[j, 0], w[j, 1], w[j, 2]
     if length <= 0.0 and acc[81] <= 0.0:
         freeze(x, acc)
     L0, h0, s0, k0, t0, in0, ie0 = acc[21], acc[22], acc[23], acc[24], acc[25], acc[26], acc[27]
@@ -157,6 +165,22 @@ def mechanise(x: Array, acc: Array, t: Array, f: Array, w: Array, start: int, st
             time = end
         if t[k] > until:
             break
+        if k > 0:
+            whole = t[k] - t[k - 1]
+            part = min(1.0, whole / SHAKE_MEMORY)
+            a, b, c = f[k, 0] - l0, f[k, 1] - l1, f[k, 2] - l2
+            v0, v1, v2 = (
+                v0 + part * (0.5 * whole * a * a - v0),
+                v1 + part * (0.5 * whole * b * b - v1),
+                v2 + part * (0.5 * whole * c * c - v2),
+            )
+            a, b, c = w[k, 0] - l3, w[k, 1] - l4, w[k, 2] - l5
+            v3, v4, v5 = (
+                v3 + part * (0.5 * whole * a * a - v3),
+                v4 + part * (0.5 * whole * b * b - v4),
+                v5 + part * (0.5 * whole * c * c - v5),
+            )
+        l0, l1, l2, l3, l4, l5 = f[k, 0], f[k, 1], f[k, 2], w[k, 0], w[k, 1], w[k, 2]
         k += 1
         if length >= TICK - 1e-6:
             break
@@ -168,4 +192,6 @@ def mechanise(x: Array, acc: Array, t: Array, f: Array, w: Array, start: int, st
     )  # fmt: skip
     acc[12], acc[13], acc[14], acc[15], acc[16], acc[17] = q0, q1, q2, r0, r1, r2
     acc[18], acc[19] = length, time
+    acc[82], acc[83], acc[84], acc[85], acc[86], acc[87] = l0, l1, l2, l3, l4, l5
+    acc[88], acc[89], acc[90], acc[91], acc[92], acc[93] = v0, v1, v2, v3, v4, v5
     return k

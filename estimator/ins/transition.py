@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from estimator.ins.arrays import copy2, fill2, identity
 from estimator.ins.earth import OMEGA
-from estimator.ins.mechanise import F1, M1, M2, S1, S2, U1, U2, W1
+from estimator.ins.mechanise import F1, M1, M2, S1, S2, SHAKE, U1, U2, W1
 
 Array = NDArray[np.float64]
 
@@ -27,6 +27,7 @@ class Model(NamedTuple):
     scale: int  # first of six scale factors
     lag: int  # first of two latencies
     car: int  # first of three of a car: mounting pitch, yaw, distance to the rear axle
+    shake: float  # share of the readings' shaking that is noise to navigation (E-51)
 
 
 class Leg(NamedTuple):
@@ -38,7 +39,7 @@ class Leg(NamedTuple):
     Q: Array  # (n, n)
     acc: Array  # (ACC,)
     ring: Array  # (RING, RING_COLUMNS) the last ticks, newest last
-    work: Array  # (5, n, n) scratch
+    work: Array  # (5, n, n) scratch, n at least 15
 
 
 @njit(cache=True)
@@ -113,3 +114,21 @@ def transition(leg: Leg, m: Model, T: float, d: Array, Top: Array) -> None:
                     Top[i, j] += a * main[k, j]
                 for j in range(MOVING):
                     Top[j, k] += main[j, i] * a
+
+
+@njit(cache=True)
+def shaken(acc: Array, m: Model, T: float, out: Array) -> None:
+    """Half an interval's noise that comes from the readings' shaking, to out's first six rows and columns (E-51).
+
+    Attitude and velocity, in n: an axis that shakes more than its neighbours is noisier than they are.
+    """
+    for i in range(6):
+        for j in range(6):
+            out[i, j] = 0.0
+    for k in range(3):
+        gyro, accel = 0.5 * T * m.shake * acc[SHAKE + 3 + k], 0.5 * T * m.shake * acc[SHAKE + k]
+        for i in range(3):
+            for j in range(3):
+                a = acc[U1 + 3 * i + k] * acc[U1 + 3 * j + k] / (T * T)  # U1 / T is the mean attitude
+                out[i, j] += a * gyro
+                out[3 + i, 3 + j] += a * accel

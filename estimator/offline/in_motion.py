@@ -25,7 +25,7 @@ from estimator.simulation.drive_path import radii
 Array = NDArray[np.float64]
 
 SETTLED = 15.0  # s after the start of navigation, from which errors count
-HONEST = ImuNoise(accel=0.05, gyro=math.radians(0.05))  # the simulated sensors' own figures
+HONEST = ImuNoise(accel=0.05, gyro=math.radians(0.05), shake=0.0)  # the simulated sensors' own figures, as they are
 BELIEVED = FixSettings(floor_p=(0.0, 0.0, 0.0), floor_v=(0.0, 0.0, 0.0), timing=0.0)  # what the fixes say, no more
 CONSTANT = 1e-9  # factor on the biases' variance that makes them constants
 WHEELS = Constraints(  # as the comparison has it: mounting known, IMU over the rear axle, nothing at standstill
