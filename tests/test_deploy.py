@@ -1,4 +1,4 @@
-"""What the container image is made of: every file that the Dockerfile copies reaches the build, and every room is copied."""
+"""The container image: what its recipe copies reaches the build, and every room is copied."""
 
 import tomllib
 from pathlib import Path
