@@ -13,12 +13,13 @@ import zenoh
 from google.protobuf.message import DecodeError
 
 from messages import gyrofree_pb2 as pb
-from messages.spool import Spool
+from messages.spool import REPLY_BYTES, Spool
 from messages.topics import published_key
 
 log = logging.getLogger(__name__)
 
 ANSWER_S = 10.0  # an answer is a MB from the disk; a busy machine takes its time
+LEAST_BYTES = 1 << 15  # of an answer that a busier machine is asked for
 
 
 def declare(session: zenoh.Session, prefix: str, device: str, source: str, spool: Spool) -> zenoh.Queryable:
@@ -77,7 +78,7 @@ class Asker:
 
     RETRIES = 4  # a link that is just back may carry samples before it carries questions
     RETRY_S = 0.5
-    PATIENCE_S = 120.0  # with one that is there, but does not answer in time
+    PATIENCE_S = 1800.0  # with one that is there, but does not answer in time
 
     def __init__(self, session: zenoh.Session, prefix: str, done: Callable[[object, pb.HistoryReply | None], None]):
         self._session, self._prefix, self._done = session, prefix, done
@@ -98,8 +99,10 @@ class Asker:
 
     def _run(self) -> None:
         while (question := self._questions.get()) is not None and not self._stop.is_set():
-            token, device, source, query = question
+            token, device, source, asked = question
             reply, nobody, end = None, 0, time.monotonic() + self.PATIENCE_S
+            query = pb.HistoryQuery()
+            query.CopyFrom(asked)
             while reply is None and nobody < self.RETRIES and time.monotonic() < end:
                 began = time.monotonic()
                 try:
@@ -107,7 +110,10 @@ class Asker:
                 except zenoh.ZError as error:
                     log.warning("history of %s: %s", device, error)
                 if reply is None:
-                    nobody += time.monotonic() - began < ANSWER_S / 2  # else it was there, and slow
+                    slow = time.monotonic() - began >= ANSWER_S / 2  # it is there
+                    nobody += not slow
+                    if slow and query.every_s <= 0.0:  # whoever was slow is asked for less at a time
+                        query.max_bytes = max(LEAST_BYTES, (query.max_bytes or REPLY_BYTES) // 2)
                     if self._stop.wait(self.RETRY_S):
                         return
             self._done(token, reply)

@@ -7,7 +7,8 @@ estimator and dashboard use it on their own threads, and a test without any.
 
 Messages belong together by device and publishing process (a "stream"): one question about a stream fills the gaps of
 all its topics, in the right order among them. With `hold`, live messages of a stream wait while one of its gaps is
-being filled, at most `max_held` of them; without, they pass at once and the filled ones come late.
+being filled, at most `max_held` of them; newer ones are as if lost, and asked for later. Without, they pass at once and
+the filled ones come late.
 """
 
 import logging
@@ -72,6 +73,7 @@ class _Key:
 @dataclass
 class _Stream:
     asking: bool = False
+    full: bool = False  # holds max_held: the newest were not taken
     held: deque[Arrival] = field(default_factory=deque)
     waiting: deque[pb.HistoryQuery] = field(default_factory=deque)
     tried: set[tuple[str, int, int]] = field(default_factory=set)  # beginnings that were asked for
@@ -129,11 +131,13 @@ class Mender:
             return [arrival]
         stream = self._streams.setdefault((arrival.device, arrival.topic.source), _Stream())
         if self._hold and stream.asking:
-            stream.held.append(arrival)
-            if len(stream.held) <= self._max_held:
+            if len(stream.held) < self._max_held:
+                stream.held.append(arrival)
                 return []
-            log.warning("%s: no answer in time: going on with a gap", arrival.device)
-            return self._release(stream)
+            if not stream.full:
+                log.warning("%s: %d messages wait; newer ones are asked for later", arrival.device, self._max_held)
+            stream.full = True
+            return []
         return self._pass(stream, arrival)
 
     def answer(self, question: Question, reply: pb.HistoryReply | None) -> list[Arrival]:
@@ -156,7 +160,7 @@ class Mender:
             self._ask(Question(question.stream, stream.waiting.popleft()))
             return out
         self._give_up(question.stream)
-        stream.asking = False
+        stream.asking = stream.full = False
         stream.tried.clear()
         while stream.held and not stream.asking:
             out += self._pass(stream, stream.held.popleft())
