@@ -18,7 +18,7 @@ from sessions.catalogue import Catalogue
 from sessions.mcap_log import read
 
 SERVICES = ("gateway", "record", "estimator", "dashboard", "router")
-PATIENCE = 90.0  # s, for a service to be back at work
+PATIENCE = 240.0  # s, for a service to be back at work
 
 
 class Watch:
@@ -60,12 +60,22 @@ class Account:
     states: list[str] = field(default_factory=list)
 
 
-def kill_all(demo: RunningDemo, watch: Watch, rounds: int, seed: int, services=SERVICES) -> list[tuple[str, int]]:
-    """Kill each service `rounds` times at random moments; (service, UTC ns) of each. Waits for the work to go on."""
+def kill_all(
+    demo: RunningDemo,
+    watch: Watch,
+    rounds: int,
+    seed: int,
+    services: tuple[str, ...] = SERVICES,
+    kills: list[tuple[str, int]] | None = None,
+) -> list[tuple[str, int]]:
+    """Kill each service `rounds` times at random moments; (service, UTC ns) of each. Waits for the work to go on.
+
+    `kills` is filled while it goes on, for who wants them also when AssertionError says that the work does not.
+    """
     chance = random.Random(seed)
     order = [service for service in services for _ in range(rounds)]
     chance.shuffle(order)
-    kills = []
+    kills = [] if kills is None else kills
     for service in order:
         time.sleep(chance.uniform(0.5, 2.5))
         victim = demo.children()[service]
