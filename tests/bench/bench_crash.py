@@ -1,6 +1,6 @@
 """kill -9 of every service at random moments: what is lost, what is double, what had been acknowledged.
 
-    python tests/bench/bench_crash.py [kills of each service, default 20] [seed]
+    python tests/bench/bench_crash.py [kills of each service, default 20] [seed] [services, default all]
 
 The whole demo stack runs (simulated table, 100 samples/s, two estimators, recording). Afterwards every message of every
 session is read.
@@ -12,11 +12,11 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from kill_stack import Watch, account, bus_of, kill_all, line  # noqa: E402
+from kill_stack import SERVICES, Watch, account, bus_of, kill_all, line  # noqa: E402
 from stack import RunningDemo  # noqa: E402
 
 
-def main(rounds: int = 20, seed: int = 1) -> None:
+def main(rounds: int = 20, seed: int = 1, *services: str) -> None:
     """Run and print."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -24,7 +24,7 @@ def main(rounds: int = 20, seed: int = 1) -> None:
             watch = Watch(bus_of(demo))
             kills = []
             try:
-                kill_all(demo, watch, rounds, seed, kills=kills)
+                kill_all(demo, watch, rounds, seed, services or SERVICES, kills)
             except AssertionError as error:  # the machine is too busy: what was done is accounted for all the same
                 print(str(error).splitlines()[0], file=sys.stderr)
             watch.close()
@@ -41,4 +41,4 @@ def main(rounds: int = 20, seed: int = 1) -> None:
 
 
 if __name__ == "__main__":
-    main(*(int(word) for word in sys.argv[1:3]))
+    main(*(int(word) for word in sys.argv[1:3]), *sys.argv[3:])
