@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from estimator.ins import estimate as est
 from estimator.ins.alignment import Start
+from estimator.ins.drag import DragWatch
 from estimator.ins.filters import FilterConfig, filter_of
 from estimator.ins.fix import Fix, fix_row
 from estimator.ins.leg import Leg, copy_leg
@@ -146,7 +147,9 @@ class Drive:
         self.config = config
         settle = config.settle
         good = [fix for fix in fixes if not config.fix.objection(fix)]
-        self.fixes = sorted(good, key=lambda fix: fix.due(settle))
+        watch = DragWatch()
+        by_use = sorted(good, key=lambda fix: fix.due(settle))
+        self.fixes = [watch.take(fix) if fix.arrival >= self.t[0] else fix for fix in by_use]  # live they need samples
         self.due = np.array([fix.due(settle) for fix in self.fixes])
         self.table = np.array([fix_row(fix, config.fix) for fix in self.fixes]).reshape(-1, FIX_COLUMNS)
         self.gaps = np.flatnonzero(np.diff(self.t) > config.longest_gap) + 1  # first samples after one
@@ -195,6 +198,7 @@ class Drive:
         caught: list[tuple[Start, Fix]] = []
         nav.begin = lambda start, fix: caught.append((start, fix))  # type: ignore[method-assign]
         nav._advance_head = lambda: None  # type: ignore[method-assign]
+        nav.watch = None
         for i in range(k, len(self.t)):
             nav.imu(float(self.t[i]), self.f[i], self.w[i])
             while not caught and j < len(self.fixes) and self.due[j] <= self.t[i]:

@@ -50,6 +50,7 @@ class Fix:
     key: int = 0  # whatever the caller needs to know it by
     yaw: float | None = None  # rad, heading by two antennas
     sigma_yaw: float = 0.01  # rad, with yaw
+    drag: float = 0.0  # m/s, by which its position walks off its own velocity; then sigma_p is raised, see drag
 
     def due(self, settle: float) -> float:
         """When it is used, s."""

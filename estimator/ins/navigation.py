@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from estimator.ins import estimate as est
 from estimator.ins.alignment import Alignment, AlignmentSettings, Start
+from estimator.ins.drag import DragWatch
 from estimator.ins.earth import ned_between
 from estimator.ins.error_model import DP, ImuNoise
 from estimator.ins.filters import FILTERS, FilterConfig, filter_of
@@ -93,7 +94,9 @@ class Navigator:
         self.model = chosen.model(config.imu)
         self.settings = chosen.settings(config.fix, config.lever_arm_b)
         self.mode = Mode.WAITING
-        self.counts = {"used": 0, "rejected": 0, "withheld": 0, "late": 0, "ahead": 0, "readmitted": 0, "doubted": 0}
+        names = ("used", "rejected", "withheld", "late", "ahead", "readmitted", "doubted", "dragged")
+        self.counts = dict.fromkeys(names, 0)
+        self.watch: DragWatch | None = DragWatch()  # None: the fixes have been looked at already
         self.horizon: HorizonChoice | None = None
         self.align = Alignment(config.alignment)
         self._history = History()
@@ -177,6 +180,9 @@ class Navigator:
         reason = self.config.fix.objection(fix)
         if reason:
             return self._refuse(nothing_compared(fix), "rejected", reason)
+        if self.watch is not None:
+            fix = self.watch.take(fix)
+        self.counts["dragged"] += fix.drag > 0.0
         if self._origin is None:
             self._origin = (fix.latitude, fix.longitude, fix.height)
         if self._memory is None:

@@ -77,6 +77,9 @@ def correction_of(fix: Fix, row: Array) -> Correction:
         reason, weight = MUTED if fix.muted else WITHHELD, 0.0
     elif weight < 1.0:
         reason = f"weighted down to {weight:.2f}"
+    if fix.drag > 0.0 and accepted:
+        drag = f"position walks off its own velocity at {fix.drag:.2f} m/s: believed to {max(fix.sigma_p[:2]):.0f} m"
+        reason = f"{drag}; {reason}" if reason else drag
     horizon = None
     if row[est.O_N] > 0.0:
         fuzzy = math.isfinite(row[est.O_INPUT])
