@@ -291,7 +291,7 @@ class AdcBatch(_message.Message):
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., first_index: _Optional[int] = ..., period_s: _Optional[float] = ..., channels: _Optional[int] = ..., counts: _Optional[_Iterable[int]] = ..., volt_per_count: _Optional[float] = ..., lost_samples: _Optional[int] = ..., frame_sequence: _Optional[int] = ..., received_ns: _Optional[int] = ..., channel_mask: _Optional[int] = ..., zero_g_v: _Optional[float] = ..., accel_v_per_mps2: _Optional[float] = ..., zero_rate_v: _Optional[float] = ..., gyro_v_per_radps: _Optional[float] = ...) -> None: ...
 
 class RateEstimate(_message.Message):
-    __slots__ = ("header", "estimator", "for_sequence", "for_index", "omega_ib_b_radps", "omega_covariance", "alpha_b_radps2", "f_b_mps2", "q_nb", "angle_z_rad", "innovation", "innovation_sigma", "nis", "nis_dof", "still", "p_n_m", "v_n_mps", "bias", "innovation_unit", "sight", "sight_reason", "bound_sigma_radps", "calibration", "excluded_mask")
+    __slots__ = ("header", "estimator", "for_sequence", "for_index", "omega_ib_b_radps", "omega_covariance", "alpha_b_radps2", "f_b_mps2", "q_nb", "angle_z_rad", "innovation", "innovation_sigma", "nis", "nis_dof", "still", "p_n_m", "v_n_mps", "bias", "innovation_unit", "sight", "sight_reason", "bound_sigma_radps", "calibration", "excluded_mask", "aid")
     class Sight(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         SIGHT_VALID: _ClassVar[RateEstimate.Sight]
@@ -324,6 +324,7 @@ class RateEstimate(_message.Message):
     BOUND_SIGMA_RADPS_FIELD_NUMBER: _ClassVar[int]
     CALIBRATION_FIELD_NUMBER: _ClassVar[int]
     EXCLUDED_MASK_FIELD_NUMBER: _ClassVar[int]
+    AID_FIELD_NUMBER: _ClassVar[int]
     header: Header
     estimator: str
     for_sequence: int
@@ -348,7 +349,8 @@ class RateEstimate(_message.Message):
     bound_sigma_radps: _containers.RepeatedScalarFieldContainer[float]
     calibration: str
     excluded_mask: int
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., for_sequence: _Optional[int] = ..., for_index: _Optional[int] = ..., omega_ib_b_radps: _Optional[_Iterable[float]] = ..., omega_covariance: _Optional[_Iterable[float]] = ..., alpha_b_radps2: _Optional[_Iterable[float]] = ..., f_b_mps2: _Optional[_Iterable[float]] = ..., q_nb: _Optional[_Iterable[float]] = ..., angle_z_rad: _Optional[float] = ..., innovation: _Optional[_Iterable[float]] = ..., innovation_sigma: _Optional[_Iterable[float]] = ..., nis: _Optional[float] = ..., nis_dof: _Optional[int] = ..., still: _Optional[bool] = ..., p_n_m: _Optional[_Iterable[float]] = ..., v_n_mps: _Optional[_Iterable[float]] = ..., bias: _Optional[_Iterable[float]] = ..., innovation_unit: _Optional[str] = ..., sight: _Optional[_Iterable[_Union[RateEstimate.Sight, str]]] = ..., sight_reason: _Optional[str] = ..., bound_sigma_radps: _Optional[_Iterable[float]] = ..., calibration: _Optional[str] = ..., excluded_mask: _Optional[int] = ...) -> None: ...
+    aid: str
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., for_sequence: _Optional[int] = ..., for_index: _Optional[int] = ..., omega_ib_b_radps: _Optional[_Iterable[float]] = ..., omega_covariance: _Optional[_Iterable[float]] = ..., alpha_b_radps2: _Optional[_Iterable[float]] = ..., f_b_mps2: _Optional[_Iterable[float]] = ..., q_nb: _Optional[_Iterable[float]] = ..., angle_z_rad: _Optional[float] = ..., innovation: _Optional[_Iterable[float]] = ..., innovation_sigma: _Optional[_Iterable[float]] = ..., nis: _Optional[float] = ..., nis_dof: _Optional[int] = ..., still: _Optional[bool] = ..., p_n_m: _Optional[_Iterable[float]] = ..., v_n_mps: _Optional[_Iterable[float]] = ..., bias: _Optional[_Iterable[float]] = ..., innovation_unit: _Optional[str] = ..., sight: _Optional[_Iterable[_Union[RateEstimate.Sight, str]]] = ..., sight_reason: _Optional[str] = ..., bound_sigma_radps: _Optional[_Iterable[float]] = ..., calibration: _Optional[str] = ..., excluded_mask: _Optional[int] = ..., aid: _Optional[str] = ...) -> None: ...
 
 class NavSolution(_message.Message):
     __slots__ = ("header", "estimator", "for_sequence", "for_index", "mode", "latitude_deg", "longitude_deg", "height_m", "p_ned_m", "v_n_mps", "q_nb", "bias_f_b_mps2", "bias_omega_b_radps", "sigma", "position_covariance", "origin_latitude_deg", "origin_longitude_deg", "origin_height_m", "fix_age_s", "horizon", "alignment", "gnss_muted", "calibration")
