@@ -291,6 +291,7 @@ def innovation_message(header: pb.Header, name: str, c: Correction) -> pb.Innova
         reason=c.reason,
         weight=c.weight,
         prediction_error=as_list(c.prediction_error),
+        residual=as_list(c.residual),
     )
 
 

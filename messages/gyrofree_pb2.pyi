@@ -413,7 +413,7 @@ class NavSolution(_message.Message):
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., for_sequence: _Optional[int] = ..., for_index: _Optional[int] = ..., mode: _Optional[_Union[NavSolution.Mode, str]] = ..., latitude_deg: _Optional[float] = ..., longitude_deg: _Optional[float] = ..., height_m: _Optional[float] = ..., p_ned_m: _Optional[_Iterable[float]] = ..., v_n_mps: _Optional[_Iterable[float]] = ..., q_nb: _Optional[_Iterable[float]] = ..., bias_f_b_mps2: _Optional[_Iterable[float]] = ..., bias_omega_b_radps: _Optional[_Iterable[float]] = ..., sigma: _Optional[_Iterable[float]] = ..., position_covariance: _Optional[_Iterable[float]] = ..., origin_latitude_deg: _Optional[float] = ..., origin_longitude_deg: _Optional[float] = ..., origin_height_m: _Optional[float] = ..., fix_age_s: _Optional[float] = ..., horizon: _Optional[_Union[Horizon, _Mapping]] = ..., alignment: _Optional[str] = ..., gnss_muted: _Optional[bool] = ..., calibration: _Optional[str] = ...) -> None: ...
 
 class Innovation(_message.Message):
-    __slots__ = ("header", "estimator", "for_sequence", "name", "value", "sigma", "nis", "dof", "accepted", "error_to_reference", "reason", "weight", "prediction_error")
+    __slots__ = ("header", "estimator", "for_sequence", "name", "value", "sigma", "nis", "dof", "accepted", "error_to_reference", "reason", "weight", "prediction_error", "residual")
     HEADER_FIELD_NUMBER: _ClassVar[int]
     ESTIMATOR_FIELD_NUMBER: _ClassVar[int]
     FOR_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
@@ -427,6 +427,7 @@ class Innovation(_message.Message):
     REASON_FIELD_NUMBER: _ClassVar[int]
     WEIGHT_FIELD_NUMBER: _ClassVar[int]
     PREDICTION_ERROR_FIELD_NUMBER: _ClassVar[int]
+    RESIDUAL_FIELD_NUMBER: _ClassVar[int]
     header: Header
     estimator: str
     for_sequence: int
@@ -440,7 +441,8 @@ class Innovation(_message.Message):
     reason: str
     weight: float
     prediction_error: _containers.RepeatedScalarFieldContainer[float]
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., for_sequence: _Optional[int] = ..., name: _Optional[_Iterable[str]] = ..., value: _Optional[_Iterable[float]] = ..., sigma: _Optional[_Iterable[float]] = ..., nis: _Optional[float] = ..., dof: _Optional[int] = ..., accepted: _Optional[bool] = ..., error_to_reference: _Optional[_Iterable[float]] = ..., reason: _Optional[str] = ..., weight: _Optional[float] = ..., prediction_error: _Optional[_Iterable[float]] = ...) -> None: ...
+    residual: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., for_sequence: _Optional[int] = ..., name: _Optional[_Iterable[str]] = ..., value: _Optional[_Iterable[float]] = ..., sigma: _Optional[_Iterable[float]] = ..., nis: _Optional[float] = ..., dof: _Optional[int] = ..., accepted: _Optional[bool] = ..., error_to_reference: _Optional[_Iterable[float]] = ..., reason: _Optional[str] = ..., weight: _Optional[float] = ..., prediction_error: _Optional[_Iterable[float]] = ..., residual: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class Truth(_message.Message):
     __slots__ = ("header", "for_index", "q_nb", "omega_ib_b_radps", "alpha_b_radps2", "f_b_mps2", "angle_z_rad", "profile_time_s")

@@ -35,6 +35,7 @@ TRUTH_OMEGA, TRUTH_F, TRUTH_ANGLE = slice(0, 3), slice(3, 6), 6
 NAV_POSITION, NAV_VELOCITY, NAV_SIGMA_POSITION, NAV_YAW = slice(0, 3), slice(3, 6), slice(6, 9), 9
 NAV_HORIZON, NAV_CRISP, NAV_INPUTS, NAV_MEMBERSHIP = 10, 11, slice(12, 14), slice(14, 20)
 INNOVATION_VALUE, INNOVATION_SIGMA, INNOVATION_NIS, INNOVATION_ERROR = slice(0, 6), slice(6, 12), 12, slice(13, 16)
+INNOVATION_AHEAD, INNOVATION_RESIDUAL = slice(16, 19), slice(19, 22)  # fix minus prediction, minus solution: NED m
 GNSS_POSITION = slice(0, 3)
 
 
@@ -289,7 +290,8 @@ def _gnss(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.GnssF
 
 def _innovation(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.Innovation) -> None:
     row = _six(m.value) + _six(m.sigma) + [m.nis] + _three(m.error_to_reference)
-    _ring(device, topic, estimator, 16, rate=10.0).append(t, row)
+    row += _six(m.prediction_error)[:3] + _six(m.residual)[:3]
+    _ring(device, topic, estimator, 22, rate=10.0).append(t, row)
     # A fix withheld on purpose is not accepted either, but it comes with its error.
     if not m.accepted and not m.error_to_reference and estimator == device.estimators("innovation")[0]:
         p_n = device.fixes.get(m.for_sequence)

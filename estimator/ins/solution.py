@@ -59,6 +59,11 @@ class Correction:
         n = min(6, len(self.values) // 3 * 3)
         return signs[:n] * self.values[:n]
 
+    @property
+    def residual(self) -> Array:
+        """(6,) fix minus the solution after it was used: position NED m, velocity NED m/s; empty where nothing was."""
+        return np.empty(0) if self.left is None else np.array([-1.0, -1.0, 1.0, -1.0, -1.0, -1.0]) * self.left
+
 
 def nothing_compared(fix: Fix) -> Correction:
     """A fix taken while there is no prediction to compare it with."""

@@ -9,6 +9,7 @@ from dashboard.scene.store import (
     INNOVATION_ERROR,
     INNOVATION_SIGMA,
     INNOVATION_VALUE,
+    NAV_SIGMA_POSITION,
     RATE_OMEGA,
     RATE_SIGMA,
     TRUTH_OMEGA,
@@ -69,8 +70,8 @@ class Errors(Panel):
             error = r[:, INNOVATION_ERROR]
             held_out = np.isfinite(error[:, 0])
             if held_out.any():
-                t, error, half = t[held_out], error[held_out], [None] * 3
-                what = "navigation minus unseen fix"
+                t, error = t[held_out], error[held_out]
+                half, what = _three_sigma(s, name, t), "navigation minus unseen fix"
             else:  # before it is used, each fix is unseen too: the innovation is the error of the prediction
                 error, half = -r[:, INNOVATION_VALUE][:, :3], [3 * r[:, INNOVATION_SIGMA][:, k] for k in range(3)]
                 what = "prediction minus the fix about to be used"
@@ -85,6 +86,14 @@ class Errors(Panel):
                 items += [("RMS height", number(float(np.sqrt(np.nanmean(error[:, 2] ** 2))), 2, "m"))]
                 items += [("fixes in the window", str(len(error)))]
         self._table = self.html(rows(items) if items else _nothing("no fixes yet"), self._table)
+
+
+def _three_sigma(s: Snapshot, name: str, t: np.ndarray) -> list[np.ndarray | None]:
+    """What the filter claims for north, east, down, m, at times t (n,); the fix's own error comes on top."""
+    at, r = s.rows("nav", name)
+    if len(at) < 2:
+        return [None] * 3
+    return [3 * np.interp(t, at, r[:, NAV_SIGMA_POSITION][:, k]) for k in range(3)]
 
 
 def _nothing(text: str) -> str:

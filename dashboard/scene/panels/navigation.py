@@ -10,15 +10,21 @@ from dashboard.scene.panels import drift
 from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve
 from dashboard.scene.store import (
     GNSS_POSITION,
+    INNOVATION_AHEAD,
     INNOVATION_ERROR,
     INNOVATION_NIS,
-    INNOVATION_VALUE,
+    INNOVATION_RESIDUAL,
     NAV_POSITION,
     NAV_SIGMA_POSITION,
 )
 from messages import gyrofree_pb2 as pb
 
 OUTAGE_S = 30.0
+HEAD = ("<b>race</b>, horizontal RMS, m", "unseen fix", "prediction", "fed fix", "NIS")
+METRICS = (
+    "Three metrics, not to be mixed up: error on fixes held back from the filter; its prediction against the next fix, "
+    "before that is used; and what is left to a fix after it was used, which rewards a filter that just follows."
+)
 
 
 class Navigation(Panel):
@@ -110,17 +116,22 @@ class Navigation(Panel):
         """Three metrics, which are not the same: see docs/navigation.md."""
         found = []
         for name in names:
-            t, r = s.rows("innovation", name)
-            error, value = r[:, INNOVATION_ERROR][:, :2], r[:, INNOVATION_VALUE][:, :2]
+            _, r = s.rows("innovation", name)
+            error, ahead = r[:, INNOVATION_ERROR][:, :2], r[:, INNOVATION_AHEAD][:, :2]
             unseen = np.isfinite(error[:, 0])
-            fed = ~unseen & np.isfinite(value[:, 0])
-            found.append((_rms(error[unseen]), _rms(value[fed]), name, r[fed, INNOVATION_NIS]))
+            fed = ~unseen & np.isfinite(ahead[:, 0])
+            left = r[fed][:, INNOVATION_RESIDUAL][:, :2]
+            left = left[np.isfinite(left[:, 0])]
+            found.append((_rms(error[unseen]), _rms(ahead[fed]), _rms(left), name, r[fed, INNOVATION_NIS]))
         items = []
-        for error, ahead, name, nis in sorted(found, key=lambda f: (np.nan_to_num(f[0], nan=1e9), f[2])):
+        for error, ahead, left, name, nis in sorted(found, key=lambda f: (np.nan_to_num(f[0], nan=1e9), f[3])):
             dot = f'<span style="color:{estimator_colour(name, names)}">●</span> {estimator_title(name)}'
             honest = number(float(np.mean(nis)), 1) if len(nis) else "–"
-            items.append((dot, f"{number(error, 3)} · {number(ahead, 3)} m · NIS {honest}"))
-        return rows([("<b>race</b>, horizontal RMS", "unseen fixes · prediction"), *items])
+            cells = [number(v, 3) for v in (error, ahead, left)] + [honest]
+            items.append("".join(f"<td>{cell}</td>" for cell in [dot, *cells]))
+        head = "".join(f"<td>{text}</td>" for text in HEAD)
+        body = "".join(f"<tr>{row}</tr>" for row in [head, *items])
+        return f'<table class="gf-rows">{body}</table><p class="gf-note">{METRICS}</p>'
 
     def _order(self) -> None:
         seconds = 0.0 if self._muted else OUTAGE_S
