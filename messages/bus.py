@@ -52,6 +52,8 @@ def _config(settings: BusSettings, mode: str) -> zenoh.Config:
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
         "timestamping/enabled": True,
+        # A pool of 16 MiB in every process for messages above 3 kB, left in /dev/shm by every one that is killed.
+        "transport/shared_memory/enabled": False,
         "transport/link/tx/lease": settings.lease_ms,
         # A process that gets no processor for a while must not lose messages: room for 16 batches of 64 KiB, and some
         # patience before DROP drops. Express publishing would be no faster at these rates (measured), but takes a
