@@ -22,10 +22,10 @@ from messages.topics import WIRING
 
 log = logging.getLogger(__name__)
 
-CHANNELS = 6  # one of them open
+CHANNELS = 7  # one of them open
 REST_S, MOVE_S = 1.6, 1.4  # s, of a guided movement: the detection wants a second of rest
 IDLE_REST_S, IDLE_MOVE_S = 1.0, 2.0
-GONE_S = 3.0  # s without a word: nobody guides any more
+GONE_S = 3.0  # s of samples without a word: nobody guides any more
 POSES = {
     pb.WiringStatus.POSE_LEVEL: "level",
     pb.WiringStatus.POSE_NOSE_UP: "nose up",
@@ -39,7 +39,7 @@ class Guide:
 
     def __init__(self, bus: BusSettings, device: str, stop: threading.Event) -> None:
         self._device = device
-        self._wanted: tuple[float, pb.WiringStatus] | None = None
+        self._wanted, self._samples_left = pb.WiringStatus(), 0.0
         threading.Thread(target=self._listen, args=(bus, stop), name="guide", daemon=True).start()
 
     def _listen(self, bus: BusSettings, stop: threading.Event) -> None:
@@ -50,23 +50,23 @@ class Guide:
         self._kept = session, subscribe(session, WIRING, bus.prefix, self._heard, self._device)
 
     def _heard(self, _: object, status: pb.WiringStatus) -> None:
-        self._wanted = time.monotonic(), status
+        self._wanted, self._samples_left = status, GONE_S * RATE_HZ
 
-    @property
     def pose(self) -> str:
-        """Pose to go to now; empty: whatever one likes."""
-        if self._wanted is None or time.monotonic() - self._wanted[0] > GONE_S:
+        """Pose to go to now, asked once a sample; empty: whatever one likes."""
+        self._samples_left -= 1.0
+        if self._samples_left < 0.0:
             return ""
-        status = self._wanted[1]
+        status = self._wanted
         running = status.state in (pb.WiringStatus.STATE_WAITING, pb.WiringStatus.STATE_MOVING)
         return POSES[status.pose] if running else ""
 
 
 def wiring_of(seed: int) -> AnalogueWiring:
-    """A wiring of the board's six inputs that is not the usual one."""
+    """A wiring of three accelerometers and three gyroscopes that is not the usual one."""
     draw = np.random.default_rng([seed, 41])
-    inputs = tuple(int(v) for v in draw.permutation(CHANNELS)[:5])
-    return AnalogueWiring(inputs, tuple(int(v) for v in draw.choice([-1, 1], 5)), CHANNELS)
+    inputs = tuple(int(v) for v in draw.permutation(CHANNELS)[:6])
+    return AnalogueWiring(inputs, tuple(int(v) for v in draw.choice([-1, 1], 6)), CHANNELS)
 
 
 def motion(hand: Hand, guide: Guide, seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -74,7 +74,7 @@ def motion(hand: Hand, guide: Guide, seed: int) -> Iterator[tuple[np.ndarray, np
     draw, at, rest = np.random.default_rng([seed, 42]), "", 0.0
     while True:
         rest = rest + 1.0 / RATE_HZ if hand.resting else 0.0
-        wanted = guide.pose
+        wanted = guide.pose()
         if wanted and rest > REST_S and wanted != at:
             hand.move_to(hand.pose(wanted), MOVE_S)
             at = wanted

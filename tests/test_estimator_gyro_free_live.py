@@ -4,48 +4,13 @@ import pickle
 
 import numpy as np
 import pytest
+from gyro_free_rig import COS, LATITUDE, LONGITUDE, METRES, SETTINGS, heading_error, messages
 
 from estimator.service import Pipeline, UnknownEstimator
 from estimator.settings import EstimatorSettings
 from estimator.simulation.arm import ARM, arm_test, centre
 from messages import gyrofree_pb2 as pb
-from messages.topics import ACCEL, GNSS, INNOVATION, NAV
-
-LATITUDE, LONGITUDE, HEIGHT = 37.759, 45.978, 1468.0
-METRES = 111_195.0  # per degree of latitude, of a sphere: 0.2 % of 3 m do not matter
-COS = np.cos(np.radians(LATITUDE))
-SETTINGS = {
-    "rate": ["products-free"], "gyro_free_rate": "products-free", "gyro_free_navigation": ["huber"],
-    "use_every_fix": 2,
-}  # fmt: skip
-
-
-def messages(seconds, half_side=0.05, seed=3, batch=10):
-    """Batches of the arm's cube and a fix every 0.5 s, in the order of the bus."""
-    test, draw, out = arm_test(seed, half_side=half_side), np.random.default_rng(seed), []
-    for number in range(int(np.ceil(seconds / 10.0))):
-        block = test.block(number)
-        for k in range(0, 1000, batch):
-            t = float(block.t_s[k])
-            header = pb.Header(device="cube", sequence=len(out), epoch=1, device_us=round(t * 1e6),
-                               utc_ns=round((1e9 + t) * 1e9))  # fmt: skip
-            flat = block.readings[k : k + batch].ravel().tolist()
-            out.append((ACCEL, pb.AccelBatch(header=header, first_index=block.index + k, period_s=0.01, axes=12,
-                                             f_mps2=flat)))  # fmt: skip
-            if k % 50 == 40:  # at the end of this batch
-                out.append((GNSS, fix(test, t + 0.1, len(out), draw)))
-    return test, out
-
-
-def fix(test, t, sequence, draw):
-    p, v = centre(test, t)
-    p, v = p + draw.normal(size=3) * 0.3, v + draw.normal(size=3) * 0.1
-    header = pb.Header(device="cube", sequence=sequence // 6, epoch=1, device_us=round(t * 1e6))
-    return pb.GnssFix(
-        header=header, latitude_deg=LATITUDE + p[0] / METRES, height_m=HEIGHT - p[2],
-        longitude_deg=LONGITUDE + p[1] / (METRES * COS), quality=2, device_time_s=t,
-        position_sigma_ned_m=[0.3] * 3, v_n_mps=v, velocity_sigma_ned_mps=[0.1] * 3,
-    )  # fmt: skip
+from messages.topics import GNSS, INNOVATION, NAV
 
 
 def test_the_arm_and_its_centre_belong_together():
@@ -84,13 +49,6 @@ def test_a_cube_on_an_arm_navigates_without_gyros():
     assert 0.3 < rms[0] / np.mean(sigma) < 3.0
     unseen = [o.message for o in said if o.topic is INNOVATION and len(o.message.error_to_reference)]
     assert len(unseen) > 20
-
-
-def heading_error(test, t, q_nb):
-    angle = float(test.profile.motion(np.array([t]))[0][0])
-    w, x, y, z = q_nb
-    yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    return (yaw + angle + np.pi) % (2 * np.pi) - np.pi  # z_b is up: a positive angle is a turn to the left
 
 
 def test_the_same_messages_give_the_same_bytes_also_after_a_crash():

@@ -155,6 +155,19 @@ def test_a_flat_turn_that_tilts_and_a_turn_about_two_edges_are_refused(tmp_path)
     assert any("it tilted" in m.message for m in said) and said[-1].state == STATUS.STATE_FOUND
 
 
+def test_an_input_that_never_rests_is_left_out_and_a_board_that_moves_is_waited_for(tmp_path):
+    wiring = AnalogueWiring((6, 1, 0, 2, 3), channels=7)
+    force, rate, _ = guided(4, ("right down", "level", "nose up", *GUIDED[:5]), rest_s=1.5, move_s=1.5)
+    still, rest, _ = guided(4, ("level",), rest_s=6.0)
+    counts = wiring.counts(np.vstack([still, force]), np.vstack([rest, rate]))
+    counts[:, 4] += np.random.default_rng(1).integers(-300, 300, len(counts))  # hum on an open input
+    said = detect(Pipeline(settings(tmp_path)), adc_batches(counts, wiring))
+    assert [entry.name for entry in said[-1].inputs if entry.unused] == ["input 4"]
+    assert any("input 4: never quiet" in m.message for m in said)
+    moving = detect(Pipeline(settings(tmp_path)), adc_batches(wiring.counts(force[150:450], rate[150:450]), wiring))
+    assert not any(entry.unused for m in moving for entry in m.inputs)
+
+
 def test_lost_samples_spoil_only_the_movement_under_way(tmp_path):
     force, rate, _ = guided(7, ("level", "nose up", "level", "nose up", "level", "right down", "level", "turned right"))
     batches = list(imu_batches(force, rate))

@@ -26,11 +26,14 @@ SAY = {
     TURNED_RIGHT: "turn it to the right by a quarter, flat on the table, and let it rest",
 }
 WINDOW_S = 0.5  # s, of the rest test
-FIRST_S = 2.0  # s of rest before the first movement, and s after which a restless input counts as unused
+FIRST_S = 2.0  # s of rest before the first movement
+UNUSED_S = 4.0  # s that an input is restless while five others rest: nothing is attached to it
 REST_S = 1.0  # s of rest that end a movement
 LONGEST_S = 20.0  # s, of a movement
 NEAR_LEVEL = 2.5  # m/s^2, a quarter of g: how exactly "level again" is wanted
 SENSITIVITY = 0.15  # of the turned angle: gyroscope against accelerometer
+NOT_LEVEL = np.radians(20.0)  # of the first rest, as the map that was found sees it
+ON_TABLE = 0.35  # part of the limits below that holds where the board lies, not in a hand
 FORCE_REST, RATE_REST, VOLT_REST = 0.4, 0.15, 0.02  # m/s^2, rad/s, V: standard deviations of a board at rest
 
 
@@ -70,7 +73,7 @@ class WiringSession:
         self._window: deque[Array] = deque()
         self._buffer: list[Array] = []
         self._rested = 0.0
-        self._begun = 0.0  # s of samples while the first rest is waited for
+        self._since_quiet, self._since_restless = np.zeros(len(board.names)), np.zeros(len(board.names))  # s
         self._moved = False
         self._level: Array | None = None  # readings of the level board
         self._taken: dict[int, Array] = {}  # pose -> rows of its movement
@@ -141,7 +144,7 @@ class WiringSession:
             return
         window = np.array(self._window)[-n:]
         self.reading = window.mean(axis=0)
-        quiet = window.std(axis=0) < self.board.rest
+        quiet = window.std(axis=0) < self.board.rest * (ON_TABLE if self.pose == LEVEL else 1.0)
         used = [c for c in range(len(quiet)) if c not in self.unused]
         resting = len(window) == n and bool(quiet[used].all())
         self._rested = self._rested + self._period if resting else 0.0
@@ -154,15 +157,17 @@ class WiringSession:
 
     def _first(self, quiet: Array) -> None:
         """Rest on the table; an input that never rests while five others do is attached to nothing."""
-        self._begun += self._period
+        self._since_quiet = np.where(quiet, 0.0, self._since_quiet + self._period)
+        self._since_restless = np.where(quiet, self._since_restless + self._period, 0.0)
         if self._rested >= FIRST_S and (self._level is None or self._near_level()):
-            self._level = self.reading.copy()
+            self._level = np.array(self._window)[: len(self._window) // 2].mean(axis=0)  # not what may just begin
             self._next(self.message)
-        elif self._begun > FIRST_S + WINDOW_S and self._rested == 0.0 and 5 <= quiet.sum() < len(quiet):
-            self.unused |= {int(c) for c in np.flatnonzero(~quiet)}
-            self.message = (
-                f"{', '.join(self.board.names[c] for c in sorted(self.unused))}: never quiet, taken as unused"
-            )
+            return
+        restless = np.flatnonzero(self._since_quiet > UNUSED_S)
+        if len(restless) and len(quiet) - len(restless) >= 5 and (self._since_restless > UNUSED_S).sum() >= 5:
+            self.unused = {int(c) for c in restless}
+            names = ", ".join(self.board.names[c] for c in sorted(self.unused))
+            self.message = f"{names}: never quiet, taken as unused"
 
     def _level_again(self) -> None:
         if self._rested >= REST_S and self._near_level():
@@ -199,8 +204,6 @@ class WiringSession:
         """Level again, then the same movement."""
         self.message, self.state = message, WAITING
         self.step, self._moved, self._buffer, self._rested = self.step - 1, False, [], 0.0
-        if self.step == 0:
-            self._begun = 0.0
 
     def _judge(self, rows: Array) -> None:
         """Take a movement, rows (n, columns) in quanta; raises Unclear."""
@@ -252,6 +255,11 @@ class WiringSession:
         zero = [f.zero_force] * 3 + [float(rest[c]) for c in column[3:5]] + [0.0]
         scale = [1.0 / f.force] * 3 + [1.0 / f.rate] * 3
         self.map = AxisMap(self.board.source, self.board.names, tuple(column), tuple(signs), tuple(zero), tuple(scale))
+        felt = self.map.apply(self._level[None])[0][0]
+        if -felt[2] < np.cos(NOT_LEVEL) * np.linalg.norm(felt):
+            self.map, self._level = None, None
+            self._restart("the board was not level at first")
+            return
         left = [c for c in used if c not in column]
         self._offered = any(np.ptp(self._rows(pose)[:, c]) > 0.0 for c in left for pose in (NOSE_UP, RIGHT_DOWN))
         self._check("y", NOSE_UP, 1)

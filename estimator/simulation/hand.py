@@ -96,7 +96,10 @@ def guided(
 
 @dataclass(frozen=True)
 class AnalogueWiring:
-    """Which input of the converter carries which article's axis (x y z of force, rates xz and yz), and which way."""
+    """Which input of the converter carries which article's axis, and which way: x y z of force, rates xz and yz.
+
+    A sixth one is a gyroscope about +z_b, which the article's board does not have.
+    """
 
     inputs: tuple[int, ...] = (0, 1, 2, 3, 4)
     signs: tuple[int, ...] = (1, 1, 1, -1, -1)  # as the Acc_Gyro board
@@ -111,7 +114,7 @@ class AnalogueWiring:
     def counts(self, force: Array, rate: Array) -> NDArray[np.int64]:
         """(n, channels) counts of force (n, 3) m/s^2 and rate (n, 3) rad/s in b; open inputs read half a volt."""
         a = force / GRAVITY * [1.0, -1.0, -1.0]
-        turning = np.degrees(rate[:, [1, 0]])  # RateAxz is about +y_b, RateAyz about +x_b
+        turning = np.degrees(rate[:, [1, 0, 2][: len(self.inputs) - 3]])  # RateAxz is about +y_b, RateAyz about +x_b
         signs = np.array(self.signs)
         volts = np.full((len(force), self.channels), 0.5)
         volts[:, list(self.inputs[:3])] = self.zero_g + self.per_g * a * signs[:3]
