@@ -5,7 +5,7 @@ import viser
 
 from dashboard.scene.chart import Curve
 from dashboard.scene.map import map_svg
-from dashboard.scene.palette import GREY, GYRO_FREE, estimator_colour, estimator_title, number, rows
+from dashboard.scene.palette import GREY, GYRO_FREE, escape, estimator_colour, estimator_title, number, rows
 from dashboard.scene.panels import drift
 from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve
 from dashboard.scene.store import (
@@ -109,7 +109,7 @@ class Navigation(Panel):
         drawn = map_svg(ways, fixes[:, GNSS_POSITION], rejected, sigma, s.dark)
         alarm = '<p class="gf-alert">GNSS is muted: the filters go on without fixes.</p>' if self._muted else ""
         m = s.device.get("nav", names[0]).message
-        waits = f'<p class="gf-note">{m.alignment}</p>' if m.mode != pb.NavSolution.MODE_NAVIGATING else ""
+        waits = f'<p class="gf-note">{escape(m.alignment)}</p>' if m.mode != pb.NavSolution.MODE_NAVIGATING else ""
         return alarm + waits + drawn
 
     def _race(self, s: Snapshot, names: list[str]) -> str:

@@ -4,7 +4,7 @@ import numpy as np
 
 from dashboard.scene.chart import Curve
 from dashboard.scene.geometry import MODES
-from dashboard.scene.palette import FIX, number, rows
+from dashboard.scene.palette import FIX, escape, number, rows
 from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
 from dashboard.scene.store import GNSS_POSITION, NAV_POSITION, NAV_SIGMA_POSITION, RATE_POSITION
 
@@ -48,6 +48,7 @@ class Position(Panel):
         course = float(np.degrees(np.arctan2(v[1], v[0]))) % 360
         items = [
             ("mode", MODES.get(m.mode, "unknown")),
+            ("alignment", escape(m.alignment) or "–"),
             ("latitude, longitude", f"{number(m.latitude_deg, 7, '°')}, {number(m.longitude_deg, 7, '°')}"),
             ("height", number(m.height_m, 2, "m")),
             ("speed over ground", number(float(np.hypot(v[0], v[1])) * 3.6, 1, "km/h")),
