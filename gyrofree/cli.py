@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from gyrofree import cli_board, cli_calibrate, cli_handover, cli_layout, cli_run, cli_sessions, cli_users
-from gyrofree.cli_options import AsJson, Config, Fault, Speed, Verbose, faults_of, settings_of
+from gyrofree.cli_options import AsJson, Config, Fault, Speed, Verbose, faults_of, settings_of, show_table
 from gyrofree.cli_replay import replay
 from gyrofree.config import ConfigError
 from gyrofree.process import EXIT_CONFIG as CONFIG
@@ -313,7 +312,7 @@ def doctor(
         for finding in findings:
             state = f"[{colour[finding.state]}]{finding.state}[/]"
             table.add_row(finding.check, state, finding.found, finding.remedy)
-        Console(file=sys.stdout).print(table)
+        show_table(table)
     if any(finding.state == "fail" for finding in findings):
         raise typer.Exit(EXIT_FAILED)
 

@@ -3,15 +3,13 @@
 import datetime
 import json
 import math
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
-from gyrofree.cli_options import AsJson
+from gyrofree.cli_options import AsJson, show_table
 from gyrofree.process import EXIT_CONFIG, EXIT_FAILED, fail
 
 DEG = 180.0 / math.pi
@@ -77,7 +75,7 @@ def _print(m: Any, found: Any, out: Path | None) -> None:
     for k, name in enumerate(AXES):
         absent = m.column[k] == ABSENT
         table.add_row(name, "no input" if absent else m.inputs[m.column[k]], "" if absent else f"{'-+'[m.sign[k] > 0]}")
-    Console(file=sys.stdout, width=None if sys.stdout.isatty() else 100).print(table)
+    show_table(table, 100)
     for turn in found.turns:
         other = "" if turn.about == "z" else f", by accelerometer {turn.by_force * DEG:.1f}°"
         print(f"turn about {turn.about}: by gyro {turn.by_rate * DEG:.1f}°{other}")

@@ -3,17 +3,15 @@
 import csv
 import datetime
 import json
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from gyrofree.cli_axes import axes
-from gyrofree.cli_options import AsJson
+from gyrofree.cli_options import AsJson, show_table
 from gyrofree.cli_run import progress_bar
 from gyrofree.process import EXIT_CONFIG, fail
 
@@ -69,7 +67,7 @@ def plan(
     table = Table("pose", "do this", "up in body axes")
     for number, one in enumerate(listed, 1):
         table.add_row(str(number), one["text"], " ".join(f"{v:+.2f}" for v in one["up_b"]))
-    Console(file=sys.stdout).print(table)
+    show_table(table)
     print(
         f"each {seconds:g} s still, worst axis then: bias ±{promised['bias_sigma_mps2'] * MG:.2f} mg, scale "
         f"±{promised['scale_sigma'] * 100:.3f} %, direction ±{promised['misalignment_sigma_rad'] * DEG:.3f}°"
@@ -148,7 +146,7 @@ def _print(card: Any) -> None:
             place,
             f"{card.residual[i] * MG:.2f}",
         )
-    Console(file=sys.stdout, width=None if sys.stdout.isatty() else 160).print(table)
+    show_table(table)
 
 
 @app.command("apply")

@@ -2,7 +2,6 @@
 
 import json
 import math
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,8 +10,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from gyrofree.cli_options import AsJson
+from gyrofree.cli_options import AsJson, console_of, show_table
 from gyrofree.process import EXIT_CONFIG, fail
+
+WIDTH = 150  # characters of tables where nobody looks at a terminal
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -59,7 +60,7 @@ def show(
         _draw([q], plot)
     if as_json:
         return print(json.dumps(q.as_json(), indent=2))
-    console = _console()
+    console = console_of(WIDTH)
     console.print(f"[bold]{q.layout.name}[/]  {q.layout.text}", highlight=False)
     console.print(_axes(q.layout))
     console.print(_figures([q]))
@@ -91,7 +92,7 @@ def compare(
         _draw(found, plot)
     if as_json:
         return print(json.dumps([q.as_json() for q in found], indent=2))
-    _console().print(_figures(found))
+    show_table(_figures(found), WIDTH)
 
 
 @app.command()
@@ -140,7 +141,7 @@ def optimise(
     if as_json:
         extra = {"starts": found.starts, "agreeing": found.agreeing, "gdops": found.gdops, "lower_bound": found.bound}
         return print(json.dumps({"search": extra, "found": q.as_json(), "cube": cube.as_json()}, indent=2))
-    console = _console()
+    console = console_of(WIDTH)
     console.print(_axes(found.layout))
     console.print(_figures([q, cube]))
     console.print(
@@ -209,11 +210,6 @@ def _draw(found: list[Any], path: Path) -> None:
         draw(found, path)
     except (OSError, ValueError) as error:
         raise fail(f"{path}: {error}; name another PNG file with --plot") from None
-
-
-def _console() -> Console:
-    """Standard output; wide enough for the tables where nobody looks at a terminal."""
-    return Console(file=sys.stdout, width=None if sys.stdout.isatty() else 150)
 
 
 def _products(q: Any) -> int:

@@ -27,9 +27,14 @@ def settings_of(path: Path | None) -> Settings:
         raise fail(str(error), EXIT_CONFIG) from None
 
 
-def show_table(table: Table) -> None:
-    """On standard output; wide where that is a file or a pipe, which has no width of its own."""
-    Console(file=sys.stdout, width=None if sys.stdout.isatty() else 160).print(table)
+def console_of(width: int = 160) -> Console:
+    """Standard output; `width` characters where that is a file or a pipe, which has no width of its own."""
+    return Console(file=sys.stdout, width=None if sys.stdout.isatty() else width)
+
+
+def show_table(table: Table, width: int = 160) -> None:
+    """On standard output."""
+    console_of(width).print(table)
 
 
 Fault = Annotated[

@@ -1,7 +1,6 @@
 """`gyrofree run` and `gyrofree reproduce`: logs on disk through the estimators, without a bus."""
 
 import json
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from gyrofree.cli_options import AsJson
+from gyrofree.cli_options import AsJson, show_table
 from gyrofree.process import EXIT_CONFIG, fail
 
 Report = Callable[[float, str], None]
@@ -110,7 +109,7 @@ def show(result: dict[str, Any], as_json: bool) -> None:
     for name, row in rows.items():
         mark = " (default)" if name == result.get("default") else ""
         table.add_row(name + mark, *(cell(row.get(key)) for key in columns))
-    Console(file=sys.stdout, width=None if sys.stdout.isatty() else 200).print(table)
+    show_table(table, 200)
     for key, value in result.items():
         if key == "axes" and isinstance(value, dict):
             bad = {name: state for name, state in value.items() if state not in ("good", {"state": "good"})}

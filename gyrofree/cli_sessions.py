@@ -136,6 +136,7 @@ def verify(session: Session, as_json: AsJson = False, config: Config = None) -> 
     else:
         said = {True: "matches", False: "DOES NOT MATCH", None: "is not there yet: the session is open"}[found.hash_ok]
         print(f"{session}: {found.state}; its hash {said}; {found.messages:,} messages readable; {found.damage}")
+        print(f"  curves for drawing: {found.curves}")
         for key, text in found.differing.items():
             print(f"  {key}: {text}")
     if not found.ok:
@@ -146,6 +147,7 @@ def verify(session: Session, as_json: AsJson = False, config: Config = None) -> 
 def delete(
     session: Session,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,
+    as_json: AsJson = False,
     config: Config = None,
 ) -> None:
     """Delete a session for good."""
@@ -159,7 +161,8 @@ def delete(
         freed = remove(catalogue, session)
     except (SessionError, OSError) as error:
         raise fail(str(error)) from None
-    print(f"{session} deleted, {freed / 1e6:.2f} MB freed")
+    text = f"{session} deleted, {freed / 1e6:.2f} MB freed"
+    print(json.dumps({"deleted": session, "freed_bytes": freed}) if as_json else text)
 
 
 @app.command()
@@ -167,6 +170,7 @@ def retain(
     days: Annotated[float, typer.Option(min=0, help="Sessions older than this go; 0: no limit.")] = 0.0,
     max_gb: Annotated[float, typer.Option(min=0, help="Oldest sessions go until all are below this; 0: no limit.")] = 0,
     yes: Annotated[bool, typer.Option("--yes", help="Really delete; without it only the list is shown.")] = False,
+    as_json: AsJson = False,
     config: Config = None,
 ) -> None:
     """Apply rules of retention. Sessions with the tag `keep`, and those being recorded, always stay."""
@@ -175,8 +179,12 @@ def retain(
     catalogue = catalogue_of(settings_of(config))
     try:
         going = too_many(catalogue, Retention(days, int(max_gb * 1e9)))
+        if as_json:
+            rows = [{"id": info.id, "bytes": info.bytes, "deleted": yes} for info in going]
+            print(json.dumps(rows, indent=2))
         for info in going:
-            print(f"{info.id}  {info.bytes / 1e6:.2f} MB")
+            if not as_json:
+                print(f"{info.id}  {info.bytes / 1e6:.2f} MB")
             if yes:
                 remove(catalogue, info.id)
     except (SessionError, OSError) as error:
@@ -190,14 +198,19 @@ def note(
     text: Annotated[str, typer.Argument(help="The remark.")],
     at: Annotated[float | None, typer.Option(help="s from the session's start; default: about all of it.")] = None,
     author: Annotated[str, typer.Option(help="Who says so.")] = "",
+    as_json: AsJson = False,
     config: Config = None,
 ) -> None:
     """Add a remark to a session; the recording itself is never changed."""
     folder = catalogue_of(settings_of(config)).root / session
     try:
-        add_note(folder, SessionNote(text=text, author=author, at_s=at, written_utc_ns=time.time_ns()))
+        notes = add_note(folder, SessionNote(text=text, author=author, at_s=at, written_utc_ns=time.time_ns())).notes
     except (ValueError, OSError) as error:
         raise fail(str(error)) from None
+    if as_json:
+        print(json.dumps([one.model_dump(mode="json") for one in notes], indent=2))
+    else:
+        print(f"{session}: {len(notes)} note{'' if len(notes) == 1 else 's'}")
 
 
 @app.command()
@@ -207,6 +220,7 @@ def tag(
     remove: Annotated[list[str] | None, typer.Option(help="Tag to take away.")] = None,
     title: Annotated[str | None, typer.Option(help="New title.")] = None,
     outcome: Annotated[str | None, typer.Option(help="pass, fail, incomplete, or empty.")] = None,
+    as_json: AsJson = False,
     config: Config = None,
 ) -> None:
     """Title, tags and outcome of a session."""
@@ -222,4 +236,7 @@ def tag(
         changed = change_annotations(folder, change)
     except (ValueError, OSError) as error:
         raise fail(str(error).splitlines()[0], EXIT_CONFIG) from None
+    if as_json:
+        print(json.dumps(changed.model_dump(mode="json"), indent=2))
+        return
     print(f"{session}: {changed.title or 'no title'}; tags {', '.join(changed.tags) or 'none'}; {changed.outcome}")

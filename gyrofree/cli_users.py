@@ -12,6 +12,7 @@ from gyrofree.process import EXIT_CONFIG, fail
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Who may sign in to the dashboard.")
 
+
 @app.command("add")
 def users_add(
     name: Annotated[str, typer.Argument(help="User name.")],
@@ -44,7 +45,7 @@ def users_list(as_json: AsJson = False, config: Config = None) -> None:
 
 
 @app.command("remove")
-def users_remove(name: str, config: Config = None) -> None:
+def users_remove(name: Annotated[str, typer.Argument(help="User name.")], config: Config = None) -> None:
     """Take a user's right to sign in."""
     try:
         remove_user(settings_of(config).dashboard.users, name)

@@ -2,7 +2,6 @@
 
 import datetime
 import json
-import sys
 import threading
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from google.protobuf.message import DecodeError
 from rich.console import Console
 from rich.table import Table
 
+from gyrofree.cli_options import show_table
 from gyrofree.config import Settings
 from messages import gyrofree_pb2 as pb
 from sessions.catalogue import Catalogue
@@ -47,7 +47,7 @@ def show_list(settings: Settings, as_json: bool) -> None:
             info.id, ", ".join(info.devices), f"{start:%Y-%m-%d %H:%M:%S}", f"{info.seconds:.1f} s", info.state,
             str(info.messages), str(info.lost), f"{info.bytes / 1e6:.2f} MB",
         )  # fmt: skip
-    Console(file=sys.stdout).print(table)
+    show_table(table)
 
 
 def check(settings: Settings, path: Path, as_json: bool) -> int:
@@ -63,7 +63,7 @@ def check(settings: Settings, path: Path, as_json: bool) -> int:
         table = Table("key", "equal", "different", "missing", "first difference")
         for key, row in result.as_dict()["keys"].items():
             table.add_row(key, *(str(row[name]) for name in ("equal", "different", "missing", "first_difference")))
-        Console(file=sys.stdout).print(table)
+        show_table(table)
         if not result.identical:
             reason = "an estimator began before the recording, or an input is missing"
             print(f"Estimates differ where {reason}: docs/recordings.md")

@@ -1,11 +1,12 @@
 """Is a session what it says it is? Its bytes against the hash, its messages against the counts."""
 
+import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from sessions import curves
 from sessions.manifest import KeyCount, Manifest, read_manifest
 from sessions.mcap_log import Damage
-from sessions.report.build import sha256_of
 from sessions.table import Progress, Selection, messages, silent
 
 
@@ -21,6 +22,7 @@ class Verification:
     undecodable: int
     damage: str
     differing: dict[str, str] = field(default_factory=dict)  # bus key -> what differs
+    curves: str = "none"  # kept for drawing: none, stale (made anew when needed) or fresh
 
     @property
     def ok(self) -> bool:
@@ -34,7 +36,8 @@ def verify(folder: Path, progress: Progress = silent) -> Verification:
     manifest = read_manifest(folder)
     path = folder / manifest.file
     progress(0.0, "hashing")
-    hash_ok = sha256_of(path) == manifest.sha256 if manifest.sha256 else None
+    with path.open("rb") as stream:
+        hash_ok = hashlib.file_digest(stream, "sha256").hexdigest() == manifest.sha256 if manifest.sha256 else None
     damage, found, undecodable = Damage(), {}, 0
     total = max(1, manifest.messages)
     for count, (row, _, message) in enumerate(messages(path, Selection(), damage)):
@@ -51,6 +54,7 @@ def verify(folder: Path, progress: Progress = silent) -> Verification:
         counted=manifest.messages,
         undecodable=undecodable,
         damage=str(damage),
+        curves=curves.state(path),
         differing={} if manifest.state == "open" else _differences(manifest, found),
     )
 
