@@ -181,7 +181,8 @@ def sessions_page(request: Request, who: SignedIn, q: Annotated[str, Query(max_l
     front = front_of(request)
     rows = api.list_sessions(front, q)
     can_replay = front.replay is not None and who.role >= Role.operator
-    return render(request, "sessions.html", who, rows=rows, q=q, can_replay=can_replay)
+    can_import = front.jobs is not None and who.role >= Role.operator
+    return render(request, "sessions.html", who, rows=rows, q=q, can_replay=can_replay, can_import=can_import)
 
 
 @routes.get("/users")

@@ -9,8 +9,11 @@ from collections import OrderedDict
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from sessions.curves import Curves, load, stamp, state
+from sessions.curves import Curves, load, stamp
+from sessions.curves_build import LONG_CHUNKS, build, ensure
+from sessions.scan import extent
 
+SHORT = 8_000_000  # bytes of a recording that is read here: starting a process would take longer
 KEPT = 8  # sessions in memory, some MB each
 AT_ONCE = 2  # processes
 
@@ -50,9 +53,9 @@ class Readings:
         found = load(path)
         if found is not None:
             self._keep(path, now, found)
-        if found is not None and not found.coarse:
             return found, None
         with self._lock:
+            found = kept[1] if kept is not None and kept[0] == now else None
             failed = self._failed.get(path)
             if failed is not None and failed.of == now:
                 return found, failed
@@ -77,7 +80,32 @@ class Readings:
                 self._kept.popitem(last=False)
 
     def _read(self, path: Path, reading: Reading) -> None:
-        """One process; its numbers are the share done."""
+        """A short one here; else one process, its numbers are the share done."""
+        if reading.of[0] < SHORT:
+            self._read_here(path, reading)
+        else:
+            self._read_there(path, reading)
+        with self._lock:
+            self._running.pop(path, None)
+            if reading.fault:
+                self._failed[path] = reading
+                while len(self._failed) > 64:
+                    self._failed.pop(next(iter(self._failed)))
+
+    def _read_here(self, path: Path, reading: Reading) -> None:
+        try:
+            self._keep(path, reading.of, ensure(path))
+        except (OSError, ValueError) as error:
+            reading.fault = str(error)
+
+    def _read_there(self, path: Path, reading: Reading) -> None:
+        """A first look here, a second of work at most; all of it in a process of its own."""
+        try:
+            if extent(path).chunks > LONG_CHUNKS:
+                self._keep(path, reading.of, build(path, coarse=True))
+        except (OSError, ValueError) as error:
+            reading.fault = str(error)
+            return
         nice = ["nice", "-n", "5"] if shutil.which("nice") else []
         with self._slots:
             try:
@@ -92,12 +120,6 @@ class Readings:
                 with self._lock:
                     self._processes.add(process)
                 self._follow(process, reading)
-        with self._lock:
-            self._running.pop(path, None)
-            if reading.fault:
-                self._failed[path] = reading
-                while len(self._failed) > 64:
-                    self._failed.pop(next(iter(self._failed)))
 
     def _follow(self, process: subprocess.Popen[str], reading: Reading) -> None:
         assert process.stdout is not None and process.stderr is not None
@@ -112,11 +134,3 @@ class Readings:
             self._processes.discard(process)
         if process.returncode:
             reading.fault = said[-1] if said else f"reading ended with code {process.returncode}"
-
-
-def kept_state(path: Path) -> str:
-    """For people: what is kept beside a recording."""
-    return {
-        "none": "not made yet", "stale": "of an older state of the recording; made anew when needed",
-        "coarse": "a first look only", "fresh": "there",
-    }[state(path)]  # fmt: skip

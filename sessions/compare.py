@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from estimator.ins.earth import ned_between
 from sessions.align import GOOD, Shift, correlate
-from sessions.curves import RATE, TACHO, Curves, Line, Track
+from sessions.curves import RATE, TACHO, Curves, Line, Track, ned_between
 
 Array = NDArray[np.float64]
 
@@ -221,7 +220,7 @@ def difference(b: Overlaid, line: Line, a: Overlaid, against: Line, dt: float) -
 def moved(track: Track, origin: tuple[float, float, float]) -> Array:
     """A track (m, 4) with its NED counted from another origin; axes are taken as parallel, for places near by."""
     points = track.points.copy()
-    points[:, 1:] += ned_between(*origin, *track.origin)
+    points[:, 1:] += ned_between(origin, track.origin)
     return points
 
 

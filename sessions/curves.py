@@ -20,6 +20,7 @@ Array = NDArray[np.floating[Any]]
 FILE = "curves.npz"
 FORMAT = 1
 BINS = 100_000  # at most, per line
+WGS84_A, WGS84_E2 = 6_378_137.0, 6.694379990141316e-3  # m; first eccentricity squared
 STEPS = (1, 2, 5)  # bins are 1, 2 or 5 times a power of ten, s
 
 RATE, GYRO, TACHO, TRUTH = "rate", "gyro", "tacho", "truth"
@@ -146,6 +147,18 @@ def bins_of(seconds: float, bin_s: float) -> int:
     return int(np.floor(seconds / bin_s + 1e-6)) + 1
 
 
+def ned_between(origin: tuple[float, float, float], place: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Metres north, east, down of a place (latitude, longitude rad, height m) from an origin, along the ellipsoid.
+
+    As estimator/ins/earth.py has it (E-20), but without its compiler, which takes longer to load than this to run.
+    """
+    root = np.sqrt(1.0 - WGS84_E2 * np.sin(origin[0]) ** 2)
+    meridian, normal = WGS84_A * (1.0 - WGS84_E2) / root**3, WGS84_A / root
+    east = (place[1] - origin[1] + np.pi) % (2.0 * np.pi) - np.pi
+    north = (place[0] - origin[0]) * (meridian + origin[2])
+    return float(north), float(east * (normal + origin[2]) * np.cos(origin[0])), float(origin[2] - place[2])
+
+
 def stamp(path: Path) -> list[int]:
     """What tells one state of a recording from another. Raises OSError."""
     found = path.stat()
@@ -153,7 +166,9 @@ def stamp(path: Path) -> list[int]:
 
 
 def save(curves: Curves, recording: Path) -> Path:
-    """Write beside the recording, in one step. Raises OSError."""
+    """Write beside the recording, in one step. Raises OSError, ValueError for a first look, which is not kept."""
+    if curves.coarse:
+        raise ValueError(f"{recording}: curves of a part of it are not kept")
     arrays: dict[str, Any] = {}
     for k, line in enumerate(curves.lines.values()):
         arrays[f"mean{k}"] = line.mean.astype(np.float32)
@@ -163,7 +178,7 @@ def save(curves: Curves, recording: Path) -> Path:
         arrays[f"track{k}"] = track.points
     facts = {
         "format": FORMAT, "of": stamp(recording), "session": curves.session, "start_utc_ns": curves.start_utc_ns,
-        "seconds": curves.seconds, "bin_s": curves.bin_s, "lines": list(curves.lines), "coarse": curves.coarse,
+        "seconds": curves.seconds, "bin_s": curves.bin_s, "lines": list(curves.lines),
         "tracks": [[track.key, track.origin] for track in curves.tracks.values()], "clocks": curves.clocks,
         "leader": curves.leader,
         "marks": [[mark.t, mark.text, mark.author, mark.seconds] for mark in curves.marks],
@@ -181,20 +196,20 @@ def save(curves: Curves, recording: Path) -> Path:
 
 
 def state(recording: Path) -> str:
-    """`none`, `stale`, `coarse` or `fresh`: the curves kept beside a recording. Raises OSError without a recording."""
+    """`none`, `stale` or `fresh`: the curves kept beside a recording. Raises OSError without a recording."""
     facts = _facts(recording.parent / FILE)
     if facts is None:
         return "none"
     if facts["of"] != stamp(recording) or facts["format"] != FORMAT:
         return "stale"
-    return "coarse" if facts["coarse"] else "fresh"
+    return "fresh"
 
 
 def _facts(path: Path) -> dict[str, Any] | None:
     try:
         with np.load(path, allow_pickle=False) as data:
             found: dict[str, Any] = json.loads(bytes(data["facts"]))
-            return found if isinstance(found, dict) and {"of", "format", "coarse"} <= found.keys() else None
+            return found if isinstance(found, dict) and {"of", "format"} <= found.keys() else None
     except (OSError, ValueError, KeyError, EOFError, AttributeError):  # AttributeError: a bare array, no archive
         return None
     except Exception as error:  # a cut archive: zipfile and zlib have errors of their own
@@ -206,7 +221,7 @@ def _facts(path: Path) -> dict[str, Any] | None:
 def load(recording: Path) -> Curves | None:
     """The kept curves; None when there are none, when they are of another state of the recording, or damaged."""
     path = recording.parent / FILE
-    if state(recording) not in ("coarse", "fresh"):
+    if state(recording) != "fresh":
         return None
     with np.load(path, allow_pickle=False) as data:
         facts = json.loads(bytes(data["facts"]))
@@ -221,5 +236,5 @@ def load(recording: Path) -> Curves | None:
         }
     return Curves(
         facts["session"], facts["start_utc_ns"], facts["seconds"], facts["bin_s"], lines, tracks,
-        tuple(Mark(*mark) for mark in facts["marks"]), tuple(facts["clocks"]), facts["coarse"], facts["leader"],
+        tuple(Mark(*mark) for mark in facts["marks"]), tuple(facts["clocks"]), leader=facts["leader"],
     )  # fmt: skip

@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.ins.earth import ned_between
-from sessions.curves import Line, Track, bins_of
+from sessions.curves import Line, Track, bins_of, ned_between
 from sessions.report.data import Tacho
 from sessions.report.segments import reference
 
@@ -14,6 +13,7 @@ Array = NDArray[np.float64]
 
 GAP_PERIODS = 4.0  # a hole of more than so many sample periods is a gap and stays one
 LEAST_GAP_S = 0.05
+PULSE_S = 0.1  # a pulse nearer than that says that the line worked
 POINTS = 4000  # of a track, at most
 
 
@@ -91,8 +91,11 @@ class PulseLine:
         self._t.append(t)
         self._omega.append(omega)
 
-    def line(self, n: int, bin_s: float, coarse: bool) -> Line:
-        """The reference of report/segments.py in the middle of every bin; of a part of the pulses only their means."""
+    def line(self, n: int, bin_s: float, coarse: bool, dark: NDArray[np.bool_] | None = None) -> Line:
+        """The reference of report/segments.py in the middle of every bin; of a part of the pulses only their means.
+
+        `dark` (n,): bins without any other sample of the device; no pulse there does not mean that the table stands.
+        """
         t, omega = np.concatenate(self._t), np.concatenate(self._omega)
         order = np.argsort(t, kind="stable")
         t, omega = t[order], omega[order]
@@ -102,6 +105,11 @@ class PulseLine:
             return binner.line(n)
         middle = (np.arange(n) + 0.5) * bin_s
         rate = reference(Tacho(t, omega, np.zeros(len(t))), middle).astype(np.float32)[:, None]
+        if dark is not None and dark.any():
+            after = np.searchsorted(t, middle)
+            since = middle - t[np.maximum(after - 1, 0)]
+            until = t[np.minimum(after, len(t) - 1)] - middle
+            rate[dark & (np.minimum(np.abs(since), np.abs(until)) > PULSE_S)] = np.nan
         return Line(self._key, rate, rate, rate)
 
 
@@ -125,7 +133,7 @@ class TrackLine:
 
     def add_place(self, t: float, latitude: float, longitude: float, height: float) -> None:
         """One position, rad and m."""
-        self.add(t, *ned_between(*self._origin, latitude, longitude, height))
+        self.add(t, *ned_between(self._origin, (latitude, longitude, height)))
 
     def track(self) -> Track:
         """What it has become."""

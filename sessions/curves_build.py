@@ -2,7 +2,7 @@
 
     python -m sessions.curves_build RECORDING.mcap
 
-writes curves.npz beside the recording, of long ones a coarse form first, and prints the share done, a number per line.
+writes curves.npz beside the recording and prints the share done, a number per line.
 """
 
 import sys
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from estimator.settings import EstimatorSettings
 from messages.topics import GNSS, IMU, NAV, NOTE, RATE, TACHO, TRUTH, Topic, parse
-from sessions.curves import Curves, Mark, bin_for, bins_of, load, save
+from sessions.curves import Curves, Line, Mark, bin_for, bins_of, load, save
 from sessions.curves_bins import Binner, PulseLine, TrackLine
 from sessions.manifest import SessionError, read_manifest
 from sessions.scan import Block, Extent, Progress, extent, scan
@@ -47,7 +47,7 @@ def build(path: Path, coarse: bool = False, on_progress: Progress = lambda _: No
 def ensure(path: Path, on_progress: Progress = lambda _: None) -> Curves:
     """The kept curves, or new ones, kept if the folder can be written. Raises what build raises."""
     kept = load(path)
-    if kept is not None and not kept.coarse:
+    if kept is not None:
         return kept
     made = build(path, on_progress=on_progress)
     try:
@@ -95,7 +95,8 @@ class _Reading:
         width = self._bin_s or bin_for(seconds, max(self._least_s, 0.01))
         n = bins_of(seconds, width)
         lines = {key: binner.line(n) for key, binner in self._lines.items()}
-        lines |= {key: pulses.line(n, width, self._coarse) for key, pulses in self._pulses.items()}
+        dark = {key: _dark(key, lines) for key in self._pulses}
+        lines |= {key: pulses.line(n, width, self._coarse, dark[key]) for key, pulses in self._pulses.items()}
         tracks = {key: track.track() for key, track in self._tracks.items()}
         session = self._path.parent.name if self._path.stem in ("recording", "recovered") else self._path.stem
         return Curves(
@@ -160,6 +161,12 @@ class _Reading:
             self._marks.append(Mark(float(moment), m.text or "mark", m.author, m.seconds))
 
 
+def _dark(key: str, lines: dict[str, Line]) -> NDArray[np.bool_] | None:
+    """Bins in which the tachometer's device has no sample at all."""
+    mine = [line.mean[:, 0] for line in lines.values() if line.device == key.split("/")[0]]
+    return np.isnan(np.column_stack(mine)).all(axis=1) if mine else None
+
+
 def leader_of(path: Path) -> str:
     """The first rate estimator of the configuration that a session was recorded with, else of the default one."""
     try:
@@ -182,13 +189,8 @@ def main(arguments: list[str]) -> int:
     """The program; 0 when the curves are there, 1 with one line on standard error when not."""
     path = Path(arguments[0])
     try:
-        kept = load(path)
-        if kept is not None and not kept.coarse:
-            return 0
-        if kept is None and extent(path).chunks > LONG_CHUNKS:
-            save(build(path, coarse=True), path)
-        print(0.02, flush=True)
-        save(build(path, on_progress=lambda done: print(f"{0.02 + 0.97 * done:.3f}", flush=True)), path)
+        if load(path) is None:
+            save(build(path, on_progress=lambda done: print(f"{done:.3f}", flush=True)), path)
     except (OSError, ValueError) as error:
         print(error, file=sys.stderr)
         return 1

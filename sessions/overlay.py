@@ -41,12 +41,12 @@ def drawing(
 
 
 def _shown(one: Overlaid, number: int, everything: bool) -> list[Line]:
-    """Tachometer and truth of the first session stand for the table; the others' would only hide it."""
+    """The leading line and the tachometer of each; the truth of the first only."""
     lines = [line for line in one.curves.lines.values() if everything or line.key == one.lead]
     if everything:
         return lines
-    references = [line for kind in (TACHO, TRUTH) for line in one.curves.of_kind(kind)]
-    return lines + (references if number == 0 else [])
+    kinds = (TACHO, TRUTH) if number == 0 else (TACHO,)
+    return lines + [line for kind in kinds for line in one.curves.of_kind(kind)]
 
 
 def _session(one: Overlaid) -> dict[str, Any]:

@@ -33,7 +33,8 @@ function showTables(answer) {
     const set = (name, text) => { row.querySelector(`[data-cell=${name}]`).textContent = text; };
     set("by", HOW[session.by]);
     const rival = session.quality === "ambiguous" ? `, ${n(session.rival_s, 2)} s fits as well` : "";
-    set("quality", `${session.quality}${session.correlation === null ? "" : `, r ${n(session.correlation, 4)}`}${rival}`);
+    if (k === 0) set("quality", "–");
+    else set("quality", `${session.quality}${session.correlation === null ? "" : `, r ${n(session.correlation, 4)}`}${rival}`);
     const errors = answer.errors[k][session.line];
     set("error", errors ? `${["x", "y", "z"].map((c) => deg(errors.rms_radps[c])).join(" / ")} (${errors.against})` : "–");
   });

@@ -102,7 +102,7 @@ export class Plot {
     c.lineWidth = 1;
     c.textBaseline = "middle";
     c.textAlign = "right";
-    const vertical = ticks(this.bottom, this.top, Math.max(2, this.height / 45));
+    const vertical = ticks(this.bottom, this.top, Math.max(2, this.height / 30));
     for (const v of vertical.found) {
       const y = Math.round(this.y(v)) + 0.5;
       c.beginPath(); c.moveTo(MARGIN.left, y); c.lineTo(this.width - MARGIN.right, y); c.stroke();

@@ -7,11 +7,34 @@ export async function call(path, body) {
     headers: { "content-type": "application/json", "x-csrf-token": csrf },
     body: JSON.stringify(body),
   };
-  const answer = await fetch(`/api/${path}`, options);
+  return answered(await fetch(`/api/${path}`, options));
+}
+
+// Bytes as they are, a piece of a file.
+export async function send(path, blob) {
+  const headers = { "content-type": "application/octet-stream", "x-csrf-token": csrf };
+  return answered(await fetch(`/api/${path}`, { method: "POST", headers, body: blob }));
+}
+
+async function answered(answer) {
   if (answer.status === 401) location.assign("/login");
   const value = await answer.json();
-  if (!answer.ok) throw new Error(value.error ?? `the dashboard answered ${answer.status}`);
+  const faults = (value.faults ?? []).map((fault) => `${fault.at.slice(1).join(".")}: ${fault.what}`).join("; ");
+  if (!answer.ok) throw new Error(faults || (value.error ?? `the dashboard answered ${answer.status}`));
   return value;
+}
+
+// Until a job has ended; `line` says how far it is.
+export async function ended(job, line) {
+  while (job.state === "waiting" || job.state === "running") {
+    const size = job.bytes ? `, ${(job.bytes / 1e6).toFixed(1)} MB` : "";
+    line.textContent = `${job.state}, ${job.seconds.toFixed(0)} s${size}`;
+    await new Promise((resolve) => setTimeout(resolve, 500));
+    job = await call(`jobs/${job.number}`);
+  }
+  line.textContent = "";
+  if (job.state === "failed") throw new Error(job.message || `${job.kind} failed`);
+  return job;
 }
 
 export function toast(text, kind = "fault") {

@@ -1,6 +1,6 @@
 // The page of one session: plots, replay, report, export, notes, labels, deletion.
 import { Overlay } from "/static/overlay.js";
-import { call, toast } from "/static/rest.js";
+import { call, ended, toast } from "/static/rest.js";
 
 const session = document.querySelector("main").dataset.session;
 const path = `sessions/${encodeURIComponent(session)}`;
@@ -15,19 +15,6 @@ async function guarded(button, work) {
   } finally {
     button.disabled = false;
   }
-}
-
-// Until a job has ended; `line` says how far it is.
-async function ended(job, line) {
-  while (job.state === "waiting" || job.state === "running") {
-    const size = job.bytes ? `, ${(job.bytes / 1e6).toFixed(1)} MB` : "";
-    line.textContent = `${job.state}, ${job.seconds.toFixed(0)} s${size}`;
-    await new Promise((resolve) => setTimeout(resolve, 500));
-    job = await call(`jobs/${job.number}`);
-  }
-  line.textContent = "";
-  if (job.state === "failed") throw new Error(job.message || `${job.kind} failed`);
-  return job;
 }
 
 by("replay")?.addEventListener("click", (event) => replay(event.target, moment > 0 ? moment : 0));
@@ -62,6 +49,38 @@ by("export")?.addEventListener("submit", (event) => {
     location.assign(`/api/jobs/${job.number}/download`);
   });
 });
+
+// The same samples through other estimators: a new session, shown over this one.
+by("rerun")?.addEventListener("submit", (event) => {
+  event.preventDefault();
+  const form = event.target;
+  guarded(form.querySelector("button"), async () => {
+    const known = await names();
+    const wanted = form.estimators.value.split(/[\s,]+/).filter(Boolean);
+    const strange = wanted.filter((name) => !known.rate.includes(name) && !known.navigators.includes(name));
+    if (strange.length) throw new Error(`no estimator ${strange.join(", ")}: want ${[...known.rate, ...known.navigators].join(", ")}`);
+    const settings = Object.fromEntries(form.settings.value.split(";").map((s) => s.trim()).filter(Boolean).map((text) => {
+      const [key, ...value] = text.split("=");
+      if (!value.length) throw new Error(`setting ${text}: want KEY=VALUE, like layout.half_side_m=0.0493`);
+      return [key.trim(), value.join("=").trim()];
+    }));
+    const order = {
+      estimators: wanted.filter((name) => known.rate.includes(name)), settings, name: form.name.value,
+      navigators: wanted.filter((name) => known.navigators.includes(name)),
+    };
+    const job = await ended(await call(`${path}/rerun`, order), by("rerun-state"));
+    location.assign(`/sessions/${job.made}`); // old and new estimates stand in it side by side
+  });
+});
+
+let known = null;
+async function names() {
+  known ??= await call("estimators");
+  by("estimator-names").replaceChildren(...[...known.rate, ...known.navigators].map((name) => new Option(name)));
+  by("rerun-names").textContent = `Rate: ${known.rate.join(", ")}. Navigation: ${known.navigators.join(", ")}.`;
+  return known;
+}
+by("rerun")?.addEventListener("focusin", () => names().catch((error) => toast(error.message)), { once: true });
 
 by("note")?.addEventListener("submit", (event) => {
   event.preventDefault();

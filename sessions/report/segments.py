@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter, uniform_filter1d
 
 from sessions.report.data import Tacho
 
@@ -92,6 +91,8 @@ def _to_zero(t: Array, omega: Array) -> float:
 
 def segment(tacho: Tacho, seconds: float) -> list[Segment]:
     """Plateaus and standstills of a run of that length, in order."""
+    from scipy.ndimage import median_filter, uniform_filter1d  # here: slow to load, and `reference` wants none of it
+
     t = np.arange(0.0, seconds, STEP)
     if len(t) < 10:
         return []
