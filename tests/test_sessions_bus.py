@@ -18,7 +18,9 @@ from messages.topics import ACCEL, GNSS, LOCATION, RATE, RECORDER, STATUS, TRUTH
 from sessions import recorder, replay
 from sessions.catalogue import Catalogue
 from sessions.mcap_log import read
+from sessions.playback import Playback
 from sessions.settings import RecorderSettings
+from sessions.source import Source
 from sessions.store import start
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -245,16 +247,16 @@ def make_session(root: Path) -> Path:
     return store.folder / "recording.mcap"
 
 
-def test_replay_publishes_the_inputs_under_a_new_name_and_changes_nothing_else(client, bus, tmp_path):
+def test_replay_publishes_under_a_new_name_and_changes_nothing_else(client, bus, tmp_path):
     path = make_session(tmp_path)
-    got, progress = [], []
+    got, said = [], []
     held = client.declare_subscriber("t/**", lambda s: got.append((str(s.key_expr), s.payload.to_bytes())))
-    final = replay.run(path, bus, threading.Event(), speed=10.0, on_progress=progress.append)
-    until(lambda: len(got) >= 108, "all messages")
+    with open_client(bus) as session:
+        Playback(path, replay.Outlet(session, "t").put, speed=10.0).run(threading.Event(), said.append)
+        until(lambda: len(got) >= 208, "all messages")
     held.undeclare()
-    assert final.messages == 108 == len(got) and final.unreadable == 0 and progress[-1] == final
-    assert final.seconds == pytest.approx(0.99, abs=0.001)
-    assert {key for key, _ in got} == {f"t/cube-replay/{name}" for name in ("accel", "gnss", "location")}
+    assert len(got) == 208 and said[-1].position_s == pytest.approx(0.99, abs=0.001)
+    assert {key for key, _ in got} == {f"t/cube-replay/{name}" for name in ("accel", "gnss", "location", "rate/e")}
     back = [pb.AccelBatch.FromString(p) for key, p in got if key.endswith("accel")]
     for message in back:
         assert message.header.device == "cube-replay"
@@ -264,23 +266,27 @@ def test_replay_publishes_the_inputs_under_a_new_name_and_changes_nothing_else(c
     assert all(place.frame_id == "cube-replay" and place.latitude == 48.1 for place in places)
 
 
-def test_a_replay_is_paced_and_stops_when_told(client, bus, tmp_path):
+def test_a_replay_is_paced_and_stops_when_told(tmp_path):
     path = make_session(tmp_path)
-    stop = threading.Event()
+    sent, stop = [], threading.Event()
+
+    def put(address, device, message):
+        sent.append(address.topic)
+
     begun = time.monotonic()
-    with open_client(bus) as session:
-        final = replay.replay(path, replay.Outlet(session, "t"), stop, speed=2.0)
-        assert time.monotonic() - begun >= 0.99 / 2 - 0.05 and final.messages == 108
-        stop.set()
-        assert replay.replay(path, replay.Outlet(session, "t"), stop, speed=0.001).messages == 0
-        with pytest.raises(ValueError, match="want a positive number"):
-            replay.replay(path, replay.Outlet(session, "t"), threading.Event(), speed=0.0)
+    Playback(path, put, speed=2.0).run(stop)
+    assert time.monotonic() - begun >= 0.99 / 2 - 0.05 and len(sent) == 208
+    stop.set()
+    Playback(path, put, speed=0.1).run(stop)
+    assert len(sent) == 208
+    with pytest.raises(ValueError, match="speed"):
+        Playback(path, put, speed=0.0)
 
 
 def test_what_is_no_recording_is_refused_with_its_name(tmp_path):
     (tmp_path / "x.mcap").write_bytes(b"not an mcap at all, sorry")
     with pytest.raises(ValueError, match="x.mcap: no message in it"):
-        list(replay.inputs(tmp_path / "x.mcap"))
+        Source(tmp_path / "x.mcap", replay.INPUTS)
 
 
 def test_long_device_names_stay_within_what_a_key_allows():

@@ -16,7 +16,7 @@ from gyrofree.replay import Options
 from gyrofree.replay import run as play
 from messages import gyrofree_pb2 as pb
 from messages.bus import subscribe
-from messages.topics import ACCEL, RATE
+from messages.topics import ACCEL, RATE, parse
 from sessions import replay
 from sessions.catalogue import Catalogue
 from sessions.mcap_log import read
@@ -89,7 +89,7 @@ def test_a_live_session_is_reproduced_and_its_replay_gives_the_same_estimates(bu
     seen = []
     listener = subscribe(client, RATE, "t", lambda key, message: seen.append((key, message.for_index)))
     until(lambda: (s := order(client)) and s.recording, "the recording")
-    outlet, address = replay.Outlet(client, "t"), replay.parse(ACCEL.key("t", "cube"))
+    outlet, address = replay.Outlet(client, "t"), parse(ACCEL.key("t", "cube"))
     for batch in batches():
         outlet.put(address, "cube", batch)
         time.sleep(0.01)  # ten times real time
