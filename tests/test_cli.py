@@ -57,7 +57,7 @@ def test_a_log_that_cannot_be_played_is_named_by_file_row_and_column(tmp_path):
 
 def test_a_drive_wants_its_folder(tmp_path):
     refused(gyrofree("demo", "--source", "drive", cwd=tmp_path), 2, "--data FOLDER")
-    refused(gyrofree("demo", "--source", "boat", cwd=tmp_path), 2, "'table', 'emulated' or 'drive'")
+    refused(gyrofree("demo", "--source", "boat", cwd=tmp_path), 2, "'table', 'emulated', 'arm', 'tilt' or 'drive'")
 
 
 def test_an_unknown_profile_is_refused(tmp_path):
