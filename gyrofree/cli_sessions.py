@@ -167,18 +167,29 @@ def delete(
 
 @app.command()
 def retain(
-    days: Annotated[float, typer.Option(min=0, help="Sessions older than this go; 0: no limit.")] = 0.0,
-    max_gb: Annotated[float, typer.Option(min=0, help="Oldest sessions go until all are below this; 0: no limit.")] = 0,
+    days: Annotated[
+        float | None,
+        typer.Option(min=0, help="Sessions older than this go; 0: no limit; default [recorder] keep_days."),
+    ] = None,
+    max_gb: Annotated[
+        float | None,
+        typer.Option(min=0, help="Oldest go until all are below this; 0: no limit; default [recorder] keep_bytes."),
+    ] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Really delete; without it only the list is shown.")] = False,
     as_json: AsJson = False,
     config: Config = None,
 ) -> None:
-    """Apply rules of retention. Sessions with the tag `keep`, and those being recorded, always stay."""
+    """Apply rules of retention. Sessions with the tag `keep`, and those being recorded, always stay.
+
+    The recorder applies those of the configuration by itself when it starts.
+    """
     from sessions.remove import Retention, remove, too_many
 
-    catalogue = catalogue_of(settings_of(config))
+    settings = settings_of(config)
+    catalogue, kept = catalogue_of(settings), settings.recorder
+    rule = Retention(kept.keep_days if days is None else days, kept.keep_bytes if max_gb is None else int(max_gb * 1e9))
     try:
-        going = too_many(catalogue, Retention(days, int(max_gb * 1e9)))
+        going = too_many(catalogue, rule)
         if as_json:
             rows = [{"id": info.id, "bytes": info.bytes, "deleted": yes} for info in going]
             print(json.dumps(rows, indent=2))

@@ -19,9 +19,11 @@ from messages.bus import BusSettings, BusUnavailable, Publishers, open_client
 from messages.history import Asker
 from messages.mending import Question
 from messages.topics import RECORDER, STATUS, recorder_control_key
+from sessions.catalogue import Catalogue
 from sessions.intake import Intake
 from sessions.manifest import SESSION_NAME, Manifest, SessionError
 from sessions.recover import cut_off, recover_all, recover_session
+from sessions.remove import Retention, retain
 from sessions.settings import RecorderSettings
 from sessions.store import SessionStore, start
 
@@ -274,7 +276,7 @@ def run(
         recorder.step()  # the session that begins now has its session.json before recovery looks at the folders
         # Beside the recording, not before it: a large file takes a minute, and what runs is locked against recovery.
         # When the process ends first, the session stays open and the next start does it.
-        threading.Thread(target=recover_all, args=(settings.root,), name="recovery", daemon=True).start()
+        threading.Thread(target=_tend, args=(settings,), name="recovery", daemon=True).start()
         next_status = 0.0
         try:
             while not stop.is_set():
@@ -289,6 +291,14 @@ def run(
             recorder.close()
             asker.close()
             publishers.put(STATUS, RECORDER, recorder.status())
+
+
+def _tend(settings: RecorderSettings) -> None:
+    """Recover what was cut off; then the rules of retention, if there are any."""
+    recover_all(settings.root)
+    rule = Retention(settings.keep_days, settings.keep_bytes)
+    if rule != Retention():
+        retain(Catalogue(settings.root), rule)
 
 
 def _go_on(recorder: Recorder, root: Path) -> None:

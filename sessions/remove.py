@@ -1,5 +1,6 @@
 """Sessions go when somebody says so, or by the rules of retention; never the one that is being recorded."""
 
+import logging
 import shutil
 import time
 from dataclasses import dataclass
@@ -7,6 +8,8 @@ from dataclasses import dataclass
 from sessions.annotations import read_annotations
 from sessions.catalogue import Catalogue, SessionInfo
 from sessions.manifest import SessionError
+
+log = logging.getLogger(__name__)
 
 KEEP = "keep"  # a session with this tag is never removed by a rule
 
@@ -45,3 +48,22 @@ def too_many(catalogue: Catalogue, rule: Retention, now_s: float | None = None) 
             result.append(info)
             total -= info.bytes
     return result
+
+
+def retain(catalogue: Catalogue, rule: Retention, now_s: float | None = None) -> list[str]:
+    """Apply the rule; ids of the sessions that are gone. One that cannot be removed is logged and stays."""
+    gone = []
+    try:
+        going = too_many(catalogue, rule, now_s)
+    except (SessionError, OSError) as error:
+        log.error("retention: %s", error)
+        return gone
+    for info in going:
+        try:
+            size = remove(catalogue, info.id)
+        except (SessionError, OSError) as error:
+            log.error("retention: %s: %s", info.id, error)
+            continue
+        log.info("retention: %s deleted, %.1f MB freed", info.id, size / 1e6)
+        gone.append(info.id)
+    return gone

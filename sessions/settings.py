@@ -19,3 +19,7 @@ class RecorderSettings(BaseModel):
     sync_s: float = Field(default=0.5, gt=0, le=0.5)  # fdatasync after each flush, and at least this often, s
     max_pending_bytes: int = Field(default=32 * 1024**2, ge=1024**2)  # held in memory while the disk is full, bytes
     max_inbox: int = Field(default=200_000, ge=1000)  # messages waiting to be written; more are counted as overflow
+    keep_days: float = Field(
+        default=0.0, ge=0
+    )  # older sessions are deleted at the start, unless tagged `keep`; 0: never
+    keep_bytes: int = Field(default=0, ge=0)  # the oldest are deleted until all are below this, in bytes; 0: no limit

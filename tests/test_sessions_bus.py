@@ -16,7 +16,9 @@ from messages import gyrofree_pb2 as pb
 from messages.bus import BusSettings, Publishers, open_client, open_router
 from messages.topics import ACCEL, GNSS, LOCATION, RATE, RECORDER, STATUS, TRUTH, recorder_control_key
 from sessions import recorder, replay
+from sessions.annotations import change_annotations
 from sessions.catalogue import Catalogue
+from sessions.manifest import write_manifest
 from sessions.mcap_log import read
 from sessions.playback import Playback
 from sessions.settings import RecorderSettings
@@ -163,6 +165,20 @@ def test_a_full_file_goes_on_in_a_new_session(client, recording):
     ]
     assert got == list(range(1, sent + 1))
     assert Catalogue(settings.root).manifest(infos[1].id).continues == infos[0].id
+
+
+def test_the_recorder_applies_the_rules_of_retention_when_it_starts(client, recording, tmp_path):
+    root = tmp_path / "root"
+    old = make_session(root).parent
+    kept = make_session(root).parent
+    change_annotations(kept, lambda was: was.model_copy(update={"tags": ["keep"]}))
+    for folder in (old, kept):  # both are of the year 2023 by their first message; their manifests say when they began
+        manifest = Catalogue(root).manifest(folder.name)
+        write_manifest(folder, manifest.model_copy(update={"start_utc_ns": 1_700_000_000_000_000_000}))
+    recording(keep_days=30.0)
+    until(lambda: not old.exists(), "the old session to go")
+    until(lambda: (s := order(client)) and s.recording, "the recording")
+    assert kept.is_dir() and len(Catalogue(root).list()) == 2
 
 
 RECORD = """
