@@ -27,7 +27,7 @@ from gateway.link_report import LinkReport
 from gateway.orders import Orders
 from gateway.pps import PpsClock
 from gateway.reader import Chunk, Reader
-from gateway.resume import REACH_BYTES, Past, newest, resume
+from gateway.resume import Past, resume, unseen
 from gateway.settings import DeviceSettings, GatewaySettings
 from gateway.tacho import Tachometer
 from messages import gyrofree_pb2 as pb
@@ -97,11 +97,14 @@ class DeviceLink:
         ports = [(self.device.port, self.device.baud, BOARD)]
         if self.device.gnss_port:
             ports.append((self.device.gnss_port, self.device.gnss_baud, GNSS))
-        left = newest(self.journal.tail(REACH_BYTES)) if self.keeper.holds(self.device.port) else []
+        left = None
+        if self._next_put is not None and self.keeper.holds(self.device.port):
+            past = Past(self.spool, self._next_put)
+            left = unseen(past, self.journal) if past.read_ns else None
         self.readers = [Reader(*port, self.journal, self.queue, self.keeper) for port in ports]
         try:
-            if self._next_put is not None:
-                resume(self, self._next_put, left)
+            if left is not None:
+                resume(self, past, left)
             self._loop(stop)
         finally:
             for reader in self.readers:

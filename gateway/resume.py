@@ -18,6 +18,7 @@ from firmware_protocol.ledger import Ledger
 from gateway.batch import Batch
 from gateway.reader import Chunk
 from messages import gyrofree_pb2 as pb
+from messages.journal import Journal
 from messages.journal_file import Record
 from messages.spool import Spool, entry_of
 from messages.topics import ACCEL, ADC, BY_NAME, GNSS, IMU, LOCATION, Topic
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 REACH_S = 12.0  # a board says HELLO every ten seconds
 REACH_BYTES = 1 << 20
 PUBLISHED_BYTES = 1 << 18
-MARGIN_S = 1.5  # read so long before the last message was published: surely published as well
+MARGIN_S = 1.5  # read so long before the last published samples: surely published as well
 SAME_US = 5_000  # two reports of one instant, by clocks learnt from different points
 TOPIC_OF = {Acc12: ACCEL, Imu6: IMU, Adc: ADC}
 
@@ -41,16 +42,17 @@ class Past:
         self._last: dict[str, tuple[int, int]] = {}  # topic -> boot, and next sample index or newest device time, us
         self._reached: set[str] = set()  # topics whose last boot the bytes have come to
         self._gnss_is_new = False
-        self.until_ns = 0  # UTC of the last publication
+        self.read_ns = 0  # monotonic time of the read whose samples were published last; 0: none were
         for record in spool.journal.tail(PUBLISHED_BYTES):
             try:
                 entry = entry_of(record)
                 topic = BY_NAME.get(entry.topic)
                 if topic is not None and topic is not LOCATION:
-                    self._last[topic.name] = _place(topic.type.FromString(entry.payload))
+                    message = topic.type.FromString(entry.payload)
+                    self._last[topic.name] = _place(message)
+                    self.read_ns = max(self.read_ns, message.received_ns if topic in TOPIC_OF.values() else 0)
             except (DecodeError, struct.error, UnicodeDecodeError):
                 continue  # what cannot be read cannot be passed over either
-            self.until_ns = max(self.until_ns, entry.published_ns)
 
     def has(self, kind: type, epoch: int, batch: Batch) -> bool:
         """True for a frame's samples that have been published."""
@@ -90,24 +92,19 @@ def _place(message: Message) -> tuple[int, int]:
     return message.header.epoch, message.header.device_us + 1
 
 
-def newest(records: list[Record]) -> list[Record]:
-    """Those of the last REACH_S before now by this machine's monotonic clock; none of an earlier boot."""
-    now = time.monotonic_ns()
-    found = []
-    for record in reversed(records):
-        if not now - REACH_S * 1e9 <= record.monotonic_ns <= now:
-            break
-        found.append(record)
-    return found[::-1]
+def unseen(past: Past, journal: Journal) -> list[Record]:
+    """Raw reads from REACH_S before the last published one on, however far decoding was behind; oldest first."""
+    since = min(past.read_ns, time.monotonic_ns()) - REACH_S * 1e9
+    found = journal.tail(REACH_BYTES)
+    if found and found[0].monotonic_ns > since:
+        found = journal.tail(16 * REACH_BYTES)
+    return [record for record in found if record.monotonic_ns >= since]
 
 
-def resume(link: "DeviceLink", put: "Put", records: list[Record]) -> None:
-    """Bring `link` to where the raw `records` end, and `put` what they hold that has not been published."""
-    past = Past(link.spool, put)
-    if not records or not past.until_ns:
-        return
+def resume(link: "DeviceLink", past: Past, records: list[Record]) -> None:
+    """Bring `link` to where the raw `records` end, and publish what they hold that has not been published."""
     for record in records:
-        sure = record.utc_ns < past.until_ns - MARGIN_S * 1e9
+        sure = record.monotonic_ns < past.read_ns - MARGIN_S * 1e9
         link.publish_with(None if sure else past.put, past)
         link.take(Chunk(record.channel, record.data, record.monotonic_ns))
     link.publish_with(None)

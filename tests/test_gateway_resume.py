@@ -16,7 +16,7 @@ from gateway.board_link import PtyLink
 from gateway.device import DeviceLink
 from gateway.keeper import Keeper, Left
 from gateway.reader import Chunk, Reader
-from gateway.resume import REACH_BYTES, newest, resume
+from gateway.resume import Past, resume, unseen
 from gateway.settings import DeviceSettings, GatewaySettings
 from messages.bus import Publishers
 from messages.journal_file import BOARD, Record, last_whole, pack
@@ -93,7 +93,8 @@ def again(folder) -> Life:
     link = life.link
     link.readers = [Reader(link.device.port, 0, BOARD, link.journal, link.queue, held)]
     put = link._put
-    resume(link, put, newest(link.journal.tail(REACH_BYTES)))
+    past = Past(link.spool, put)
+    resume(link, past, unseen(past, link.journal))
     link.publish_with(put)
     link.readers.pop().close()
     os.close(held.into)
@@ -101,7 +102,7 @@ def again(folder) -> Life:
 
 
 @pytest.mark.parametrize(("period_us", "seed"), [(10_000, 1), (1_000, 2), (1_000, 3)])
-def test_at_whatever_byte_it_was_killed_each_sample_is_published_once(tmp_path, monkeypatch, period_us, seed):
+def test_at_whatever_byte_it_was_killed_each_sample_is_published_once(tmp_path, period_us, seed):
     chance = random.Random(seed)
     wire = stream(round(PAST_S * 1e6 / period_us), period_us)
     begun, byte_ns = time.monotonic_ns() - int(PAST_S * 1e9), PAST_S * 1e9 / len(wire)
@@ -116,9 +117,6 @@ def test_at_whatever_byte_it_was_killed_each_sample_is_published_once(tmp_path, 
         if dying:
             deaths.pop(0)
             life.die()
-            unseen_ns = begun + int(byte_ns * (at - 600))  # here the board speaks faster than its clock says
-            monkeypatch.setattr("gateway.resume.MARGIN_S", (time.monotonic_ns() - unseen_ns) / 1e9)
-            monkeypatch.setattr("gateway.resume.REACH_S", 1e6)  # however slow this machine is
             life = again(tmp_path)
     life.link._send_held()
     said = life.published()
