@@ -6,6 +6,7 @@ Router, gateway, estimator and recorder are processes, the board speaks through 
 router is killed and started again after the outage. Then every message of every session is read.
 """
 
+import socket
 import sys
 import tempfile
 import threading
@@ -49,6 +50,12 @@ class Outage(Stack):
         until(lambda: self.rates > 200, "the first estimates")
         return self
 
+    def reached(self) -> bool:
+        """True when the router takes connections."""
+        host, port = self.bus.router.removeprefix("tcp/").split(":")
+        with socket.socket() as probe:
+            return probe.connect_ex((host, int(port))) == 0
+
     def __exit__(self, *_: object) -> None:
         if self._stop.is_set():
             return
@@ -74,6 +81,10 @@ def trial(folder: Path, minutes: float, rate: float) -> dict:
         stop.wait(60.0 * minutes)
         before = stack.status.messages
         stack.router, begun = stack.start("router"), time.monotonic()
+        while stack.router.poll() is None and not stack.reached():
+            time.sleep(0.1)
+        if stack.router.poll() is not None:
+            raise SystemExit("somebody has taken the router's port meanwhile: run this again")
         calm = None
         while calm is None or time.monotonic() - calm < CALM_S:
             if time.monotonic() - begun > PATIENCE_S:
