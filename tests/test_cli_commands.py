@@ -7,7 +7,9 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from estimator.settings import EstimatorSettings
 from gyrofree.cli import app
+from gyrofree.cli_handover import with_changes
 
 SERVICES = {"demo", "router", "gateway", "estimator", "record", "dashboard", "simulate", "play"}
 ORDERS = {"users add", "users remove", "calibrate simulate"}  # they do something, and have no result to print
@@ -97,3 +99,16 @@ def test_comparing_takes_an_offset_with_its_session():
     assert result.exit_code != 0 and "a.mcap" in result.stderr
     listed = gyrofree("sessions", "retain", "--json", "--config", "/dev/null")
     assert listed.exit_code == 0 and isinstance(json.loads(listed.stdout), list)
+
+
+def test_settings_for_one_run_are_checked_like_the_configuration():
+    changed = with_changes(
+        EstimatorSettings(), ["layout.half_side_m=0.0493", "use_every_fix=4", 'rate=["products-ukf"]']
+    )
+    assert (changed.layout.half_side_m, changed.use_every_fix, changed.rate) == (0.0493, 4, ["products-ukf"])
+    for text, said in (
+        ("layout.size=1", "layout.half_side_m"), ("half=1", "a key of"), ("layout.half_side_m", "KEY=VALUE"),
+        ("layout.half_side_m=-1", "greater than 0"), ("layout.kind=sphere", "no layout 'sphere'"),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=said):
+            with_changes(EstimatorSettings(), [text])

@@ -75,10 +75,16 @@ export class Overlay {
     };
   }
 
+  // Of one session alone colours tell its tracks apart, else the sessions.
+  trackLook(track) {
+    const place = this.ids.length === 1 ? this.answer.tracks.findIndex((t) => t.key === track.key) : track.session;
+    return { color: COLORS[place % 4], dash: DASHES[place % 4] };
+  }
+
   drawTracks() {
     if (!this.answer) return;
     drawTracks(this.tracks.querySelector("canvas"), this.answer.tracks.map((track) => ({
-      ...track, color: COLORS[track.session], dash: DASHES[track.session], dots: track.title === "gnss",
+      ...track, ...this.trackLook(track), dots: track.title === "gnss",
       hidden: this.hidden.has(`${track.session} ${track.key}`),
     })));
   }
@@ -91,7 +97,7 @@ export class Overlay {
       button.className = "small";
       button.setAttribute("aria-pressed", String(!this.hidden.has(entry.id)));
       const sample = document.createElement("i");
-      const look = entry.kind ? this.line(entry, { low: [] }) : { color: COLORS[entry.session] };
+      const look = entry.kind ? this.line(entry, { low: [] }) : this.trackLook(entry);
       sample.style.borderTop = `3px ${look.dash?.length ? "dashed" : "solid"} ${look.color}`;
       const name = entry.device ?? entry.key.split("/")[0];
       button.append(sample, `${this.ids.length > 1 ? `${LETTERS[entry.session]} ` : ""}${name} ${entry.title}`);
