@@ -103,7 +103,7 @@ def trial(folder: Path, minutes: float, rate: float) -> dict:
 
 def account(folder: Path) -> dict:
     """What the sessions hold: samples and estimates that are missing, and messages that stand twice."""
-    seen, double, have, estimates = set(), 0, set(), defaultdict(set)
+    seen, double, have, estimates, line_lost = set(), 0, set(), defaultdict(set), 0
     for info in Catalogue(folder / "sessions").list():
         for row in read(info.path):
             topic = parse(row.key).topic
@@ -114,20 +114,21 @@ def account(folder: Path) -> dict:
             double += name in seen
             seen.add(name)
             if topic is ACCEL:
+                line_lost += message.lost_samples  # the board's own index says so: it never came to the gateway
                 have |= set(range(message.first_index, message.first_index + len(message.counts) // message.axes))
             elif topic is RATE:
                 estimates[row.key].add(message.for_index)
-    lost = max(have) - min(have) + 1 - len(have)
-    missing = {key: max(n) - min(n) + 1 - len(n) for key, n in estimates.items()}
-    return {"samples": len(have), "lost": lost, "double": double, "estimates_missing": sum(missing.values()),
-            "estimators": len(missing)}  # fmt: skip
+    lost = max(have) - min(have) + 1 - len(have) - line_lost
+    missing = sum(len({i for i in have if min(n) <= i <= max(n)} - n) for n in estimates.values())
+    return {"samples": len(have), "lost": lost, "line_lost": line_lost, "double": double,
+            "estimates_missing": missing, "estimators": len(estimates)}  # fmt: skip
 
 
 def main(minutes: float = 10.0, rate: float = 100.0) -> None:
     """Run and print."""
     with tempfile.TemporaryDirectory() as name:
         found = trial(Path(name), minutes, rate)
-    more = {"minutes": minutes, "rate_hz": rate, "samples": found["samples"]}
+    more = {"minutes": minutes, "rate_hz": rate, "samples": found["samples"], "lost_on_the_line": found["line_lost"]}
     line("outage_samples_lost", found["lost"], "samples", target=0, **more)
     line("outage_estimates_missing", found["estimates_missing"], "estimates", target=0, estimators=found["estimators"])
     line("outage_double", found["double"], "messages", target=0)
