@@ -48,7 +48,7 @@ class Panel:
     def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
         self.client, self.folder = client, folder
         self._charts: dict[str, Chart] = {}
-        self._order = 0.0
+        self._place = 0.0
 
     def order_estimator(self, title: str, command: pb.EstimatorCommand) -> None:
         """Give the order and show the person who pressed the button what came of it."""
@@ -64,8 +64,8 @@ class Panel:
     def chart(self, key: str, title: str, unit: str, height: int = 170, digits: int = 1) -> Chart:
         """The chart of this key, made at first use below the ones before it."""
         if key not in self._charts:
-            self._order += 2.0
-            self._charts[key] = Chart(self.client, self.folder, self._order, title, unit, height, digits)
+            self._place += 2.0
+            self._charts[key] = Chart(self.client, self.folder, self._place, title, unit, height, digits)
         return self._charts[key]
 
     def show(self, key: str, title: str, unit: str, curves: Sequence[Curve], s: Snapshot,
