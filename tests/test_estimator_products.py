@@ -93,8 +93,8 @@ def test_the_kernel_is_the_model_without_its_zeros(x, alpha, seed):
     P = root @ root.T
     F = model.transition_jacobian(x, model.transition(x, alpha, s.SQ, dt, True), s.SQ, dt, True)
     mine, mine_P = x.copy(), P.copy()
-    none = (0.0, 0.0, 0.0)
-    kernel.predict(mine, mine_P.reshape(-1), tuple(alpha), (1.0, 0.0, 0.0, 1.0, 0.0, 1.0), dt, True, s, none)
+    none, work = (0.0, 0.0, 0.0), np.zeros(kernel.WORK)
+    kernel.predict(mine, mine_P.reshape(-1), work, tuple(alpha), (1.0, 0.0, 0.0, 1.0, 0.0, 1.0), dt, True, s, none)
     np.testing.assert_allclose(mine, model.transition(x, alpha, s.SQ, dt, True), atol=1e-12)
     np.testing.assert_allclose(mine_P, F @ P @ F.T, atol=1e-9)
     assert (mine_P == mine_P.T).all()
@@ -103,7 +103,7 @@ def test_the_kernel_is_the_model_without_its_zeros(x, alpha, seed):
     C = H @ P @ H.T + s.R_c + spread
     e = y - model.measured_products(x, s.M) - mean
     t["products_gate"] = t["force_gate"] = np.inf
-    out, work, all_y = np.zeros(kernel.OUT), np.zeros(kernel.WORK), np.concatenate([np.zeros(3), y, np.zeros(3)])
+    out, all_y = np.zeros(kernel.OUT), np.concatenate([np.zeros(3), y, np.zeros(3)])
 
     def agrees(call, H, C, e):
         mine, mine_P = x.copy(), P.copy()

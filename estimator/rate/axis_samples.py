@@ -12,6 +12,7 @@ Integers = NDArray[np.int64]
 
 SAME, AT_LIMIT, LIMIT_AGE, SPIKES, SPIKE_AGE = range(5)  # rows of the counters, see `look`
 ROWS = 5
+KNOWN, FILLED = range(2)  # of the marks of `gather`
 AGE_LONG = 1_000_000
 SPIKE_SIGMAS = 9.0  # of a sample against the middle of its neighbours, whose own noise is sqrt(1.5) of a sample's
 SPIKE_MEMORY = 200  # samples; spikes farther apart do not add up
@@ -21,6 +22,43 @@ def counters(axes: int) -> Integers:
     """Fresh counters."""
     found = np.zeros((ROWS, axes), dtype=np.int64)
     found[LIMIT_AGE], found[SPIKE_AGE] = AGE_LONG, AGE_LONG
+    return found
+
+
+@njit(cache=True)
+def gather(
+    f: Array, begin: int, per_block: int, near: Array, marks: Integers, noise: Array, limit: Array, count: Integers
+) -> int:
+    """Take samples f[begin:] (n, N), m/s^2, until a block is full or there are no more; returns the next one's row.
+
+    near (3, N): the sample before the last, the last, and the sum of the block, spikes removed; marks: how many of
+    the two are known, and samples in the block.
+    """
+    for k in range(begin, len(f)):
+        clean = look(f[k], near[1], near[0], marks[KNOWN], noise, limit, count)
+        if marks[KNOWN] > 0:
+            near[2] += clean
+            marks[FILLED] += 1
+        near[0] = clean if marks[KNOWN] == 2 else near[1]
+        near[1] = f[k]
+        marks[KNOWN] = min(marks[KNOWN] + 1, 2)
+        if marks[FILLED] >= per_block:
+            return k + 1
+    return len(f)
+
+
+@njit(cache=True)
+def flags(count: Integers, stuck: int, at_limit: int, spikes: int, out: NDArray[np.bool_]) -> bool:
+    """Rows of out (3, N): axes that are stuck, at the end of their range, spiking, by counts. True for any."""
+    n, standing, found = count.shape[1], 0, False
+    for i in range(n):
+        out[0, i], out[1, i] = count[SAME, i] >= stuck, count[AT_LIMIT, i] >= at_limit
+        out[2, i] = count[SPIKES, i] >= spikes
+        standing += 1 if out[0, i] else 0
+    if standing * 2 > n:  # most stand still exactly: a source without noise, not a fault
+        out[0] = False
+    for i in range(n):
+        found = found or out[0, i] or out[1, i] or out[2, i]
     return found
 
 

@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.layouts.layout import Layout
+from estimator.rate import bound_live
 from estimator.rate import products_model as model
+from estimator.rate.direct import Direct
 from estimator.rate.observed import Sensor, sensor
 
 Array = NDArray[np.float64]
@@ -123,37 +125,24 @@ def _up(q_nb: Array) -> Array:
     return -GRAVITY * down
 
 
-class Along:
-    """The bound along an estimate instead of the truth, live: one step for EVERY samples (E-48)."""
+_follow = Direct(bound_live.step)
 
-    EVERY = 8  # samples
+
+class Along:
+    """The bound along an estimate instead of the truth, live (bound_live.py)."""
 
     def __init__(self, layout: Layout, what: Knowledge = IN_USE) -> None:
         """Raises GeometryError for a layout that does not see omega' and p."""
-        self.sensor, self.what = sensor(layout, what.sigma_axis), what
-        self.sigma: Array | None = None  # rad/s, (3,); None before the first standstill
-        self._P = np.zeros((model.STATES, model.STATES))
-        self._count = 0
+        self.sensor, self.memory = sensor(layout, what.sigma_axis), bound_live.memory(what)
+
+    @property
+    def sigma(self) -> Array | None:
+        """rad/s, (3,); None before the first standstill."""
+        return self.memory.sigma.copy() if self.memory.known else None
 
     def step(self, omega_b: Array, alpha_b: Array, q_nb: Array, still: bool, dt: float) -> None:
         """One sample of the estimate: rate, angular acceleration, attitude, the still detector's word."""
-        self._count += 1
-        if self._count % self.EVERY or (self.sigma is None and not still):
-            return
-        s, n, what = self.sensor, self.EVERY, self.what
-        if self.sigma is None:
-            self._P = _prior(s, q_nb, what)
-        x = np.zeros(model.STATES)
-        x[model.OMEGA], x[model.U] = omega_b, _up(q_nb)
-        P = _moved(self._P, x, alpha_b, s.SQ, s, n * dt, still, what, n)
-        m = int(s.m)
-        if m:
-            P = _seen(P, model.measured_products_jacobian(x, s.M)[:m], s.R_c[:m, :m] / n)
-        R = s.R_p + (what.centre**2 if not still else 0.0) * np.eye(3)
-        P = _seen(P, model.measured_force_jacobian(x, alpha_b, s.SQ), R / n)
-        if still:
-            P = _seen(P, np.eye(6, model.STATES), np.diag([1e-10] * 3 + list(np.diag(s.R_alpha) / n)))
-        self._P, self.sigma = P, np.sqrt(np.diag(P)[:3])
+        _follow(self.memory, self.sensor, omega_b, alpha_b, q_nb, still, dt)
 
 
 def rms(sigma: Array) -> Array:

@@ -65,6 +65,7 @@ class HealthMonitor:
         self.offset = (config.offset_sigmas * np.array([s.bias for s in layout.sensors])) ** 2
         self.learned = np.zeros(n, dtype=bool)
         self._count = axis_samples.counters(n)
+        self._whose = np.zeros((3, n), dtype=bool)  # stuck, at the end of its range, spiking
         self._forget_samples()
         self.used = np.ones(n, dtype=bool)
         self.history = History(n)
@@ -98,22 +99,31 @@ class HealthMonitor:
 
     def step(self, t_s: float, f_axis: Array, stale: int = 0) -> None:
         """One sample: t_s (s, board's clock), readings (N,) m/s^2, bit k of `stale`: axis k was not fresh."""
-        f = np.ascontiguousarray(f_axis, dtype=np.float64)
-        clean = axis_samples.look(
-            f, self._last, self._before, self._known, self._noise, self._limits, self._count
-        )
-        if self._known:
-            self._total += clean
-            self._filled += 1
-        self._before, self._last = self._last if self._known < 2 else clean, f
-        self._known = min(self._known + 1, 2)
-        self._t, self._stale = t_s, self._stale | stale
-        if self._filled >= self.per_block:
-            block = self._total / self._filled
-            dt, self._filled, self._total = self._filled * self.period_s + self._gap_s, 0, np.zeros(len(f))
-            self._gap_s = 0.0
+        self.feed(np.array([t_s]), np.asarray(f_axis)[None], stale)
+
+    def feed(self, t_s: Array, f_axis: Array, stale: int = 0) -> list[tuple[int, int]]:
+        """Samples at t_s (n,), s, board's clock, readings (n, N) m/s^2; how they are batched changes nothing.
+
+        Returns the batch cut where the mask changed: (end, mask) of each part. A change holds from the very sample
+        that made it.
+        """
+        f, row, parts, mask = np.ascontiguousarray(f_axis, dtype=np.float64), 0, [], self.mask
+        near, marks = self._near, self._marks
+        while row < len(f):
+            row = axis_samples.gather(f, row, self.per_block, near, marks, self._noise, self._limits, self._count)
+            self._stale |= stale
+            filled = int(marks[axis_samples.FILLED])
+            if filled < self.per_block:
+                break
+            self._t, block = float(t_s[row - 1]), near[2] / filled
+            dt, self._gap_s = filled * self.period_s + self._gap_s, 0.0
+            marks[axis_samples.FILLED], near[2], self._last = 0, 0.0, f[row - 1]
             self._block(block, dt)
             self._stale = 0
+            if self.mask != mask:
+                parts.append((row - 1, mask))
+                mask = self.mask
+        return [*(part for part in parts if part[0] > 0), (len(f), mask)]
 
     def skip(self, samples: int) -> None:
         """Samples are missing before the next one."""
@@ -126,8 +136,8 @@ class HealthMonitor:
 
     def _forget_samples(self) -> None:
         n = self.layout.axes
-        self._before, self._last, self._known = np.zeros(n), np.zeros(n), 0
-        self._total, self._filled, self._stale = np.zeros(n), 0, 0
+        self._near, self._marks, self._last = np.zeros((3, n)), np.zeros(2, dtype=np.int64), np.zeros(n)
+        self._stale = 0
         self._count[axis_samples.SAME] = 0
 
     # --- blocks ---------------------------------------------------------------------------------------------------
@@ -147,14 +157,10 @@ class HealthMonitor:
     def _single_axes(self) -> None:
         """Stuck, saturated, spiking, stale: seen without a model."""
         c, count = self.config, self._count
-        stuck = count[axis_samples.SAME] >= round(c.stuck_s / self.period_s)
-        if stuck.sum() * 2 > len(stuck):  # most stand still exactly: a source without noise, not a fault
-            stuck[:] = False
-        limit = count[axis_samples.AT_LIMIT] >= max(3, round(c.limit_s / self.period_s))
-        spiking = count[axis_samples.SPIKES] >= c.spikes
-        self._whose = (stuck, limit, spiking)
-        if not (limit.any() or stuck.any() or spiking.any() or self._stale):
+        fewest = round(c.stuck_s / self.period_s), max(3, round(c.limit_s / self.period_s)), c.spikes
+        if not axis_samples.flags(count, *fewest, self._whose) and not self._stale:
             return
+        stuck, limit, spiking = self._whose
         for i in range(len(self.faults)):
             if limit[i]:
                 self._name(i, AxisState.SATURATED, f"at the end of its range, {self._last[i]:+.1f} m/s²")
@@ -171,7 +177,7 @@ class HealthMonitor:
             self._x, self._P = start(self.layout, block - self.bias, self.used, float(self.offset.max()) ** 0.5)
         before = (self._x, self._P)
         f = block - self.bias
-        R = parity.variances(block, self.white, self.offset, c.scale, self._reference_of(block))
+        R = parity.variances(block, self.white, self.offset, c.scale, np.where(self.learned, self.reference, block))
         x, P = parity.predict(self._x, self._P, dt, c.sigma_alpha, c.sigma_force)
         x, P, nis, _, residual, sigma = parity.correct(x, P, f, R, self.used, self._J, self._Q, -1)
         if not np.isfinite(nis):
@@ -190,9 +196,6 @@ class HealthMonitor:
             self._asked += 1
             if self._asked % 3 == 1:
                 self._ask()
-
-    def _reference_of(self, block: Array) -> Array:
-        return np.where(self.learned, self.reference, block)
 
     def _ask(self) -> None:
         """The readings do not fit: which axis, and what is wrong with it?"""
@@ -275,10 +278,10 @@ class HealthMonitor:
 
     def _learn(self, block: Array) -> None:
         """Offsets of the axes in use from two seconds of standstill; what is along p stays p's."""
-        window = self.history.clean(STANDSTILL)
-        self._quiet = self._quiet + 1 if window is not None else 0
-        if window is None or self._quiet % 10 != 1:
+        self._quiet = self._quiet + 1 if self.history.all_well(STANDSTILL) else 0
+        if self._quiet % 10 != 1:
             return
+        window = np.array(self.history.blocks[-STANDSTILL:])
         mean, used = window.mean(axis=0), self.used
         scatter = np.mean((window - mean)[:, used] ** 2 / self.white[used])
         trend = np.abs(window[: STANDSTILL // 2].mean(axis=0) - window[STANDSTILL // 2 :].mean(axis=0))

@@ -69,11 +69,9 @@ class History:
                 return back
         return len(self.well)
 
-    def clean(self, blocks: int) -> Array | None:
-        """The newest blocks (n, N) when all was well in all of them."""
-        if len(self.well) < blocks or not all(self.well[-blocks:]):
-            return None
-        return np.array(self.blocks[-blocks:])
+    def all_well(self, blocks: int) -> bool:
+        """Was all well in the newest blocks, that many?"""
+        return len(self.well) >= blocks and all(self.well[-blocks:])
 
     def from_onset(self) -> tuple[Array, Array, Array, Array] | None:
         """State before the onset, then blocks (n, N) and their dt (n,) up to now."""

@@ -33,6 +33,7 @@ SENSOR = np.dtype(
             ("R_alpha", "f8", (3, 3)),  # (rad/s^2)^2, one sample
             ("R_p", "f8", (3, 3)),  # (m/s^2)^2
             ("R_c", "f8", (6, 6)),  # (rad/s)^4; identity where not used
+            ("known", "f8", (6, 6)),  # M^T R_c^-1 M: information of one sample on the products, (rad/s)^-4
             ("drift", "f8", (12, 12)),  # W W^T
             ("Q", "f8", (MOST_AXES, 6)),  # z of every axis, m
             ("theta_b", "f8", (MOST_AXES, 3)),
@@ -72,6 +73,9 @@ def sensor(layout: Layout, sigma_axis: float, excluded: int = 0) -> Sensor:
     R = sigma_axis**2 * (W @ W.T)
     R_c = np.eye(6)
     R_c[:m, :m] = R[3 : 3 + m, 3 : 3 + m]
+    whole = np.zeros((6, 6))
+    whole[: len(M)] = M
+    known = whole.T @ np.linalg.solve(R_c, whole)
     quiet = R[:9, :9].copy()
     for k in range(3 + m, 9):
         quiet[k, k] = 1.0
@@ -83,7 +87,8 @@ def sensor(layout: Layout, sigma_axis: float, excluded: int = 0) -> Sensor:
     for name, value in (("Q", layout.Q), ("theta_b", layout.theta_b), ("used", used)):
         out[name][:n] = value
     for name, value in (("M", np.eye(6) if plain else M), ("SQ", SQ), ("R_alpha", R[:3, :3]), ("R_p", R[9:, 9:]),
-                        ("R_c", R_c), ("drift", W @ W.T), ("basis", basis.T), ("spread", spread)):  # fmt: skip
+                        ("R_c", R_c), ("known", known), ("drift", W @ W.T), ("basis", basis.T),
+                        ("spread", spread)):  # fmt: skip
         out[name][:] = value
     out["n"], out["m"], out["feedback"], out["plain"] = n, m, feedback, plain
     return out

@@ -19,6 +19,7 @@ from estimator.rate.products_kernel import (
     ROWS,
     SIGMA,
     SPREAD,
+    STRIDE,
     Three,
     Tuning,
     U,
@@ -41,58 +42,60 @@ def by_products(
     if s.m == 0:
         return 0.0, 0.0
     w0, w1, w2 = at
-    H, e = work[JACOBIAN : JACOBIAN + 18], work[RESIDUAL : RESIDUAL + 6]
+    e = work[RESIDUAL : RESIDUAL + 6]
     z0, z1, z2 = w0 * x[0], w0 * x[1] + w1 * x[0] - w0 * w1, w0 * x[2] + w2 * x[0] - w0 * w2
     z0, z3, z5 = 2.0 * z0 - w0 * w0, 2.0 * w1 * x[1] - w1 * w1, 2.0 * w2 * x[2] - w2 * w2
     z4 = w1 * x[2] + w2 * x[1] - w1 * w2
     z0, z1, z2, z3, z4, z5 = z0 + P[0], z1 + P[1], z2 + P[2], z3 + P[23], z4 + P[24], z5 + P[46]
     if s.plain:
-        H[:] = 0.0
-        H[0], H[3], H[4], H[6], H[8], H[10] = 2.0 * w0, w1, w0, w2, w0, 2.0 * w1
-        H[13], H[14], H[17] = w2, w1, 2.0 * w2
         e[0], e[1], e[2], e[3], e[4], e[5] = z0, z1, z2, z3, z4, z5
     else:
         for r in range(6):
             M = s.M[r]
-            H[3 * r] = 2.0 * M[0] * w0 + M[1] * w1 + M[2] * w2
-            H[3 * r + 1] = M[1] * w0 + 2.0 * M[3] * w1 + M[4] * w2
-            H[3 * r + 2] = M[2] * w0 + M[4] * w1 + 2.0 * M[5] * w2
             e[r] = M[0] * z0 + M[1] * z1 + M[2] * z2 + M[3] * z3 + M[4] * z4 + M[5] * z5
     for r in range(6):
         e[r] = y[3 + r] - x[6 + r] - e[r]
-    _products_rows(P, work[ROWS : ROWS + 6 * STATES], H)
-    _products_covariance(P, work, s)
+    products_rows(P, work, at, s, 1.0)
+    _add_spread(P, work, s)
     for r in range(s.m):
         out[INNOVATION + r], out[SIGMA + r] = e[r], np.sqrt(work[COV + 7 * r])
     return absorb_six(x, P, work, t.products_gate)
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _products_rows(P: Array, G: Array, H: Array) -> None:
-    """H P."""
-    n = STATES
+def products_rows(P: Array, work: Array, w: Three, s: Sensor, share: float) -> None:
+    """H P and the lower triangle of H P H^T + share R_c, for the products about omega = w (E-33)."""
+    n, w0, w1, w2 = STATES, w[0], w[1], w[2]
+    G, H, C = work[ROWS : ROWS + 6 * STRIDE], work[JACOBIAN : JACOBIAN + 18], work[COV : COV + 36]
+    for r in range(6):
+        M = s.M[r]
+        H[3 * r] = 2.0 * M[0] * w0 + M[1] * w1 + M[2] * w2
+        H[3 * r + 1] = M[1] * w0 + 2.0 * M[3] * w1 + M[4] * w2
+        H[3 * r + 2] = M[2] * w0 + M[4] * w1 + 2.0 * M[5] * w2
     for r in range(6):
         h0, h1, h2 = H[3 * r], H[3 * r + 1], H[3 * r + 2]
         for j in range(n):
-            G[n * r + j] = h0 * P[j] + h1 * P[n + j] + h2 * P[2 * n + j] + P[n * (6 + r) + j]
+            G[STRIDE * r + j] = h0 * P[j] + h1 * P[n + j] + h2 * P[2 * n + j] + P[n * (6 + r) + j]
+    for k in range(6):
+        g0, g1, g2 = G[STRIDE * k], G[STRIDE * k + 1], G[STRIDE * k + 2]
+        for l in range(k + 1):
+            value = g0 * H[3 * l] + g1 * H[3 * l + 1] + g2 * H[3 * l + 2]
+            C[6 * k + l] = value + G[STRIDE * k + 6 + l] + share * s.R_c[k, l]
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _products_covariance(P: Array, work: Array, s: Sensor) -> None:
-    """C = H P H^T + R_c + second-order spread, its lower triangle (E-34)."""
-    G, H, C = work[ROWS : ROWS + 6 * STATES], work[JACOBIAN : JACOBIAN + 18], work[COV : COV + 36]
-    S = work[SPREAD : SPREAD + 36]
+def _add_spread(P: Array, work: Array, s: Sensor) -> None:
+    """C += second-order spread of the products (E-34)."""
+    C, S = work[COV : COV + 36], work[SPREAD : SPREAD + 36]
     for a in range(6):
         i, j = FIRST[a], SECOND[a]
         for b in range(a + 1):
             k, l = FIRST[b], SECOND[b]
             S[6 * a + b] = S[6 * b + a] = P[22 * i + k] * P[22 * j + l] + P[22 * i + l] * P[22 * j + k]
-    for k in range(6):
-        g0, g1, g2 = G[22 * k], G[22 * k + 1], G[22 * k + 2]
-        for l in range(k + 1):
-            value = g0 * H[3 * l] + g1 * H[3 * l + 1] + g2 * H[3 * l + 2] + G[22 * k + 6 + l] + s.R_c[k, l]
-            C[6 * k + l] = value + S[6 * k + l] if s.plain else value
     if s.plain:
+        for k in range(6):
+            for l in range(k + 1):
+                C[6 * k + l] += S[6 * k + l]
         return
     for k in range(s.m):
         for l in range(k + 1):
@@ -111,9 +114,20 @@ def by_force(
 
     p: specific force of the centre, m/s^2; alpha: omega', rad/s^2.
     """
-    w0, w1, w2, r0, r1, r2 = x[0], x[1], x[2], x[18], x[19], x[20]
     # at rest omega' is noise: it must not seem to measure the pivot
-    e0, e1, e2 = alpha if turning else (0.0, 0.0, 0.0)
+    force_rows(x, P, work, p, alpha if turning else (0.0, 0.0, 0.0), s, 1.0)
+    if turning:
+        arm = x[18] * x[18] + x[19] * x[19] + x[20] * x[20] + P[23 * 18] + P[23 * 19] + P[23 * 20]
+        for k in range(3):
+            work[COV + 7 * k] += t.centre + arm * s.R_alpha[0, 0]
+    return absorb_three(x, P, work, t.force_gate)
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def force_rows(x: Array, P: Array, work: Array, p: Three, alpha: Three, s: Sensor, share: float) -> None:
+    """H P, the lower triangle of H P H^T + share R_p, and the innovation of the specific force p (E-35)."""
+    w0, w1, w2, r0, r1, r2 = x[0], x[1], x[2], x[18], x[19], x[20]
+    e0, e1, e2 = alpha
     wr, ww = w0 * r0 + w1 * r1 + w2 * r2, w0 * w0 + w1 * w1 + w2 * w2
     k00, k01, k02 = w0 * w0 - ww, w0 * w1 - e2, w0 * w2 + e1  # d p / d pivot
     k10, k11, k12 = w1 * w0 + e2, w1 * w1 - ww, w1 * w2 - e0
@@ -128,24 +142,20 @@ def by_force(
         y0, h00, h01, h02 = _by_squares(s.SQ[3], w0, w1, w2, y0, h00, h01, h02)
         y1, h10, h11, h12 = _by_squares(s.SQ[4], w0, w1, w2, y1, h10, h11, h12)
         y2, h20, h21, h22 = _by_squares(s.SQ[5], w0, w1, w2, y2, h20, h21, h22)
-    n, G = STATES, work[ROWS : ROWS + 3 * STATES]
+    n, G = STRIDE, work[ROWS : ROWS + 3 * STRIDE]
     for j in range(STATES):
-        p0, p1, p2 = P[j], P[n + j], P[2 * n + j]
-        q0, q1, q2 = P[PIVOT + j], P[PIVOT + n + j], P[PIVOT + 2 * n + j]
-        u0, u1, u2 = P[U + j] + P[B_F + j], P[U + n + j] + P[B_F + n + j], P[U + 2 * n + j] + P[B_F + 2 * n + j]
+        p0, p1, p2 = P[j], P[22 + j], P[44 + j]
+        q0, q1, q2 = P[PIVOT + j], P[PIVOT + 22 + j], P[PIVOT + 44 + j]
+        u0, u1, u2 = P[U + j] + P[B_F + j], P[U + 22 + j] + P[B_F + 22 + j], P[U + 44 + j] + P[B_F + 44 + j]
         G[j] = u0 + h00 * p0 + h01 * p1 + h02 * p2 + k00 * q0 + k01 * q1 + k02 * q2
         G[n + j] = u1 + h10 * p0 + h11 * p1 + h12 * p2 + k10 * q0 + k11 * q1 + k12 * q2
         G[2 * n + j] = u2 + h20 * p0 + h21 * p1 + h22 * p2 + k20 * q0 + k21 * q1 + k22 * q2
-    arm = r0 * r0 + r1 * r1 + r2 * r2 + P[23 * 18] + P[23 * 19] + P[23 * 20]
-    more = t.centre + arm * s.R_alpha[0, 0] if turning else 0.0
     h0, h1, h2 = (h00, h01, h02, k00, k01, k02), (h10, h11, h12, k10, k11, k12), (h20, h21, h22, k20, k21, k22)
     C, R = work[COV : COV + 36], s.R_p
-    C[0] = _seen(G, 0, 0, h0) + R[0, 0] + more
-    C[6], C[7] = _seen(G, n, 0, h0) + R[1, 0], _seen(G, n, 1, h1) + R[1, 1] + more
-    C[12], C[13] = _seen(G, 2 * n, 0, h0) + R[2, 0], _seen(G, 2 * n, 1, h1) + R[2, 1]
-    C[14] = _seen(G, 2 * n, 2, h2) + R[2, 2] + more
+    C[0], C[6] = _seen(G, 0, 0, h0) + share * R[0, 0], _seen(G, n, 0, h0) + share * R[1, 0]
+    C[7], C[12] = _seen(G, n, 1, h1) + share * R[1, 1], _seen(G, 2 * n, 0, h0) + share * R[2, 0]
+    C[13], C[14] = _seen(G, 2 * n, 1, h1) + share * R[2, 1], _seen(G, 2 * n, 2, h2) + share * R[2, 2]
     work[RESIDUAL], work[RESIDUAL + 1], work[RESIDUAL + 2] = y0, y1, y2
-    return absorb_three(x, P, work, t.force_gate)
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
@@ -168,15 +178,22 @@ def _seen(G: Array, row: int, l: int, h: tuple[float, float, float, float, float
 @njit(cache=True, error_model="numpy", fastmath=FAST)
 def by_standstill(x: Array, P: Array, work: Array, alpha_m: Three, earth_b: Three, s: Sensor, t: Tuning) -> None:
     """omega is the Earth's and omega' is bias (E-38)."""
-    C, y = work[COV : COV + 36], work[RESIDUAL : RESIDUAL + 6]
-    for k in range(6 * STATES):
-        work[ROWS + k] = P[k]
+    standstill_rows(P, work, s, t.still_rate, 1.0)
+    for i in range(3):
+        work[RESIDUAL + i], work[RESIDUAL + 3 + i] = earth_b[i] - x[i], alpha_m[i] - x[3 + i]
+    absorb_six(x, P, work, np.inf)
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def standstill_rows(P: Array, work: Array, s: Sensor, rate: float, share: float) -> None:
+    """H P and the lower triangle of H P H^T + R of a standstill, R of `rate` and of share R_alpha."""
+    C = work[COV : COV + 36]
     for i in range(6):
+        for j in range(STATES):
+            work[ROWS + STRIDE * i + j] = P[STATES * i + j]
         for j in range(i + 1):
             C[6 * i + j] = P[22 * i + j]
     for i in range(3):
-        y[i], y[3 + i] = earth_b[i] - x[i], alpha_m[i] - x[3 + i]
-        C[7 * i] += t.still_rate
+        C[7 * i] += rate
         for j in range(i + 1):
-            C[6 * (3 + i) + 3 + j] += s.R_alpha[i, j]
-    absorb_six(x, P, work, np.inf)
+            C[6 * (3 + i) + 3 + j] += share * s.R_alpha[i, j]

@@ -33,8 +33,10 @@ INNOVATION, SIGMA, NIS, USED, FORCE_NIS, FORCE_USED, LIKELIHOOD, OUT = 0, 6, 12,
 EKF, UKF, FORGET, HORIZON = range(4)
 # rows of P in (484,): of omega, b_alpha, b_c, u, b_f, the pivot, the angle
 OMEGA, B_ALPHA, B_C, U, B_F, PIVOT, TURNED = 0, 66, 132, 264, 330, 396, 462
-# of the workspace of one filter: rows of H P (6 x 22), C (6 x 6), H (6 x 3), spread (6 x 6), y (6), x and P of before
-ROWS, COV, JACOBIAN, SPREAD, RESIDUAL, BEFORE = 0, 132, 168, 186, 222, 228
+# of the workspace of one filter: seven rows, as of H P, one every 24 numbers (a distance of whole vectors: rows can be
+# worked on side by side); C (6 x 6), H (6 x 3), spread (6 x 6), y (6), x and P of before
+STRIDE = 24
+ROWS, COV, JACOBIAN, SPREAD, RESIDUAL, BEFORE = 0, 168, 204, 222, 258, 264
 WORK = BEFORE + PP
 FAST = {"contract"}  # a product and a sum in one instruction; not-a-number stays one
 
@@ -103,19 +105,15 @@ def absorb_three(x: Array, P: Array, work: Array, gate: float) -> tuple[float, f
     nis, logdet = y0 * y0 + y1 * y1 + y2 * y2, -2.0 * np.log(f[0] * f[2] * f[5])
     if not nis <= gate:
         return nis, logdet
-    G = work[ROWS : ROWS + 3 * STATES]
+    n, G = STRIDE, work[ROWS : ROWS + 3 * STRIDE]
     for j in range(STATES):
-        g0, g1, g2 = solve(f, G[j], G[STATES + j], G[2 * STATES + j])
-        G[j], G[STATES + j], G[2 * STATES + j] = g0, g1, g2
+        g0, g1, g2 = solve(f, G[j], G[n + j], G[2 * n + j])
+        G[j], G[n + j], G[2 * n + j] = g0, g1, g2
         x[j] += g0 * y0 + g1 * y1 + g2 * y2
-    for r in range(0, STATES, 2):  # two rows at a time: each g is loaded once for both
-        row = STATES * r
-        a0, a1, a2 = G[r], G[STATES + r], G[2 * STATES + r]
-        b0, b1, b2 = G[r + 1], G[STATES + r + 1], G[2 * STATES + r + 1]
+    for r in range(STATES):
+        row, a0, a1, a2 = STATES * r, G[r], G[n + r], G[2 * n + r]
         for j in range(STATES):
-            g0, g1, g2 = G[j], G[STATES + j], G[2 * STATES + j]
-            P[row + j] -= a0 * g0 + a1 * g1 + a2 * g2
-            P[row + STATES + j] -= b0 * g0 + b1 * g1 + b2 * g2
+            P[row + j] -= a0 * G[j] + a1 * G[n + j] + a2 * G[2 * n + j]
     return nis, logdet
 
 
@@ -146,7 +144,7 @@ def absorb_six(x: Array, P: Array, work: Array, gate: float) -> tuple[float, flo
     logdet = -2.0 * np.log(f[0] * f[2] * f[5] * h[0] * h[2] * h[5])
     if not nis <= gate:
         return nis, logdet
-    n, G = STATES, work[ROWS : ROWS + 6 * STATES]
+    n, G = STRIDE, work[ROWS : ROWS + 6 * STRIDE]
     for j in range(STATES):
         g0, g1, g2 = solve(f, G[j], G[n + j], G[2 * n + j])
         g3, g4, g5 = solve(
@@ -157,15 +155,12 @@ def absorb_six(x: Array, P: Array, work: Array, gate: float) -> tuple[float, flo
         )
         G[j], G[n + j], G[2 * n + j], G[3 * n + j], G[4 * n + j], G[5 * n + j] = g0, g1, g2, g3, g4, g5
         x[j] += g0 * y0 + g1 * y1 + g2 * y2 + g3 * y3 + g4 * y4 + g5 * y5
-    for r in range(0, STATES, 2):
+    for r in range(STATES):
         row = STATES * r
         a0, a1, a2, a3, a4, a5 = G[r], G[n + r], G[2 * n + r], G[3 * n + r], G[4 * n + r], G[5 * n + r]
-        k = r + 1
-        d0, d1, d2, d3, d4, d5 = G[k], G[n + k], G[2 * n + k], G[3 * n + k], G[4 * n + k], G[5 * n + k]
         for j in range(STATES):
             g0, g1, g2, g3, g4, g5 = G[j], G[n + j], G[2 * n + j], G[3 * n + j], G[4 * n + j], G[5 * n + j]
             P[row + j] -= a0 * g0 + a1 * g1 + a2 * g2 + a3 * g3 + a4 * g4 + a5 * g5
-            P[row + STATES + j] -= d0 * g0 + d1 * g1 + d2 * g2 + d3 * g3 + d4 * g4 + d5 * g5
     return nis, logdet
 
 
@@ -184,7 +179,9 @@ def along_axis(w0: float, w1: float, w2: float, fixed: bool, turning: bool) -> S
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def predict(x: Array, P: Array, alpha_m: Three, N: Six, dt: float, turning: bool, s: Sensor, earth_b: Three) -> None:
+def predict(
+    x: Array, P: Array, work: Array, alpha_m: Three, N: Six, dt: float, turning: bool, s: Sensor, earth_b: Three
+) -> None:
     """E-31 and E-32 in place, without process noise; N of omega' is integrated."""
     n00, n01, n02, n11, n12, n22 = N
     a00, a01, a02, a10, a11, a12, a20, a21, a22 = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
@@ -217,7 +214,7 @@ def predict(x: Array, P: Array, alpha_m: Three, N: Six, dt: float, turning: bool
     # dt [u x] with u between the samples: right to second order in the turn of one sample
     t = (0.5 * dt * (u0 + x[12]), 0.5 * dt * (u1 + x[13]), 0.5 * dt * (u2 + x[14]))
     A, D = (a00, a01, a02, a10, a11, a12, a20, a21, a22), (d00, d01, d02, d11, d12, d22)
-    _turn_covariance(P, A, D, C, t, dt, 0.5 * dt if turning else 0.0)
+    _turn_covariance(P, work[ROWS : ROWS + 7 * STRIDE], A, D, C, t, dt, 0.5 * dt if turning else 0.0)
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
@@ -232,10 +229,10 @@ def _feedback(s: Sensor, i: int, w0: float, w1: float, w2: float, dt: float, e: 
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _turn_covariance(P: Array, A: Nine, D: Six, C: Nine, t: Three, dt: float, back: float) -> None:
+def _turn_covariance(P: Array, G: Array, A: Nine, D: Six, C: Nine, t: Three, dt: float, back: float) -> None:
     """P = F P F^T in place. F differs from the identity in seven rows: of omega, u and the angle.
 
-    First F P, along the rows; then the seven columns of those rows, and what is symmetric to them.
+    G (7 x 24) becomes those rows of F P, then of F P F^T; they go into P as rows and as columns.
     """
     t0, t1, t2 = t
     for j in range(STATES):
@@ -243,39 +240,30 @@ def _turn_covariance(P: Array, A: Nine, D: Six, C: Nine, t: Three, dt: float, ba
         p3, p4, p5 = P[66 + j], P[88 + j], P[110 + j]
         u0, u1, u2 = P[264 + j], P[286 + j], P[308 + j]
         q0, q1, q2 = p0 - back * p3, p1 - back * p4, p2 - back * p5
-        P[462 + j] += dt * q2
-        P[264 + j] = C[0] * u0 + C[1] * u1 + C[2] * u2 - t2 * q1 + t1 * q2
-        P[286 + j] = C[3] * u0 + C[4] * u1 + C[5] * u2 + t2 * q0 - t0 * q2
-        P[308 + j] = C[6] * u0 + C[7] * u1 + C[8] * u2 - t1 * q0 + t0 * q1
-        P[j] = A[0] * p0 + A[1] * p1 + A[2] * p2 - D[0] * p3 - D[1] * p4 - D[2] * p5
-        P[22 + j] = A[3] * p0 + A[4] * p1 + A[5] * p2 - D[1] * p3 - D[3] * p4 - D[4] * p5
-        P[44 + j] = A[6] * p0 + A[7] * p1 + A[8] * p2 - D[2] * p3 - D[4] * p4 - D[5] * p5
-    for k in range(6):
-        r = 22 * k if k < 3 else 198 + 22 * k  # rows of omega, then of u
-        q0, q1, q2 = P[r] - back * P[r + 3], P[r + 1] - back * P[r + 4], P[r + 2] - back * P[r + 5]
-        u0, u1, u2 = P[r + 12], P[r + 13], P[r + 14]
-        P[r + 21] += dt * q2
-        P[r + 12] = C[0] * u0 + C[1] * u1 + C[2] * u2 - t2 * q1 + t1 * q2
-        P[r + 13] = C[3] * u0 + C[4] * u1 + C[5] * u2 + t2 * q0 - t0 * q2
-        P[r + 14] = C[6] * u0 + C[7] * u1 + C[8] * u2 - t1 * q0 + t0 * q1
-        if k < 3:
-            p0, p1, p2, p3, p4, p5 = P[r], P[r + 1], P[r + 2], P[r + 3], P[r + 4], P[r + 5]
-            P[r] = A[0] * p0 + A[1] * p1 + A[2] * p2 - D[0] * p3 - D[1] * p4 - D[2] * p5
-            P[r + 1] = A[3] * p0 + A[4] * p1 + A[5] * p2 - D[1] * p3 - D[3] * p4 - D[4] * p5
-            P[r + 2] = A[6] * p0 + A[7] * p1 + A[8] * p2 - D[2] * p3 - D[4] * p4 - D[5] * p5
-    P[462 + 21] += dt * (P[462 + 2] - back * P[462 + 5])
-    for k in range(3):
-        for r in range(k + 1, 22):
-            P[22 * r + k] = P[22 * k + r]
-    for k in range(12, 15):
-        for r in range(3, 12):
-            P[22 * r + k] = P[22 * k + r]
-        for r in range(k + 1, 22):
-            P[22 * r + k] = P[22 * k + r]
-    for r in range(3, 12):
-        P[22 * r + 21] = P[462 + r]
-    for r in range(15, 21):
-        P[22 * r + 21] = P[462 + r]
+        G[j] = A[0] * p0 + A[1] * p1 + A[2] * p2 - D[0] * p3 - D[1] * p4 - D[2] * p5
+        G[24 + j] = A[3] * p0 + A[4] * p1 + A[5] * p2 - D[1] * p3 - D[3] * p4 - D[4] * p5
+        G[48 + j] = A[6] * p0 + A[7] * p1 + A[8] * p2 - D[2] * p3 - D[4] * p4 - D[5] * p5
+        G[72 + j] = C[0] * u0 + C[1] * u1 + C[2] * u2 - t2 * q1 + t1 * q2
+        G[96 + j] = C[3] * u0 + C[4] * u1 + C[5] * u2 + t2 * q0 - t0 * q2
+        G[120 + j] = C[6] * u0 + C[7] * u1 + C[8] * u2 - t1 * q0 + t0 * q1
+        G[144 + j] = P[462 + j] + dt * q2
+    for r in range(0, 168, 24):
+        p0, p1, p2, p3, p4, p5 = G[r], G[r + 1], G[r + 2], G[r + 3], G[r + 4], G[r + 5]
+        q0, q1, q2, u0, u1, u2 = p0 - back * p3, p1 - back * p4, p2 - back * p5, G[r + 12], G[r + 13], G[r + 14]
+        G[r] = A[0] * p0 + A[1] * p1 + A[2] * p2 - D[0] * p3 - D[1] * p4 - D[2] * p5
+        G[r + 1] = A[3] * p0 + A[4] * p1 + A[5] * p2 - D[1] * p3 - D[3] * p4 - D[4] * p5
+        G[r + 2] = A[6] * p0 + A[7] * p1 + A[8] * p2 - D[2] * p3 - D[4] * p4 - D[5] * p5
+        G[r + 12] = C[0] * u0 + C[1] * u1 + C[2] * u2 - t2 * q1 + t1 * q2
+        G[r + 13] = C[3] * u0 + C[4] * u1 + C[5] * u2 + t2 * q0 - t0 * q2
+        G[r + 14] = C[6] * u0 + C[7] * u1 + C[8] * u2 - t1 * q0 + t0 * q1
+        G[r + 21] += dt * q2
+    for i in range(7):  # the lower triangle of those seven rows last: it is the transpose of the upper one
+        k = 6 - i
+        row = k if k < 3 else 9 + k if k < 6 else 21
+        for j in range(STATES):
+            P[22 * row + j] = G[24 * k + j]
+        for j in range(STATES):
+            P[22 * j + row] = G[24 * k + j]
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)

@@ -59,7 +59,7 @@ def step(core: Array, work: Array, s: Sensor, t: Tuning, y: Array, at: Three, dt
     w0, w1, w2 = x[0], x[1], x[2]
     fixed = fixed and w0 * w0 + w1 * w1 + w2 * w2 > t.axis_from
     alpha = (0.5 * (core[ALPHA] + y[0]), 0.5 * (core[ALPHA + 1] + y[1]), 0.5 * (core[ALPHA + 2] + y[2]))
-    _predict(x, P, alpha, dt, turning, fixed, turning, s, t, earth_b)
+    _predict(x, P, work, alpha, dt, turning, fixed, turning, s, t, earth_b)
     if t.method == UKF:
         nis, logdet = unscented.by_products(x, P, work, y, s, t, out)
     else:
@@ -71,7 +71,7 @@ def step(core: Array, work: Array, s: Sensor, t: Tuning, y: Array, at: Three, dt
         for k in range(PP):
             core[k] = work[BEFORE + k]
         alpha = (core[ALPHA], core[ALPHA + 1], core[ALPHA + 2])
-        _predict(x, P, alpha, dt, True, fixed, turning, s, t, earth_b)
+        _predict(x, P, work, alpha, dt, True, fixed, turning, s, t, earth_b)
         for i in range(3):
             P[23 * i] += t.unseen_alpha * dt * dt
     f_b = (x[12], x[13], x[14])
@@ -92,14 +92,14 @@ def step(core: Array, work: Array, s: Sensor, t: Tuning, y: Array, at: Three, dt
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _predict(x: Array, P: Array, alpha: Three, dt: float, moving: bool, fixed: bool, turning: bool, s: Sensor,
-             t: Tuning, earth_b: Three) -> None:  # fmt: skip
+def _predict(x: Array, P: Array, work: Array, alpha: Three, dt: float, moving: bool, fixed: bool, turning: bool,
+             s: Sensor, t: Tuning, earth_b: Three) -> None:  # fmt: skip
     """Prediction by the filter's method, with noise. moving: omega' is integrated; turning: the detector's word."""
     N = kernel.along_axis(x[0], x[1], x[2], fixed, moving)
     if t.method == UKF:
         unscented.predict(x, P, alpha, N, dt, moving, s, earth_b)
     else:
-        kernel.predict(x, P, alpha, N, dt, moving, s, earth_b)
+        kernel.predict(x, P, work, alpha, N, dt, moving, s, earth_b)
     if t.method == FORGET and turning:
         _forget(P, s, t, dt)
     else:

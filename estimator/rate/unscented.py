@@ -11,7 +11,18 @@ from numpy.typing import NDArray
 
 from estimator.attitude.rotation import from_rotation_vector, to_dcm
 from estimator.rate.observed import Sensor
-from estimator.rate.products_kernel import COV, INNOVATION, RESIDUAL, ROWS, SIGMA, Six, Three, Tuning, absorb_six
+from estimator.rate.products_kernel import (
+    COV,
+    INNOVATION,
+    RESIDUAL,
+    ROWS,
+    SIGMA,
+    STRIDE,
+    Six,
+    Three,
+    Tuning,
+    absorb_six,
+)
 from estimator.rate.products_model import FIRST, SECOND, STATES
 
 Array = NDArray[np.float64]
@@ -178,7 +189,7 @@ def by_products(x: Array, flat: Array, work: Array, y: Array, s: Sensor, t: Tuni
 def _absorb_products(x: Array, flat: Array, work: Array, c_m: Array, mean: Array, z: Array, H: Array, s: Sensor,
                      t: Tuning, out: Array) -> tuple[float, float]:  # fmt: skip
     n, P = len(x), flat.reshape(STATES, STATES)
-    HP, C = work[ROWS : ROWS + 6 * n].reshape(6, n), work[COV : COV + 36].reshape(6, 6)
+    HP, C = work[ROWS : ROWS + 6 * STRIDE].reshape(6, STRIDE), work[COV : COV + 36].reshape(6, 6)
     y = work[RESIDUAL : RESIDUAL + 6]
     HP[:, :], C[:, :], y[:] = 0.0, np.eye(6), 0.0
     for r in range(s.m):
