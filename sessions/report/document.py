@@ -95,7 +95,8 @@ def _check(check: Check) -> tuple[str, str, str, str]:
     low, high = check.minimum, check.maximum
     limits = f"{number(low)} to {number(high)}" if low is not None and high is not None else ""
     limits = limits or (f"≥ {number(low)}" if low is not None else f"≤ {number(high)}")
-    return check.name, number(check.value, 4), limits, {True: "pass", False: "fail", None: "not told"}[check.passed]
+    name = f"{check.text} ({check.name})" if check.text else check.name
+    return name, number(check.value, 4), limits, {True: "pass", False: "fail", None: "not told"}[check.passed]
 
 
 def _plateaus(found: Analysis) -> Grid | None:

@@ -12,7 +12,17 @@ from reportlab.lib.units import mm
 from reportlab.pdfbase import pdfmetrics
 from reportlab.pdfbase.ttfonts import TTFont
 from reportlab.pdfgen.canvas import Canvas
-from reportlab.platypus import Image, KeepTogether, Paragraph, SimpleDocTemplate, Spacer, Table, TableStyle
+from reportlab.platypus import (
+    BaseDocTemplate,
+    Frame,
+    Image,
+    KeepTogether,
+    PageTemplate,
+    Paragraph,
+    Spacer,
+    Table,
+    TableStyle,
+)
 
 from sessions.report.document import Document, Grid
 
@@ -32,11 +42,14 @@ def to_pdf(document: Document) -> bytes:
     """The file's bytes; the same document gives the same bytes."""
     _register_fonts()
     buffer = io.BytesIO()
-    pages = SimpleDocTemplate(
+    pages = BaseDocTemplate(
         buffer, pagesize=A4, leftMargin=MARGIN, rightMargin=MARGIN, topMargin=MARGIN, bottomMargin=MARGIN,
         title=document.title, author="gyrofree", invariant=1,
     )  # fmt: skip
-    pages.build(_story(document), onFirstPage=_footer(document), onLaterPages=_footer(document))
+    height = A4[1] - 2 * MARGIN
+    frame = Frame(MARGIN, MARGIN, WIDTH, height, leftPadding=0, rightPadding=0, topPadding=0, bottomPadding=0)
+    pages.addPageTemplates(PageTemplate(frames=[frame], onPage=_footer(document)))
+    pages.build(_story(document))
     return buffer.getvalue()
 
 
@@ -49,7 +62,7 @@ def _register_fonts() -> None:
 
 
 def _footer(document: Document):
-    def draw(canvas: Canvas, pages: SimpleDocTemplate) -> None:
+    def draw(canvas: Canvas, pages: BaseDocTemplate) -> None:
         canvas.saveState()
         canvas.setFont(FONT, 7)
         canvas.setFillColor(DIM)

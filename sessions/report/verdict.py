@@ -1,12 +1,12 @@
 """Pass or fail: a report's figures against limits in a TOML file.
 
-    title = "Acceptance on the rate table"
-    estimator = "products-ekf"            # whose figures are judged
-    [limits.rate_rms_z_dps]               # a name of docs/reports.md
-    max = 1.4
-    [limits.scale_factor_error_ppm]
-    min = -5000
-    max = 5000
+title = "Acceptance on the rate table"
+estimator = "products-ekf"            # whose figures are judged
+[limits.rate_rms_z_dps]               # a name of docs/reports.md
+max = 1.4
+[limits.scale_factor_error_ppm]
+min = -5000
+max = 5000
 """
 
 import difflib
@@ -58,6 +58,7 @@ class Check:
     value: float | None
     minimum: float | None
     maximum: float | None
+    text: str = ""  # what the figure is
 
     @property
     def passed(self) -> bool | None:
@@ -85,13 +86,14 @@ def load_spec(path: Path | None) -> Spec:
 def judge(spec: Spec, found: list[Metric]) -> list[Check]:
     """Every limit against its figure; raises SpecError for a limit on a figure that no report has."""
     values = {metric.name: metric.value for metric in found}
+    texts = {metric.name: metric.text for metric in found}
     checks = []
     for name, limit in spec.limits.items():
         if name not in values and not _of_another_kind(name):
             near = difflib.get_close_matches(name, values, 1)
             hint = f"; did you mean {near[0]}?" if near else ""
             raise SpecError(f"limits.{name}: no such figure in this report{hint}")
-        checks.append(Check(name, values.get(name), limit.min, limit.max))
+        checks.append(Check(name, values.get(name), limit.min, limit.max, texts.get(name, "")))
     return checks
 
 
