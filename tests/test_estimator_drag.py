@@ -39,7 +39,7 @@ def alarms(fixes: list[Fix]) -> list[float]:
     return found
 
 
-@pytest.mark.parametrize(("speed", "within"), [(0.3, 90.0), (0.5, 50.0), (1.0, 30.0)])
+@pytest.mark.parametrize(("speed", "within"), [(0.3, 90.0), (0.5, 50.0), (1.0, 60.0)])
 def test_a_drag_is_found_and_measured(town, speed: float, within: float) -> None:
     fixes = walked_off(town.fixes, speed)
     found = alarms(fixes)

@@ -38,6 +38,7 @@ class DragSettings:
     sigma_drag: float = 1.0  # m/s, before any data
     false_alarm: float = 1e-4  # chance of a statistic as large without a drag, were the model right
     calm: float = 1e-2  # an alarm ends where the chance is above this
+    patience: float = 20.0  # s from its begin until it raises an alarm: it may have begun in a burst of gross fixes
     longest_gap: float = 5.0  # s between fixes; after more it begins anew
     gross: float = 1e-3  # chance that a good fix is left out as a gross one
     jumps: int = 5  # contradicting fixes in a row after which the position is taken to have jumped: begin anew
@@ -54,7 +55,7 @@ class DragWatch:
         self._last: Fix | None = None
         self._lag, self._sigma_lag = 0.0, s.sigma_lag
         self._contradicted = 0
-        self._calm_since = 0.0  # s, when the statistic was last calm
+        self._calm_since = self._began = 0.0  # s, when the statistic was last calm, when the watch began
 
     @property
     def drag(self) -> Array:
@@ -85,7 +86,7 @@ class DragWatch:
             return self._raised(fix) if self.dragging else fix
         if self.statistic < self._calm:
             self._calm_since, self.dragging = fix.t, False
-        elif self.statistic > self._gate:
+        elif self.statistic > self._gate and fix.t - self._began >= self.settings.patience:
             self.dragging = True
         return self._raised(fix) if self.dragging else fix
 
@@ -104,7 +105,7 @@ class DragWatch:
         self._walk, self._last = np.zeros(3), fix
         self._origin = (fix.latitude, fix.longitude, fix.height)
         self._v0 = fix.v_n * UP
-        self._contradicted, self.dragging, self._calm_since = 0, False, fix.t
+        self._contradicted, self.dragging, self._calm_since, self._began = 0, False, fix.t, fix.t
 
     def _step(self, last: Fix, fix: Fix) -> bool:
         """Predict, and correct by position minus integrated velocity; False for a fix that contradicts all of it."""
