@@ -24,9 +24,9 @@ Array = NDArray[np.float64]
 
 WANTED: tuple[Topic, ...] = (RATE, IMU, TACHO, TRUTH, NAV, GNSS, NOTE)
 STRAY_S = 5.0  # a sample whose own time lies further outside the recording is put where it was received
-COARSE_CHUNKS = 400  # read for the first look at a recording ...
+COARSE_CHUNKS = 250  # read for the first look at a recording ...
 COARSE_THIN = 4  # ... and of those one message in so many
-LONG_CHUNKS = 3 * COARSE_CHUNKS  # a recording of more gets one
+LONG_CHUNKS = 4 * COARSE_CHUNKS  # a recording of more gets one
 
 
 def build(path: Path, coarse: bool = False, on_progress: Progress = lambda _: None) -> Curves:

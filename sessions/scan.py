@@ -5,6 +5,7 @@ MessageIndex records behind each chunk (https://mcap.dev/spec#message-index-op0x
 one that cannot be read, is read from front to end instead.
 """
 
+import functools
 import io
 import struct
 from collections.abc import Callable, Iterator
@@ -49,6 +50,12 @@ class Extent:
 
 def summary_of(path: Path) -> Summary | None:
     """The file's own index; None where it has none that can be read. Raises OSError."""
+    found = path.stat()
+    return _summary(path, found.st_size, found.st_mtime_ns)
+
+
+@functools.lru_cache(maxsize=2)  # that of an hour takes longer to read than a first look at it
+def _summary(path: Path, size: int, mtime_ns: int) -> Summary | None:
     with path.open("rb") as stream:
         try:
             found = make_reader(stream).get_summary()
