@@ -2,6 +2,7 @@
 
 import json
 import math
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -49,6 +50,17 @@ def test_live_gives_what_offline_gives(simulated, name: str) -> None:
     assert np.abs(live.x - end.leg.x).max() < 1e-9
 
 
+def test_a_live_filter_takes_no_more_memory_with_time(simulated) -> None:
+    live, waiting, sizes = NAVIGATORS["mhe-robust"](), list(simulated.fixes), {}
+    for k, row in enumerate(simulated.imu):
+        while waiting and waiting[0].arrival <= row[0]:
+            live.fix(waiting.pop(0))
+        live.imu(row[0], row[1:4], row[4:7])
+        if k in (8_000, 14_000):
+            sizes[k] = len(pickle.dumps(live))
+    assert abs(sizes[14_000] - sizes[8_000]) < 500  # bytes, of half a megabyte
+
+
 def test_outliers_cost_the_robust_filters_less(simulated) -> None:
     plain = replace(FILTERS["kf"], gated=False)
     runs = run_filters(simulated.imu, simulated.fixes, {"plain": plain, "huber": FILTERS["huber"]})
@@ -82,7 +94,7 @@ def test_the_real_drive(data_dir: Path, tmp_path: Path) -> None:
     assert best["velocity_h_rms_mps"] < 0.065 and math.degrees(best["heading_rms_rad"]) < 1.0
     assert scores["smoother"]["position_h_rms_m"] < 0.03
     ends = {name: math.sqrt(np.mean(np.square(row["outage_end_m"]))) for name, row in scores.items()}
-    assert ends[DEFAULT] < 45.0 < 0.6 * ends["kf"]
+    assert ends[DEFAULT] < 15.0 and ends["kf"] < 90.0
     # the trap of the third metric: the smallest residual belongs to one of the worst predictions
     assert scores["fpe-p0-n1"]["residual_to_fed_m"] < kf["residual_to_fed_m"]
     assert scores["fpe-p0-n1"]["prediction_1s_m"] > kf["prediction_1s_m"]

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
 USUAL = (
-    "kf", "kf-nhc", "huber", "huber-nhc", "fpe-p0-n1", "fpe-p0-n10", "fpe-fuzzy", "mhe-robust", "smoother",
+    "kf", "kf-still", "kf-nhc", "huber", "huber-nhc", "fpe-p0-n1", "fpe-p0-n10", "fpe-fuzzy", "mhe-robust", "smoother",
 )  # fmt: skip
 SETTLED = 20.0  # s after navigation began, from which on it is scored
 COURSE_SPEED = 4.0  # m/s, above it the course is taken as the heading
