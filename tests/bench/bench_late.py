@@ -20,7 +20,7 @@ sys.path[:0] = [str(Path(__file__).resolve().parent.parent), str(Path(__file__).
 
 from feeder import Feeder  # noqa: E402
 from kill_stack import line  # noqa: E402
-from playwright.sync_api import sync_playwright  # noqa: E402
+from playwright.sync_api import Error, sync_playwright  # noqa: E402
 from stack import free_port  # noqa: E402
 from test_browser import CHROMIUM, FLAGS  # noqa: E402
 
@@ -116,7 +116,11 @@ def main(minutes: float = 10.0) -> None:
         handle = start(bus, SimpleNamespace(viser_port=0))
         try:
             line("late_history_in_dashboard", seconds(lambda: reaches(handle.store, span_s)), "s", target=2.0)
-            found = look(handle.port, span_s)
+            try:
+                found = look(handle.port, span_s)
+            except Error as error:
+                line("late_page", None, "s", target=2.0, not_measured=str(error).splitlines()[0])
+                return
             line("late_page_to_first_chart", found.pop("first_chart"), "s")
             for title, value in found.items():
                 line(f"late_charts_{title.lower()}", value, "s", target=2.0)
