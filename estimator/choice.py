@@ -1,10 +1,12 @@
 """Names and files of the settings become estimators, layouts and calibration cards; a wrong one is refused by name."""
 
+import math
 from pathlib import Path
 from typing import Any
 
 from estimator.calibration.card import Card, CardError, read_card
-from estimator.settings import LayoutSettings
+from estimator.rate.beliefs import Beliefs
+from estimator.settings import EstimatorSettings, LayoutSettings
 
 
 class UnknownEstimator(ValueError):
@@ -23,6 +25,12 @@ def check_names(key: str, names: list[str], known: dict[str, Any]) -> None:
     for name in names:
         if name not in known:
             raise UnknownEstimator(f"[estimator] {key}: no estimator {name!r}; want some of {', '.join(known)}")
+
+
+def beliefs(settings: EstimatorSettings) -> Beliefs:
+    """What the products filters are told beside the layout."""
+    latitude = None if settings.latitude_deg is None else math.radians(settings.latitude_deg)
+    return Beliefs(latitude, settings.tacho_axis_b)
 
 
 def load_card(path: Path) -> Card:

@@ -125,6 +125,14 @@ def sample_header(first: pb.Header, offset_s: float) -> pb.Header:
     )
 
 
+def tacho_report(message: pb.TachoRate) -> tuple[float, float, float, bool]:
+    """Time (s, board's clock), rate, sigma (rad/s), and whether the sign is known; raises BadMessage."""
+    t_s, rate, sigma = message.header.device_us * 1e-6, message.omega_radps, message.sigma_radps
+    if not (math.isfinite(rate) and math.isfinite(sigma) and sigma > 0.0):
+        raise BadMessage(f"tacho of {message.header.device}: {rate} rad/s with sigma {sigma} rad/s: want numbers")
+    return t_s, rate, sigma, message.direction_known
+
+
 def rate_message(header: pb.Header, batch: pb.AccelBatch, index: int, name: str, state: Any) -> pb.RateEstimate:
     """RateState as published."""
     return pb.RateEstimate(  # its arrays are float64: tolist() at once, this runs for every sample
@@ -151,6 +159,7 @@ def rate_message(header: pb.Header, batch: pb.AccelBatch, index: int, name: str,
         sight_reason=state.sight_reason,
         bound_sigma_radps=() if state.bound_sigma is None else state.bound_sigma.tolist(),
         excluded_mask=state.excluded,
+        aid=state.aid,
     )
 
 

@@ -20,7 +20,7 @@ from estimator.attitude.axis_map import MapError
 from estimator.attitude.board import AttitudeBoard
 from estimator.attitude.filters import ATTITUDES
 from estimator.calibration.card import CardError
-from estimator.choice import UnknownEstimator, check_names, load_card, make_layout, rate_estimators
+from estimator.choice import UnknownEstimator, beliefs, check_names, load_card, make_layout, rate_estimators
 from estimator.cost import Cost
 from estimator.ins.board import NavBoard, NavOutput
 from estimator.ins.gyro_free import GyroFreeNavigation
@@ -140,6 +140,8 @@ class Pipeline:
     def on_tacho(self, message: pb.TachoRate) -> list[Output]:
         """A report of the tachometer: table runs of a guided calibration need it."""
         self._desk.tacho(message)
+        if self._settings.tacho_aid and (board := self._boards.get(message.header.device)) is not None:
+            board.tacho(*convert.tacho_report(message))
         return []
 
     def on_accel(self, batch: pb.AccelBatch) -> list[Output]:
@@ -189,12 +191,11 @@ class Pipeline:
 
     def _board(self, device: str) -> RateBoard:
         """Rate estimators of a device, with its calibration card; raises convert.BadMessage for another layout's."""
-        path = self._settings.card_of(device)
-        card = load_card(path) if path is not None else None
-        card = self._desk.used.get(device, card)
-        layout = make_layout(self._settings.layout_of(device))
+        s, path = self._settings, self._settings.card_of(device)
+        card = self._desk.used.get(device, load_card(path) if path is not None else None)
+        layout = make_layout(s.layout_of(device))
         try:
-            return RateBoard(device, layout, self._settings.rate, self._settings.rate_limit_hz, card)
+            return RateBoard(device, layout, s.rate, s.rate_limit_hz, card, beliefs(s))
         except CardError as error:
             raise convert.BadMessage(f"{device}: {error}") from None
 

@@ -46,6 +46,9 @@ class EstimatorSettings(BaseModel):
     attitudes: list[str] = Field(default_factory=lambda: ["vqf", "tilt-vector", "tilt-published"])  # tilt of six axes
     layout: LayoutSettings = LayoutSettings()  # of a device that layouts does not name
     layouts: dict[str, LayoutSettings] = Field(default_factory=dict)  # by device name
+    tacho_aid: bool = False  # correct the rate by the tachometer: then it cannot be scored against it any more
+    tacho_axis_b: tuple[float, float, float] = (0.0, 0.0, 1.0)  # the axis in b that the tachometer's rate is about
+    latitude_deg: float | None = Field(default=None, ge=-90.0, le=90.0)  # given: a standing body turns with the Earth
     calibration: Path | None = None  # calibration card of a device that calibrations does not name
     calibrations: dict[str, Path] = Field(default_factory=dict)  # calibration cards by device name
     cards: Path = Path("var/cards")  # folder that a guided calibration saves its cards to

@@ -39,6 +39,9 @@ def run(
     half_side: Annotated[float, typer.Option(help="Cube logs: centre to face, m.")] = 0.05,
     lsb_mg: Annotated[float | None, typer.Option(help="Cube logs in counts: mg per count.")] = None,
     card: Annotated[Path | None, typer.Option(help="Cube logs: calibration card to apply.")] = None,
+    tacho_aid: Annotated[
+        bool, typer.Option("--tacho-aid", help="Cube logs: correct by the log's tachometer; not scored against it.")
+    ] = False,
     estimators: Filters = "",
     filters: Filters = "",
     imu: Annotated[str, typer.Option(help="Drives: file of inertial samples, in the folder or a path.")] = "imu.csv",
@@ -76,7 +79,7 @@ def run(
 
                 result = run_cube(
                     log, layout=layout, half_side_m=half_side, lsb_mg=lsb_mg, card=card, estimators=names,
-                    plot=plot, progress=progress,
+                    tacho_aid=tacho_aid, plot=plot, progress=progress,
                 )  # fmt: skip
     except (ValueError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None

@@ -16,8 +16,10 @@ from estimator.layouts.catalogue import find
 from estimator.layouts.layout import GeometryError, Layout
 from estimator.offline.cube_axes import examine
 from estimator.offline.cube_log import CubeLog, LogError, read_log
+from estimator.rate.beliefs import make
 from estimator.rate.bound import IN_USE, rate_bound
 from estimator.rate.estimators import ESTIMATORS
+from estimator.rate.tachometer import SUFFIX
 from estimator.settings import EstimatorSettings
 
 Array = NDArray[np.float64]
@@ -27,6 +29,8 @@ SURE = 5.0  # rad/s; an estimate less certain than that says "I do not know yet"
 AT_REST = 2e-3  # rad/s; a truth below it stands for rest
 WARM_SAMPLES = 560  # run on a throw-away estimator, into the first turn, so that no compiler is timed
 SHOW_GAPS = 20
+TACHO_SIGMA = 0.03  # rad/s; a log says neither how well its tachometer measured nor when its pulses came
+REPORT_S = 0.25  # s, between reports of a tachometer that reads the same
 
 
 @dataclass(frozen=True)
@@ -57,6 +61,7 @@ def run_cube(
     lsb_mg: float | None = None,
     card: Path | None = None,
     estimators: list[str] | None = None,
+    tacho_aid: bool = False,
     plot: Path | None = None,
     progress: Progress = nothing,
 ) -> dict[str, Any]:
@@ -71,15 +76,22 @@ def run_cube(
     progress(0.0, "reading")
     data = read_log(log, shape.axis_names, lsb_mg)
     used = read_card(card) if card is not None else None
-    tracks, notes = run_log(data, shape, used, estimators, progress)
+    if tacho_aid and data.tacho is None:
+        raise LogError(f"--tacho-aid: {log} has no column tacho_rad_s")
+    tracks, notes = run_log(data, shape, used, estimators, progress, tacho_aid)
     truth = reference(data)
+    aided = [name for name in tracks if name.endswith(SUFFIX)]
+    if truth.name == "tachometer":
+        notes += [f"{name}: aided by the tachometer that it would be scored against: not scored" for name in aided]
+    elif aided:
+        notes.append(f"{', '.join(aided)}: aided by the tachometer")
     progress(0.95, "bound")
     bound = _bound(data, used.layout(shape) if used is not None else shape, truth)
-    known = [name for name in estimators or ESTIMATORS]
-    default = EstimatorSettings().rate[0]
+    known = list(dict.fromkeys([*tracks, *(n for n in estimators or ESTIMATORS if n + SUFFIX not in tracks)]))
+    default = next((name for name in tracks if name.removesuffix(SUFFIX) == EstimatorSettings().rate[0]), None)
     result = {
         "estimators": {name: score(tracks.get(name), truth, bound) for name in known},
-        "default": default if default in tracks else next(iter(tracks), None),
+        "default": default or next(iter(tracks), None),
         "gaps": {
             "count": len(data.gaps),
             "missing_samples": sum(gap.missing for gap in data.gaps),
@@ -98,7 +110,12 @@ def run_cube(
 
 
 def run_log(
-    data: CubeLog, shape: Layout, card: Card | None, names: Sequence[str] | None, progress: Progress = nothing
+    data: CubeLog,
+    shape: Layout,
+    card: Card | None,
+    names: Sequence[str] | None,
+    progress: Progress = nothing,
+    tacho_aid: bool = False,
 ) -> tuple[dict[str, Track], list[str]]:
     """Tracks of the estimators that can use this layout, and why the others cannot. Raises LogError, CardError."""
     f_axis = data.f_axis * np.array(shape.gain)
@@ -112,10 +129,12 @@ def run_log(
     for k, name in enumerate(chosen):
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # an integral that runs away is a result, too
-                tracks[name] = run_estimator(
+                track = run_estimator(
                     name, data, shape, f_axis,
                     lambda part, k=k, name=name: progress(0.05 + 0.9 * (k + part) / len(chosen), name),
+                    card, tacho_aid,
                 )  # fmt: skip
+            tracks[track.name] = track
         except GeometryError as error:
             notes.append(f"{name}: {error}")
         except np.linalg.LinAlgError:
@@ -124,14 +143,23 @@ def run_log(
 
 
 def run_estimator(
-    name: str, data: CubeLog, shape: Layout, f_axis: Array, progress: Callable[[float], None] = lambda part: None
+    name: str,
+    data: CubeLog,
+    shape: Layout,
+    f_axis: Array,
+    progress: Callable[[float], None] = lambda part: None,
+    card: Card | None = None,
+    tacho_aid: bool = False,
 ) -> Track:
-    """Every sample of a log through one estimator; missing samples are announced to it as on the live path."""
-    make = ESTIMATORS[name]
-    warm = make(shape)
+    """Every sample of a log through one estimator; missing samples are announced to it as on the live path.
+
+    With tacho_aid the name of the track ends in SUFFIX, once the estimator has used the tachometer.
+    """
+    warm = make(ESTIMATORS[name], shape)
     for k in range(min(WARM_SAMPLES, len(data.t_s))):
         warm.step(k, k * data.period_s, f_axis[k])
-    estimator, n = make(shape), len(data.t_s)
+    estimator, n = make(ESTIMATORS[name], shape, card), len(data.t_s)
+    reports, aided = _reports(data) if tacho_aid else {}, False
     omega, P, q, angle = np.zeros((n, 3)), np.zeros((n, 3, 3)), np.zeros((n, 4)), np.zeros(n)
     alpha, force, still, p_n = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n, dtype=bool), np.zeros((n, 3))
     missing = np.diff(data.index, prepend=data.index[0] - 1) - 1
@@ -141,12 +169,26 @@ def run_estimator(
         if missing[k]:
             estimator.skip(int(missing[k]))
         s = estimator.step(int(data.index[k]), float(data.t_s[k]), f_axis[k])
+        if k in reports:
+            estimator.tacho(float(data.t_s[k]), reports[k], TACHO_SIGMA)
         busy += time.thread_time_ns() - started
+        aided = aided or bool(s.aid)
         omega[k], P[k], q[k], angle[k], still[k] = s.omega_b, s.P, s.q_nb, s.angle_z, s.still
         alpha[k], force[k], p_n[k] = s.alpha_b, s.f_b, s.p_n
         if k % 200 == 0:
             progress(k / n)
-    return Track(name, omega, P, q, angle, alpha, force, still, p_n, busy / n / 1000.0)
+    called = name + SUFFIX if aided else name
+    return Track(called, omega, P, q, angle, alpha, force, still, p_n, busy / n / 1000.0)
+
+
+def _reports(data: CubeLog) -> dict[int, float]:
+    """The tachometer's column as reports, by row: its rate, rad/s, when it changes, and every quarter of a second."""
+    found, last = {}, 0
+    for k in range(1, len(data.t_s)):
+        rate = float(data.tacho[k])
+        if np.isfinite(rate) and (rate != data.tacho[k - 1] or data.t_s[k] - data.t_s[last] >= REPORT_S):
+            found[k], last = rate, k
+    return found
 
 
 @dataclass(frozen=True)
@@ -175,11 +217,12 @@ def score(track: Track | None, truth: Reference, bound: Array | None) -> dict[st
     if track is None:
         nothing_known = dict.fromkeys(("rate_rms_radps", "angle_error_final_rad", "bound_rate_rms_radps"))
         return {**nothing_known, "nees_mean": None, "us_per_sample": None}
-    error = track.omega_b - truth.omega_b
+    circular = track.name.endswith(SUFFIX) and truth.name == "tachometer"
+    error = track.omega_b - truth.omega_b + (np.nan if circular else 0.0)
     rms = np.sqrt(np.mean(error**2, axis=0))
     return {
         "rate_rms_radps": [_known(value) for value in rms],
-        "angle_error_final_rad": _known(abs(track.angle_z[-1] - truth.angle_z[-1])),
+        "angle_error_final_rad": None if circular else _known(abs(track.angle_z[-1] - truth.angle_z[-1])),
         "bound_rate_rms_radps": [None] * 3 if bound is None else [_known(value) for value in bound],
         "nees_mean": nees_mean(error, track.P),
         "us_per_sample": track.us_per_sample,

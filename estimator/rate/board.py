@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.layouts.layout import GeometryError
+from estimator.rate.beliefs import Beliefs, make
 from estimator.stream import Stream, every, worth_a_line
 
 log = logging.getLogger(__name__)
@@ -32,7 +33,13 @@ class RateBoard:
     """Feeds batches to every estimator; tells them of gaps, starts them anew after a reboot."""
 
     def __init__(
-        self, device: str, layout: Any, names: list[str], rate_limit_hz: float, card: Any | None = None
+        self,
+        device: str,
+        layout: Any,
+        names: list[str],
+        rate_limit_hz: float,
+        card: Any | None = None,
+        beliefs: Beliefs = Beliefs(),
     ) -> None:
         """Names are keys of estimator.rate.estimators.VARIANTS; card: calibration card of the device, or None.
 
@@ -41,7 +48,7 @@ class RateBoard:
         from estimator.rate.estimators import VARIANTS  # here: loads only where accelerometers are
 
         self.device = device
-        self.card = card
+        self.card, self._beliefs = card, beliefs
         self.wiring = layout  # which column of the board is which axis
         self.layout = layout if card is None else card.layout(layout)
         self.stream = Stream()
@@ -61,7 +68,9 @@ class RateBoard:
 
         if reason:
             log.warning("%s: %s: rate estimators start anew", self.device, reason)
-        self._estimators = {name: make(self.layout) for name, make in self._make.items()}
+        self._estimators = {
+            name: make(kind, self.layout, self.card, self._beliefs) for name, kind in self._make.items()
+        }
         self.health, self._mask = HealthMonitor(self.layout, self._period_s), 0
 
     def feed(
@@ -110,6 +119,11 @@ class RateBoard:
                 if index % step == step - 1:
                     out.append(RateOutput(row, index, name, state))
         return out
+
+    def tacho(self, t_s: float, rate: float, sigma: float, signed: bool) -> None:
+        """A tachometer's report to all estimators (RateEstimator.tacho)."""
+        for estimator in self._estimators.values():
+            estimator.tacho(t_s, rate, sigma, signed)
 
     def cost_us(self, name: str) -> float:
         """Time of one sample in this estimator, us, since it was last asked for."""

@@ -4,6 +4,7 @@ ESTIMATORS maps a name to a class that is made of a layout and has `step` and `s
 samples give the same bits. Frames and units as everywhere: b body, n north-east-down, SI, quaternions w x y z.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.layouts.layout import Layout
-from estimator.rate import bound, least_squares, products_ekf, products_kernel, sight
+from estimator.rate import bound, least_squares, products_ekf, products_kernel, sight, tachometer
 from estimator.rate import products_run as frame
 from estimator.rate.direct import Direct
 from estimator.rate.field import checked
@@ -44,6 +45,7 @@ class RateState:
     bound_sigma: Array | None = None  # rad/s, (3,), posterior Cramer-Rao bound along the estimate
     excluded: int = 0  # bit k: axis k was not used
     calibration: str = ""  # id of the calibration card that the readings were corrected by
+    aid: str = ""  # "tachometer" once omega was corrected by it; not to be scored against it
 
 
 class RateEstimator(Protocol):
@@ -60,6 +62,13 @@ class RateEstimator(Protocol):
 
     def skip(self, n: int) -> None:
         """n samples are missing before the next one."""
+        ...
+
+    def tacho(self, t_s: float, rate: float, sigma: float, signed: bool = True) -> None:
+        """A tachometer's rate (rad/s, with its sigma) up to its newest pulse at t_s (s, the clock of the samples).
+
+        Without `signed`, rate is a size. Estimators that take no aid ignore it. Raises ValueError for no number.
+        """
         ...
 
     def exclude(self, mask: int) -> None:
@@ -144,6 +153,9 @@ class LeastSquaresRate:
         """See RateEstimator.skip; the next step integrates over the gap with omega' linear across it."""
         self._core.gap()
 
+    def tacho(self, t_s: float, rate: float, sigma: float, signed: bool = True) -> None:
+        """See RateEstimator.tacho: no aid."""
+
     def exclude(self, mask: int) -> None:
         """See RateEstimator.exclude."""
         self._core.exclude(mask)
@@ -155,22 +167,25 @@ class ProductsRate:
     name = "products-ekf"
     method = "ekf"
     with_bound = True  # follow the Cramer-Rao bound along the estimate, by step()
+    default = products_ekf.Config()
 
-    def __init__(
-        self, layout: Layout, config: products_ekf.Config = products_ekf.Config(), calibration: str = ""
-    ) -> None:
+    def __init__(self, layout: Layout, config: products_ekf.Config | None = None, calibration: str = "") -> None:
         """Raises GeometryError when the layout does not see angular acceleration and specific force."""
+        config = config or self.default
         self.core = products_ekf.ProductsFilter(layout, config, self.method)
         self.calibration = calibration
         self._clock = _Clock()
         self._bound = bound.Along(layout) if self.with_bound else None
         self._unseen = config.unseen_rate**2 * np.eye(3)
+        self._reports, self._axis_b, self._aid = tachometer.Reports(), np.array([0.0, 0.0, 1.0]), ""
 
     def step(self, index: int, t_s: float, f_axis: Array) -> RateState:
         """See RateEstimator.step."""
         core = self.core
         f_axis = checked(core.layout, f_axis)
         self._clock.advance(t_s)
+        if self._reports:
+            self._take_reports()
         core._time[0], core._row[0] = t_s, f_axis
         _run(core.memory, core.watch, core.sensor, core.tuning, core.limits, core._time, core._row, core.now)
         return self._state()
@@ -182,6 +197,23 @@ class ProductsRate:
     def exclude(self, mask: int) -> None:
         """See RateEstimator.exclude."""
         self.core.exclude(mask)
+
+    def tacho_axis(self, axis_b: Sequence[float]) -> None:
+        """Axis in b that tachometer rates are about, any length. Raises ValueError for no direction."""
+        axis = np.array(axis_b, dtype=np.float64)
+        if axis.shape != (3,) or not np.linalg.norm(axis) > 0.0:
+            raise ValueError(f"axis of the tachometer {axis_b}: want three numbers that are not all zero")
+        self._axis_b = axis / np.linalg.norm(axis)
+
+    def tacho(self, t_s: float, rate: float, sigma: float, signed: bool = True) -> None:
+        """See RateEstimator.tacho; it is used with the first step after a sample of its time."""
+        self._reports.add(t_s, rate, sigma, signed)
+
+    def _take_reports(self) -> None:
+        core = self.core
+        for report in self._reports.due(float(core.memory["clock"][frame.LAST_S])):
+            if tachometer.correct(core.memory, core.watch, core.sensor, self._axis_b, report):
+                self._aid = tachometer.NAME
 
     def run_batch(self, t_s: Array, f_axis: Array) -> products_ekf.Track:
         """All samples at once: times (n,) s, growing, readings (n, N) m/s^2; the same bits as step() gives one by one.
@@ -225,12 +257,13 @@ class ProductsRate:
             p_n=x[products_kernel.P_N : products_kernel.P_N + 3].copy(),
             v_n=x[products_kernel.V_N : products_kernel.V_N + 3].copy(),
             bias=np.concatenate([x[3:6], x[15:18], x[6:12]]),
-            phase=core.phase,
+            phase=f"{core.phase}, aided by the tachometer" if self._aid else core.phase,
             innovation_unit="(rad/s)^2",
             sight=sights,
             sight_reason=reason,
             excluded=core.excluded,
             calibration=self.calibration,
+            aid=self._aid,
             bound_sigma=None if self._bound is None else self._bound.sigma,
         )
 
@@ -241,15 +274,7 @@ class UnscentedRate(ProductsRate):
     name = "products-ukf"
     method = "ukf"
     with_bound = False
-
-    def __init__(
-        self,
-        layout: Layout,
-        config: products_ekf.Config = products_ekf.Config(fixed_axis=False),  # its points do not follow a turning axis
-        calibration: str = "",
-    ) -> None:
-        """Raises GeometryError when the layout does not see angular acceleration and specific force."""
-        super().__init__(layout, config, calibration)
+    default = products_ekf.Config(fixed_axis=False)  # its points do not follow a turning axis
 
 
 class RecursiveLeastSquaresRate(ProductsRate):
@@ -273,15 +298,7 @@ class FreeBodyRate(ProductsRate):
 
     name = "products-free"
     with_bound = False
-
-    def __init__(
-        self,
-        layout: Layout,
-        config: products_ekf.Config = products_ekf.Config(fixed_axis=False, gravity_aid=False),
-        calibration: str = "",
-    ) -> None:
-        """Raises GeometryError when the layout does not see angular acceleration and specific force."""
-        super().__init__(layout, config, calibration)
+    default = products_ekf.Config(fixed_axis=False, gravity_aid=False)
 
 
 ESTIMATORS: dict[str, Any] = {
