@@ -17,7 +17,15 @@ MAY_IMPORT = {
     "gyrofree": {"firmware_protocol", "emulator", "messages", "gateway", "estimator", "sessions", "dashboard"},
 }
 # The pure part of estimator/ is a plain numpy library; these are its shell.
-ESTIMATOR_SHELL = {"service.py", "live.py", "convert.py", "mute_orders.py", "orders.py", "wiring_orders.py", "settings.py"}
+ESTIMATOR_SHELL = {
+    "service.py",
+    "live.py",
+    "convert.py",
+    "mute_orders.py",
+    "orders.py",
+    "wiring_orders.py",
+    "settings.py",
+}
 
 
 def imported(path: Path) -> set[str]:
