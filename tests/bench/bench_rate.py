@@ -155,7 +155,7 @@ def main() -> None:
             for case in PUBLISHED:
                 print(json.dumps({"bench": "rate", "case": case, "estimator": name, "seeds": few}
                                  | figures(name, case, few)), flush=True)  # fmt: skip
-    for profile in PUBLISHED:
+    for profile in (*PUBLISHED, "slow"):
         print(json.dumps({"bench": "rate-bound", "case": profile, "seeds": seeds}
                          | against_bound(profile, seeds, pictures)), flush=True)  # fmt: skip
 
