@@ -5,7 +5,7 @@ samples give the same bits. Frames and units as everywhere: b body, n north-east
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,6 +16,7 @@ from estimator.rate import bound, least_squares, products_ekf, products_kernel, 
 from estimator.rate import products_run as frame
 from estimator.rate.direct import Direct
 from estimator.rate.field import checked
+from estimator.rate.observed import sensor
 
 Array = NDArray[np.float64]
 
@@ -172,6 +173,9 @@ class ProductsRate:
     def __init__(self, layout: Layout, config: products_ekf.Config | None = None, calibration: str = "") -> None:
         """Raises GeometryError when the layout does not see angular acceleration and specific force."""
         config = config or self.default
+        if sensor(layout, config.still.sigma_axis)["feedback"]:
+            # the feedback S Q z acts across the axis: held to an axis, P grows by what is not integrated
+            config = replace(config, fixed_axis=False)
         self.core = products_ekf.ProductsFilter(layout, config, self.method)
         self.calibration = calibration
         self._clock = _Clock()
