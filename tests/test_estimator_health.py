@@ -209,8 +209,8 @@ class Told:
     def __init__(self, layout) -> None:
         self.masks = []
 
-    def step(self, index, t_s, f_axis):
-        return None
+    def feed(self, t_s, f_axis, wanted):
+        return [None] * len(wanted)
 
     def skip(self, n) -> None: ...
 

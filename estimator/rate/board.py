@@ -105,20 +105,32 @@ class RateBoard:
         if self._last_t is not None and not t_s[0] > self._last_t:
             self._start(f"board clock went from {self._last_t:.6f} s to {t_s[0]:.6f} s")
         self._last_t = float(t_s[-1])
-        step = every(period_s, self._limit)
-        out = []
-        for row in range(len(t_s)):
-            index = first_index + row
-            self.health.step(float(t_s[row]), f_axis[row], stale)
-            self._exclude(self.health.mask)
-            for name, estimator in self._estimators.items():
-                began = time.perf_counter_ns()  # told by EstimatorStatus, touches no estimate
-                state = self.last[name] = estimator.step(index, float(t_s[row]), f_axis[row])
-                self.cost_ns[name] += time.perf_counter_ns() - began
-                self.cost_samples[name] += 1
-                if index % step == step - 1:
-                    out.append(RateOutput(row, index, name, state))
+        f_axis = np.ascontiguousarray(f_axis, dtype=np.float64)
+        out, begin = [], 0
+        for end, mask in self.health.feed(t_s, f_axis, stale):
+            self._exclude(mask)
+            out += self._run(first_index, begin, t_s[begin:end], f_axis[begin:end], every(period_s, self._limit))
+            begin = end
         return out
+
+    def _run(self, first_index: int, begin: int, t_s: Array, f_axis: Array, step: int) -> list[RateOutput]:
+        """Every estimator over one part of a batch; outputs sample by sample, as if fed so."""
+        n, first = len(t_s), first_index + begin
+        wanted = list(range((step - 1 - first) % step, n, step))
+        asked = wanted if wanted and wanted[-1] == n - 1 else [*wanted, n - 1]  # the newest state is always known
+        by_name = []
+        for name, estimator in self._estimators.items():
+            began = time.perf_counter_ns()  # told by EstimatorStatus, touches no estimate
+            states = estimator.feed(t_s, f_axis, asked)
+            self.last[name] = states[-1]
+            self.cost_ns[name] += time.perf_counter_ns() - began
+            self.cost_samples[name] += n
+            by_name.append((name, states))
+        return [
+            RateOutput(begin + row, first + row, name, states[k])
+            for k, row in enumerate(wanted)
+            for name, states in by_name
+        ]
 
     def tacho(self, t_s: float, rate: float, sigma: float, signed: bool) -> None:
         """A tachometer's report to all estimators (RateEstimator.tacho)."""

@@ -1,29 +1,29 @@
 """The one door to all gyro-free rate estimators: samples in, RateState out.
 
-ESTIMATORS maps a name to a class that is made of a layout and has `step` and `skip`. Deterministic: the same
+ESTIMATORS maps a name to a class that is made of a layout and has `feed`, `step` and `skip`. Deterministic: the same
 samples give the same bits. Frames and units as everywhere: b body, n north-east-down, SI, quaternions w x y z.
 """
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimator.layouts.layout import Layout
-from estimator.rate import bound, least_squares, products_ekf, products_kernel, sight, tachometer
+from estimator.rate import bound, least_squares, products_ekf, sight, tachometer
 from estimator.rate import products_run as frame
-from estimator.rate.direct import Direct
-from estimator.rate.field import checked
-from estimator.rate.observed import sensor
+from estimator.rate import products_track as track
+from estimator.rate.samples import Samples
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # not frozen: that would cost as much as the filter
 class RateState:
-    """Rotation and motion by one estimator, at one sample."""
+    """Rotation and motion by one estimator, at one sample. Arrays are parts of one row: read them, do not write."""
 
     omega_b: Array  # rad/s, (3,), of b against inertial
     P: Array  # (rad/s)^2, (3, 3), covariance of omega_b
@@ -54,6 +54,13 @@ class RateEstimator(Protocol):
 
     name: str
 
+    def feed(self, t_s: Array, f_axis: Array, wanted: Sequence[int]) -> list[RateState]:
+        """Take samples read at t_s (n,), s, of the board's clock: readings (n, N), m/s^2; states after `wanted` rows.
+
+        The same bits as step() one by one. Raises ValueError as step() does, and then takes none of them.
+        """
+        ...
+
     def step(self, index: int, t_s: float, f_axis: Array) -> RateState:
         """Take sample `index`, read at t_s (s, the board's clock): axis readings (N,), m/s^2.
 
@@ -80,31 +87,25 @@ class RateEstimator(Protocol):
         ...
 
 
-_run = Direct(products_ekf.run)
-
 EMPTY = np.zeros(0)
 EMPTY.setflags(write=False)
+KEEP_STILL, WAITING = "finding biases: keep still", "no standstill yet: keep still"
+TWO_SIGNS = "turning, sign of the rate unknown"
 
 
-class _Clock:
-    """Time between samples; knows the period to bridge gaps."""
+class _Stepping:
+    """One sample as a batch of one: the same compiled loop, so the same bits."""
 
-    def __init__(self) -> None:
-        self.last_s: float | None = None
-        self.skipped = 0
+    def feed(self, t_s: Array, f_axis: Array, wanted: Sequence[int]) -> list[RateState]:
+        """See RateEstimator.feed."""
+        raise NotImplementedError
 
-    def advance(self, t_s: float) -> float | None:
-        """dt to t_s; None at the first sample. Time that stands or goes back raises ValueError."""
-        last, self.last_s = self.last_s, t_s
-        if last is None:
-            return None
-        if not t_s > last:
-            self.last_s = last
-            raise ValueError(f"sample at {t_s:.6f} s after one at {last:.6f} s: time must grow; start a new estimator")
-        return t_s - last
+    def step(self, index: int, t_s: float, f_axis: Array) -> RateState:
+        """See RateEstimator.step."""
+        return self.feed(np.array([t_s]), np.asarray(f_axis)[None], (0,))[0]
 
 
-class LeastSquaresRate:
+class LeastSquaresRate(_Stepping):
     """Estimator "least-squares": the paper's equations and Runge-Kutta (least_squares.py)."""
 
     name = "least-squares"
@@ -115,38 +116,39 @@ class LeastSquaresRate:
         """Raises GeometryError when the layout cannot see angular acceleration and specific force."""
         self.calibration = calibration
         self._core = least_squares.LeastSquares(layout, config)
-        self._clock = _Clock()
+        self._taken = Samples()
 
-    def step(self, index: int, t_s: float, f_axis: Array) -> RateState:
-        """See RateEstimator.step."""
-        core = self._core
-        f_axis = checked(core.layout, f_axis)
-        self._clock.advance(t_s)
-        core.step(t_s, f_axis)
-        m = core.memory
-        y, x, P = m["y"], m["x"], m["P"].copy()
-        waiting, spread = m["marks"][least_squares.SAMPLES] == 0, float(np.sqrt(P.diagonal().max()))
-        blind = spread > sight.BLIND_SIGMA and m["clock"][least_squares.MOVING_S] > 0.0
+    def feed(self, t_s: Array, f_axis: Array, wanted: Sequence[int]) -> list[RateState]:
+        """See RateEstimator.feed."""
+        rows = self._core.rows(*self._taken.take(self._core.layout, t_s, f_axis))
+        return [self._state(rows[k]) for k in wanted]
+
+    def _state(self, row: Array) -> RateState:
+        samples, still, moving_s = row[least_squares.ROW_SAMPLES :].tolist()
+        y, x = row[: least_squares.ROW_P], row[least_squares.ROW_X : least_squares.ROW_BIAS]
+        P, waiting = row[least_squares.ROW_P : least_squares.ROW_X].reshape(3, 3), samples == 0.0
+        spread = math.sqrt(max(row[least_squares.ROW_P : least_squares.ROW_X : 4].tolist()))
+        blind = moving_s > 0.0 and spread > sight.BLIND_SIGMA
         reason = f"integration only, now {spread * sight.DEG:.0f} deg/s uncertain" if blind else ""
         return RateState(
-            omega_b=y[least_squares.OMEGA].copy(),
+            omega_b=y[least_squares.OMEGA],
             P=P,
-            alpha_b=x[:3].copy(),
-            f_b=x[3:].copy(),
-            q_nb=y[least_squares.Q_NB].copy(),
+            alpha_b=x[:3],
+            f_b=x[3:],
+            q_nb=y[least_squares.Q_NB],
             angle_z=float(y[least_squares.ANGLE]),
             innovation=EMPTY,
             innovation_sigma=EMPTY,
             nis=0.0,
             nis_dof=0,
-            still=bool(m["marks"][least_squares.STILL]),
-            p_n=y[least_squares.P_N].copy(),
-            v_n=y[least_squares.V_N].copy(),
-            bias=m["bias"].copy(),
-            phase=core.phase,
-            sight=(sight.BLIND,) * 3 if blind or waiting else (sight.VALID,) * 3,
-            sight_reason="no standstill yet: keep still" if waiting else reason,
-            excluded=core.excluded,
+            still=still > 0.0,
+            p_n=y[least_squares.P_N],
+            v_n=y[least_squares.V_N],
+            bias=row[least_squares.ROW_BIAS : least_squares.ROW_SAMPLES],
+            phase=KEEP_STILL if waiting else "still at the start" if moving_s == 0.0 else "integrating",
+            sight=sight.ALL_BLIND if blind or waiting else sight.ALL_VALID,
+            sight_reason=WAITING if waiting else reason,
+            excluded=self._core.excluded,
             calibration=self.calibration,
         )
 
@@ -162,37 +164,38 @@ class LeastSquaresRate:
         self._core.exclude(mask)
 
 
-class ProductsRate:
+class ProductsRate(_Stepping):
     """Estimator "products-ekf": Kalman filter on the six products (products_ekf.py)."""
 
     name = "products-ekf"
     method = "ekf"
-    with_bound = True  # follow the Cramer-Rao bound along the estimate, by step()
+    with_bound = True  # follow the Cramer-Rao bound along the estimate, live
     default = products_ekf.Config()
 
     def __init__(self, layout: Layout, config: products_ekf.Config | None = None, calibration: str = "") -> None:
         """Raises GeometryError when the layout does not see angular acceleration and specific force."""
         config = config or self.default
-        if sensor(layout, config.still.sigma_axis)["feedback"]:
-            # the feedback S Q z acts across the axis: held to an axis, P grows by what is not integrated
-            config = replace(config, fixed_axis=False)
         self.core = products_ekf.ProductsFilter(layout, config, self.method)
         self.calibration = calibration
-        self._clock = _Clock()
+        self._taken = Samples()
         self._bound = bound.Along(layout) if self.with_bound else None
         self._unseen = config.unseen_rate**2 * np.eye(3)
+        self._m = int(self.core.sensor["m"])
         self._reports, self._axis_b, self._aid = tachometer.Reports(), np.array([0.0, 0.0, 1.0]), ""
 
-    def step(self, index: int, t_s: float, f_axis: Array) -> RateState:
-        """See RateEstimator.step."""
-        core = self.core
-        f_axis = checked(core.layout, f_axis)
-        self._clock.advance(t_s)
-        if self._reports:
-            self._take_reports()
-        core._time[0], core._row[0] = t_s, f_axis
-        _run(core.memory, core.watch, core.sensor, core.tuning, core.limits, core._time, core._row, core.now)
-        return self._state()
+    def feed(self, t_s: Array, f_axis: Array, wanted: Sequence[int]) -> list[RateState]:
+        """See RateEstimator.feed."""
+        t_s, f_axis = self._taken.take(self.core.layout, t_s, f_axis)
+        parts, aids, row = [], [], 0
+        while row < len(t_s):
+            if self._reports:
+                self._take_reports()
+            end = row + 1 if self._reports else len(t_s)  # while a report waits, its time may come with any sample
+            parts.append(self.core.rows(t_s[row:end], f_axis[row:end], self._bound))
+            aids += [self._aid] * (end - row)
+            row = end
+        rows = parts[0] if len(parts) == 1 else np.concatenate(parts)
+        return [self._state(rows[k], aids[k]) for k in wanted]
 
     def skip(self, n: int) -> None:
         """See RateEstimator.skip; the next step predicts across the gap."""
@@ -201,6 +204,7 @@ class ProductsRate:
     def exclude(self, mask: int) -> None:
         """See RateEstimator.exclude."""
         self.core.exclude(mask)
+        self._m = int(self.core.sensor["m"])
 
     def tacho_axis(self, axis_b: Sequence[float]) -> None:
         """Axis in b that tachometer rates are about, any length. Raises ValueError for no direction."""
@@ -210,7 +214,7 @@ class ProductsRate:
         self._axis_b = axis / np.linalg.norm(axis)
 
     def tacho(self, t_s: float, rate: float, sigma: float, signed: bool = True) -> None:
-        """See RateEstimator.tacho; it is used with the first step after a sample of its time."""
+        """See RateEstimator.tacho; it is used before the first sample after one of its time."""
         self._reports.add(t_s, rate, sigma, signed)
 
     def _take_reports(self) -> None:
@@ -219,7 +223,7 @@ class ProductsRate:
             if tachometer.correct(core.memory, core.watch, core.sensor, self._axis_b, report):
                 self._aid = tachometer.NAME
 
-    def run_batch(self, t_s: Array, f_axis: Array) -> products_ekf.Track:
+    def run_batch(self, t_s: Array, f_axis: Array) -> track.Track:
         """All samples at once: times (n,) s, growing, readings (n, N) m/s^2; the same bits as step() gives one by one.
 
         Raises ValueError for readings that are not finite or times that do not grow.
@@ -231,44 +235,40 @@ class ProductsRate:
         """Corrections not used because their NIS was beyond its gate: by the products, by gravity ("force")."""
         return self.core.refused
 
-    def _state(self) -> RateState:
-        core, track = self.core, self.core.now
-        x = core.memory["core"]
-        started, still = bool(track.started[0]), bool(track.still[0])
-        if self._bound is not None and started:
-            dt = float(core.memory["clock"][frame.DT])
-            self._bound.step(track.omega_b[0], track.alpha_b[0], track.q_nb[0], still, dt)
-        m = int(core.sensor["m"])
-        P = track.P[0] + self._unseen if still and started else track.P[0].copy()
-        sights, reason = (sight.BLIND,) * 3, "no standstill yet: keep still"
+    def _state(self, row: Array, aid: str) -> RateState:
+        still, started, two, sign = row[track.STILL : track.SIGN + 1].tolist()
+        angle, nis = row[track.ANGLE : track.NIS + 1].tolist()
+        P = row[track.P : track.P + 9].reshape(3, 3)
+        sights, reason = sight.ALL_BLIND, WAITING
         if started:
-            two, sign = int(core.memory["marks"][frame.BRANCHES]) == 2, float(x[products_kernel.SIGN])
-            dt = float(core.memory["clock"][frame.DT])
-            sights, reason = sight.judge(track.omega_b[0], track.P[0], sign, still, two, core.sensor, dt)
-        corrected = started and m > 0 and track.nis[0] != 0.0
+            sights, reason = tuple(map(int, row[track.SIGHT : track.SIGHT + 3].tolist())), ""
+            if sights != sight.ALL_VALID:
+                reason = sight.reason(sights, row[track.P : track.P + 9 : 4], sign, two > 0.0)
+        m = self._m if started and nis != 0.0 else 0
+        phase = KEEP_STILL if not started else TWO_SIGNS if two else "still" if still else "turning"
         return RateState(
-            omega_b=track.omega_b[0].copy(),
-            P=P,
-            alpha_b=track.alpha_b[0].copy(),
-            f_b=track.f_b[0].copy(),
-            q_nb=track.q_nb[0].copy(),
-            angle_z=float(track.angle_z[0]),
-            innovation=track.innovation[0, :m].copy() if corrected else EMPTY,
-            innovation_sigma=track.innovation_sigma[0, :m].copy() if corrected else EMPTY,
-            nis=float(track.nis[0]) if corrected else 0.0,
-            nis_dof=m if corrected else 0,
-            still=still,
-            p_n=x[products_kernel.P_N : products_kernel.P_N + 3].copy(),
-            v_n=x[products_kernel.V_N : products_kernel.V_N + 3].copy(),
-            bias=np.concatenate([x[3:6], x[15:18], x[6:12]]),
-            phase=f"{core.phase}, aided by the tachometer" if self._aid else core.phase,
+            omega_b=row[track.OMEGA : track.OMEGA + 3],
+            P=P + self._unseen if still and started else P,
+            alpha_b=row[track.ALPHA : track.ALPHA + 3],
+            f_b=row[track.F : track.F + 3],
+            q_nb=row[track.Q_NB : track.Q_NB + 4],
+            angle_z=angle,
+            innovation=row[track.INNOVATION : track.INNOVATION + m],
+            innovation_sigma=row[track.SIGMA : track.SIGMA + m],
+            nis=nis if m else 0.0,
+            nis_dof=m,
+            still=still > 0.0,
+            p_n=row[track.P_N : track.P_N + 3],
+            v_n=row[track.V_N : track.V_N + 3],
+            bias=row[track.BIAS : track.BIAS + 12],
+            phase=f"{phase}, aided by the tachometer" if aid else phase,
             innovation_unit="(rad/s)^2",
             sight=sights,
             sight_reason=reason,
-            excluded=core.excluded,
+            excluded=self.core.excluded,
             calibration=self.calibration,
-            aid=self._aid,
-            bound_sigma=None if self._bound is None else self._bound.sigma,
+            aid=aid,
+            bound_sigma=row[track.BOUND : track.BOUND + 3] if row[track.BOUND] > 0.0 else None,
         )
 
 

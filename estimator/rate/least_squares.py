@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from estimator.attitude.rotation import to_dcm
 from estimator.layouts.layout import Layout
 from estimator.rate import still as stillness
+from estimator.rate.direct import Direct
 from estimator.rate.observed import Sensor, sensor
 from estimator.rate.products_run import _level as level
 from estimator.rate.still import COUNT, DEPTH, LEARNING, Limits, Watch
@@ -184,6 +185,27 @@ def advance(m: Memory, w: Watch, s: Sensor, c: Limits, shortest: int, longest_s:
     _publish(m, w, s)
 
 
+# columns of a row, in the order of the memory
+ROW_P, ROW_X, ROW_BIAS, ROW_SAMPLES, ROW_STILL, ROW_MOVING_S, WIDTH = 14, 23, 29, 35, 36, 37, 38
+
+
+@njit(cache=True, error_model="numpy")
+def run(m: Memory, w: Watch, s: Sensor, c: Limits, shortest: int, longest_s: float, times: Array, samples: Array,
+        rows: Array) -> None:  # fmt: skip
+    """advance() over samples (n, N) at times (n,), s; rows (n, WIDTH) become the state after each."""
+    for k in range(len(times)):
+        advance(m, w, s, c, shortest, longest_s, times[k], samples[k])
+        row = rows[k]
+        row[:ROW_P], row[ROW_X:ROW_BIAS], row[ROW_BIAS:ROW_SAMPLES] = m.y, m.x, m.bias
+        for i in range(3):
+            for j in range(3):
+                row[ROW_P + 3 * i + j] = m.P[i, j]
+        row[ROW_SAMPLES], row[ROW_STILL], row[ROW_MOVING_S] = m.marks[SAMPLES], m.marks[STILL], m.clock[MOVING_S]
+
+
+_run = Direct(run)
+
+
 class LeastSquares:
     """Memory and constants of the estimator for one layout."""
 
@@ -195,17 +217,12 @@ class LeastSquares:
         self.memory, self.watch = memory(), stillness.memory()
         self.excluded = 0
 
-    @property
-    def phase(self) -> str:
-        """For people: what it is doing."""
-        if self.memory.marks[SAMPLES] == 0:
-            return "finding biases: keep still"
-        return "still at the start" if self.memory.clock[MOVING_S] == 0.0 else "integrating"
-
-    def step(self, t_s: float, f_axis: Array) -> None:
-        """One sample (N,), m/s^2, at t_s (s), both checked. A long silence starts anew."""
-        c = self.config
-        advance(self.memory, self.watch, self.sensor, self.limits, c.shortest_standstill, c.longest_step_s, t_s, f_axis)
+    def rows(self, t_s: Array, f_axis: Array) -> Array:
+        """Samples (n, N), m/s^2, at t_s (n,), s, both checked: a row after each. A long silence starts anew."""
+        c, out = self.config, np.empty((len(t_s), WIDTH))
+        least, longest = c.shortest_standstill, c.longest_step_s
+        _run(self.memory, self.watch, self.sensor, self.limits, least, longest, t_s, f_axis, out)
+        return out
 
     def gap(self) -> None:
         """Samples are missing: the next step integrates across, with omega' linear in between."""

@@ -7,19 +7,22 @@ Model: products_model.py (E-30 to E-39). What one sample does is compiled: produ
 """
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from estimator.layouts.layout import Layout
+from estimator.rate import bound_live
 from estimator.rate import products_kernel as kernel
 from estimator.rate import products_run as frame
+from estimator.rate import products_track as track
 from estimator.rate import still as stillness
-from estimator.rate.observed import Sensor, carry_biases, sensor
+from estimator.rate.bound import IN_USE, Along
+from estimator.rate.direct import Direct
+from estimator.rate.observed import carry_biases, sensor
 from estimator.rate.products_kernel import PP, Tuning
-from estimator.rate.products_model import BIASES, STATES, TURNED
+from estimator.rate.products_model import BIASES, STATES
+from estimator.rate.products_track import Track
 
 Array = NDArray[np.float64]
 
@@ -76,51 +79,8 @@ def tuning(config: Config, method: str = "ekf") -> Tuning:
     return out
 
 
-class Track(NamedTuple):
-    """States after each of n samples, as the live steps give them."""
-
-    omega_b: Array  # (n, 3) rad/s
-    P: Array  # (n, 3, 3) (rad/s)^2
-    alpha_b: Array  # (n, 3) rad/s^2
-    f_b: Array  # (n, 3) m/s^2
-    q_nb: Array  # (n, 4)
-    angle_z: Array  # (n,) rad
-    nis: Array  # (n,); 0 without correction
-    innovation: Array  # (n, 6)
-    innovation_sigma: Array  # (n, 6)
-    still: NDArray[np.bool_]  # (n,)
-    started: NDArray[np.bool_]  # (n,)
-
-
-@njit(cache=True, error_model="numpy")
-def run(m: frame.Memory, w: stillness.Watch, s: Sensor, t: Tuning, c: stillness.Limits, times: Array, rows: Array,
-        track: Track) -> None:  # fmt: skip
-    """advance() over all samples."""
-    for k in range(len(times)):
-        frame.advance(m, w, s, t, c, times[k], rows[k])
-        core, y = m.core, w.y[(w.n[stillness.COUNT] - 1) % stillness.DEPTH]
-        started, still = m.marks[frame.STARTED] == 1, m.marks[frame.STILL] == 1
-        for i in range(3):
-            track.omega_b[k, i] = core[i]
-            track.alpha_b[k, i] = y[i] - core[3 + i]
-            track.f_b[k, i] = y[9 + i] - core[15 + i]
-            for j in range(3):
-                track.P[k, i, j] = core[STATES + STATES * i + j]
-            if not started:
-                track.P[k, i, i] = frame.UNKNOWN_RATE**2
-        track.q_nb[k] = core[kernel.Q_NB : kernel.Q_NB + 4]
-        track.angle_z[k] = core[TURNED]
-        track.nis[k] = m.out[kernel.NIS]
-        track.innovation[k] = m.out[kernel.INNOVATION : kernel.INNOVATION + 6]
-        track.innovation_sigma[k] = m.out[kernel.SIGMA : kernel.SIGMA + 6]
-        track.still[k], track.started[k] = still, started
-
-
-def new_track(n: int) -> Track:
-    """Room for n samples."""
-    return Track(np.zeros((n, 3)), np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 4)),
-                 np.zeros(n), np.zeros(n), np.zeros((n, 6)), np.zeros((n, 6)), np.zeros(n, dtype=np.bool_),
-                 np.zeros(n, dtype=np.bool_))  # fmt: skip
+_run = Direct(track.run)
+_UNBOUND = bound_live.memory(IN_USE)  # what a run takes that follows no bound
 
 
 class ProductsFilter:
@@ -134,8 +94,6 @@ class ProductsFilter:
         self.limits = stillness.limits(config.still)
         self.memory, self.watch = frame.memory(), stillness.memory()
         self.excluded = 0
-        self.now = new_track(1)  # after the last step
-        self._time, self._row = np.zeros(1), np.zeros((1, layout.axes))
 
     @property
     def refused(self) -> dict[str, int]:
@@ -143,35 +101,28 @@ class ProductsFilter:
         marks = self.memory.marks
         return {"products": int(marks[frame.REFUSED]), "force": int(marks[frame.REFUSED_FORCE])}
 
-    @property
-    def phase(self) -> str:
-        """For people: what it is doing."""
-        marks = self.memory.marks
-        if not marks[frame.STARTED]:
-            return "finding biases: keep still"
-        if marks[frame.BRANCHES] == 2:
-            return "turning, sign of the rate unknown"
-        return "still" if marks[frame.STILL] else "turning"
+    def rows(self, t_s: Array, f_axis: Array, bound: Along | None = None) -> Array:
+        """Samples (n, N), m/s^2, at t_s (n,), s, both checked: a row of products_track (n, WIDTH) after each.
 
-    def step(self, t_s: float, f_axis: Array) -> None:
-        """One sample (N,), m/s^2, checked."""
-        self._time[0], self._row[0] = t_s, f_axis
-        run(self.memory, self.watch, self.sensor, self.tuning, self.limits, self._time, self._row, self.now)
+        bound follows the estimate; without one, nothing is said of it.
+        """
+        out = np.empty((len(t_s), track.WIDTH))
+        along, whole, follows = (_UNBOUND, self.sensor, False) if bound is None else (bound.memory, bound.sensor, True)
+        _run(self.memory, self.watch, self.sensor, self.tuning, self.limits, along, whole, follows, t_s, f_axis, out)
+        return out
 
     def gap(self) -> None:
         """Samples are missing: the next step predicts across."""
         frame.gap(self.memory, self.watch)
 
     def run(self, t_s: Array, f_axis: Array) -> Track:
-        """All samples (n, N) at once; the same bits as step() one by one. Raises ValueError for unusable input."""
+        """All samples (n, N) at once; the same bits as in parts. Raises ValueError for unusable input."""
         t_s, f_axis = np.ascontiguousarray(t_s, dtype=np.float64), np.ascontiguousarray(f_axis, dtype=np.float64)
         if f_axis.shape != (len(t_s), self.layout.axes):
             raise ValueError(f"readings {f_axis.shape}, want ({len(t_s)}, {self.layout.axes}) of {self.layout.name}")
         if not (np.isfinite(f_axis).all() and (np.diff(t_s) > 0.0).all()):
             raise ValueError("readings that are not finite, or times that do not grow: clean the log first")
-        track = new_track(len(t_s))
-        run(self.memory, self.watch, self.sensor, self.tuning, self.limits, t_s, f_axis, track)
-        return track
+        return track.of(self.rows(t_s, f_axis))
 
     def exclude(self, mask: int) -> None:
         """Go on without the axes of the mask's bits; what the biases were is carried over (E-42).

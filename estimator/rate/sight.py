@@ -6,44 +6,61 @@ ambiguous  omega and -omega fit the products, and the integral through zero does
 """
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from estimator.rate.observed import Sensor
-from estimator.rate.products_model import squares_jacobian
 
 Array = NDArray[np.float64]
 
 VALID, AMBIGUOUS, BLIND = 0, 1, 2  # the values of RateEstimate.Sight
+ALL_VALID, ALL_BLIND = (VALID,) * 3, (BLIND,) * 3
 BLIND_SIGMA = 0.05  # rad/s
 SURE = 9.0  # of omega^2 over the variance of its sign
 DEG = 180.0 / np.pi
 
 
-def information(omega_b: Array, s: Sensor) -> Array:
-    """Fisher information (3,) of one sample's products on each component of omega, (rad/s)^-2."""
-    m = int(s["m"])
-    if m == 0:
-        return np.zeros(3)
-    H = s["M"][:m] @ squares_jacobian(omega_b)
-    return np.einsum("ki,ki->i", H, np.linalg.solve(s["R_c"][:m, :m], H))
+@njit(cache=True, error_model="numpy")
+def information(w0: float, w1: float, w2: float, s: Sensor) -> tuple[float, float, float]:
+    """Fisher information of one sample's products on each component of omega, (rad/s)^-2."""
+    K = s.known
+    x = 4.0 * w0 * w0 * K[0, 0] + w1 * w1 * K[1, 1] + w2 * w2 * K[2, 2]
+    x += 2.0 * (2.0 * w0 * w1 * K[0, 1] + 2.0 * w0 * w2 * K[0, 2] + w1 * w2 * K[1, 2])
+    y = w0 * w0 * K[1, 1] + 4.0 * w1 * w1 * K[3, 3] + w2 * w2 * K[4, 4]
+    y += 2.0 * (2.0 * w0 * w1 * K[1, 3] + w0 * w2 * K[1, 4] + 2.0 * w1 * w2 * K[3, 4])
+    z = w0 * w0 * K[2, 2] + w1 * w1 * K[4, 4] + 4.0 * w2 * w2 * K[5, 5]
+    z += 2.0 * (w0 * w1 * K[2, 4] + 2.0 * w0 * w2 * K[2, 5] + 2.0 * w1 * w2 * K[4, 5])
+    return x, y, z
 
 
-def judge(omega_b: Array, P: Array, sign_variance: float, still: bool, two_signs: bool, s: Sensor, dt: float) -> tuple:
-    """((x, y, z) of VALID, AMBIGUOUS, BLIND; reason for people, empty when all are valid)."""
-    if still:
-        return (VALID, VALID, VALID), ""
-    informed = information(omega_b, s) / dt * BLIND_SIGMA**2 > 1.0
-    sigma = np.sqrt(np.diag(P))
-    size = float(omega_b @ omega_b)
-    lost = two_signs or (size < SURE * sign_variance and bool(informed.any()))
-    sights, reasons = [VALID] * 3, []
-    for k, axis in enumerate("xyz"):
-        if lost and omega_b[k] ** 2 > SURE * P[k, k]:
-            sights[k] = AMBIGUOUS
-        elif not informed[k] and sigma[k] > BLIND_SIGMA:
-            sights[k] = BLIND
-            reasons.append(f"{axis}: integration only, now {sigma[k] * DEG:.1f} deg/s uncertain")
+@njit(cache=True, error_model="numpy")
+def judge(
+    omega: Array, variances: tuple[float, float, float], sign_variance: float, two: bool, s: Sensor, dt: float,
+    out: Array,
+) -> None:  # fmt: skip
+    """out (3,) becomes VALID, AMBIGUOUS or BLIND by component of a turning body's omega (3,) with its variances."""
+    known = information(omega[0], omega[1], omega[2], s)
+    limit = dt / BLIND_SIGMA**2
+    size = omega[0] ** 2 + omega[1] ** 2 + omega[2] ** 2
+    lost = two or (size < SURE * sign_variance and (known[0] > limit or known[1] > limit or known[2] > limit))
+    for k in range(3):
+        out[k] = VALID
+        if lost and omega[k] ** 2 > SURE * variances[k]:
+            out[k] = AMBIGUOUS
+        elif not known[k] > limit and variances[k] > BLIND_SIGMA**2:
+            out[k] = BLIND
+
+
+def reason(sights: tuple[int, int, int], variances: Array, sign_variance: float, two: bool) -> str:
+    """Why, for people; empty when all components are valid. variances (3,) of omega."""
+    said = []
     if AMBIGUOUS in sights:
-        why = "began while turning" if two_signs else f"passed zero with {np.sqrt(sign_variance) * DEG:.1f} deg/s"
-        reasons.insert(0, f"sign unknown: {why}")
-    return tuple(sights), "; ".join(reasons)
+        said.append(f"sign unknown: {'began while turning' if two else f'passed zero with {_deg(sign_variance)}'}")
+    for k, axis in enumerate("xyz"):
+        if sights[k] == BLIND:
+            said.append(f"{axis}: integration only, now {_deg(variances[k])} uncertain")
+    return "; ".join(said)
+
+
+def _deg(variance: float) -> str:
+    return f"{np.sqrt(variance) * DEG:.1f} deg/s"
