@@ -6,7 +6,7 @@ samples give the same bits. Frames and units as everywhere: b body, n north-east
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,6 +16,7 @@ from estimator.layouts.layout import Layout
 from estimator.rate import bound, least_squares, products_ekf, sight, tachometer
 from estimator.rate import products_run as frame
 from estimator.rate import products_track as track
+from estimator.rate.observed import sensor
 from estimator.rate.samples import Samples
 
 Array = NDArray[np.float64]
@@ -175,6 +176,9 @@ class ProductsRate(_Stepping):
     def __init__(self, layout: Layout, config: products_ekf.Config | None = None, calibration: str = "") -> None:
         """Raises GeometryError when the layout does not see angular acceleration and specific force."""
         config = config or self.default
+        if sensor(layout, config.still.sigma_axis)["feedback"]:
+            # the feedback S Q z acts across the axis: held to an axis, P grows by what is not integrated
+            config = replace(config, fixed_axis=False)
         self.core = products_ekf.ProductsFilter(layout, config, self.method)
         self.calibration = calibration
         self._taken = Samples()
