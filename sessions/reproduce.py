@@ -17,11 +17,11 @@ from typing import Protocol
 
 from google.protobuf.message import DecodeError, Message
 
-from messages.topics import ACCEL, GNSS, IMU, INNOVATION, MUTE, NAV, RATE, TACHO, Topic, TopicError, parse
+from messages.topics import ACCEL, ADC, GNSS, IMU, INNOVATION, MUTE, NAV, RATE, TACHO, Topic, TopicError, parse
 from sessions.mcap_log import Damage, read
 
 ESTIMATES: tuple[Topic, ...] = (RATE, NAV, INNOVATION)
-PIPELINE_INPUTS: tuple[Topic, ...] = (ACCEL, IMU, TACHO, GNSS)
+PIPELINE_INPUTS: tuple[Topic, ...] = (ACCEL, IMU, ADC, TACHO, GNSS)
 PIPELINE_ORDERS: tuple[Topic, ...] = (MUTE,)  # they name the data that they are about: given before all inputs
 
 
