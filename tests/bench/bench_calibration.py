@@ -21,6 +21,7 @@ from estimator.calibration.poses import collect, find, plan  # noqa: E402
 from estimator.calibration.steps import blocks  # noqa: E402
 from estimator.layouts.catalogue import find as find_layout  # noqa: E402
 from estimator.offline.array import calibrate_at_rest, read_array, score  # noqa: E402
+from estimator.rate.beliefs import make  # noqa: E402
 from estimator.rate.estimators import ESTIMATORS  # noqa: E402
 from estimator.simulation.imperfect import MOUNTINGS, device, table_run, tumble  # noqa: E402
 
@@ -61,11 +62,11 @@ def simulated() -> None:
         nees.append(float(np.mean((vectors.T @ error)[free] ** 2 / values[free])))
         card = make_card(solved, cube, cube.axis_names, device="cube", date=DATE)
         run = table_run(one, profile="published", seed=1000 + seed)
-        for when, layout, values in (
-            ("before", cube, run.readings),
-            ("after", card.layout(cube), card.correct(run.readings)),
+        for when, layout, values, known in (
+            ("before", cube, run.readings, None),
+            ("after", card.layout(cube), card.correct(run.readings), card),
         ):
-            estimator = ESTIMATORS["products-ekf"](layout)
+            estimator = make(ESTIMATORS["products-ekf"], layout, known)
             said = [
                 estimator.step(k, float(t), f).omega_b for k, (t, f) in enumerate(zip(run.t_s, values, strict=True))
             ]
