@@ -6,12 +6,15 @@
     turn      does omega', summed over 4 to 128 samples, differ from the
               bias of this standstill? Sees a slow start early.            chi-square of 3 degrees at each length
     tilt      does p differ from that of this standstill?                  chi-square of 3 degrees
+    steady    is p now what it was a second ago? Gravity turns in a body
+              that turns slowly about an axis that is not quite vertical.  chi-square of 3 degrees
     rate      does the caller's rate exclude zero?                         waived after `patience_s` of the others
     biases    when they have moved for good, `quiet` would fail for ever: it is waived after twice `patience_s`
 
 `turn` and `tilt` are asked of a body that stands; they end a standstill and say how many samples ago it ended. A body
-that turns steadily below about 10 deg/s about a vertical axis reads the same as one that stands: `rate` is for that,
-and nothing can help when the rate is wrong as well. Compiled, deterministic, no time of day.
+that turns steadily below about 10 deg/s about an axis within half a degree of the vertical reads the same as one that
+stands: `rate` is for that, and nothing can help when the rate is wrong as well. `steady` takes more than a second; a
+caller who knows the rate well, and finds it zero, need not wait for it. Compiled, deterministic, no time of day.
 """
 
 from dataclasses import dataclass, fields
@@ -40,8 +43,13 @@ class Config:
     quiet_limit: float = 38.0  # chi-square, 9 degrees: once in 50 000 windows by chance
     turn_limit: float = 22.0  # chi-square, 3 degrees: once in 15 000 sums by chance
     tilt_limit: float = 30.0  # chi-square, 3 degrees
+    steady_span: int = 100  # samples between the two windows in which p must be the same
+    steady_limit: float = 20.0  # chi-square, 3 degrees: once in 6000 windows by chance
+    drift_steady: float = 0.003  # m/s^2, of p over steady_span
     rate_limit: float = 16.0  # chi-square, 3 degrees
     rate_slack: float = 0.02  # rad/s, added to the caller's sigma
+    sure_limit: float = 4.0  # chi-square, 3 degrees: the rate is zero, to a caller ...
+    sure_rate: float = 0.03  # rad/s, ... whose sigma is below this; no need to wait for `steady`
     patience_s: float = 6.0  # s of stillness by the axes alone that outweigh the caller's rate
     drift: float = 0.02  # 1/s^2, sigma by which biases of the quiet quantities may have moved since
     drift_now: float = 0.004  # rad/s^2, the same within one standstill
@@ -79,6 +87,8 @@ def limits(config: Config) -> Limits:
         raise ValueError(
             f"still detector: windows {config.short_window} <= {config.window} <= {config.guard} < {DEPTH}"
         )
+    if not 1 <= config.steady_span < 2 * DEPTH - config.window:
+        raise ValueError(f"still detector: span {config.steady_span} < {2 * DEPTH} - {config.window} samples")
     out = np.zeros(1, LIMITS)[0]
     for name in LIMITS.names:
         out[name] = getattr(config, name)
@@ -188,6 +198,22 @@ def _tilted(w: Watch, s: Sensor, window: int, drift: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
+def _steady(w: Watch, s: Sensor, c: Limits) -> bool:
+    """Is the mean p of the window what it was `steady_span` samples ago (E-24)? Not before so many are there."""
+    if w.n[FILLED] < c.steady_span + c.window:
+        return False
+    last, first = w.n[COUNT] - 1 - c.steady_span, w.n[COUNT] - 1 - c.steady_span - c.window
+    total = 0.0
+    for r in range(9, 12):
+        then = w.total[last % (2 * DEPTH), r]
+        if w.n[FILLED] > c.steady_span + c.window:
+            then -= w.total[first % (2 * DEPTH), r]
+        d = _mean(w, c.window, r) - then / c.window
+        total += d * d / (s.R_p[r - 9, r - 9] * 2.0 / c.window + c.drift_steady**2)
+    return total <= c.steady_limit
+
+
+@njit(cache=True, error_model="numpy")
 def rate_excludes_zero(omega: Array, P: Array, slack: float) -> float:
     """Chi-square of zero rate: omega^T (P + slack^2 I)^-1 omega (E-22)."""
     a, b, c = P[0, 0] + slack * slack, P[1, 1] + slack * slack, P[2, 2] + slack * slack
@@ -244,7 +270,12 @@ def _stands(w: Watch, s: Sensor, c: Limits, omega: Array, P: Array, dt: float) -
     if w.n[FILLED] < c.window or _scatter(w, s, c.window) > c.spread_limit * c.sigma_axis**2 or w.n[HOLD] > 0:
         w.n[QUIET_FOR] = w.n[SLOW_FOR] = 0
         return False
-    slow = rate_excludes_zero(omega, P, c.rate_slack) < c.rate_limit
+    zero, steady = rate_excludes_zero(omega, P, c.rate_slack), _steady(w, s, c)
+    sure = w.n[LEARNT] > 0 and zero < c.sure_limit and max(P[0, 0], P[1, 1], P[2, 2]) < c.sure_rate**2
+    if not steady and not sure:
+        w.n[QUIET_FOR] = w.n[SLOW_FOR] = 0
+        return False
+    slow = zero < c.rate_limit
     if w.n[LEARNT] == 0 or (
         _moved(w, s, c.window, c.drift) <= c.quiet_limit and _moved(w, s, c.short_window, c.drift) <= c.quiet_limit
     ):
