@@ -48,8 +48,9 @@ class Config:
     drift_steady: float = 0.003  # m/s^2, of p over steady_span
     rate_limit: float = 16.0  # chi-square, 3 degrees
     rate_slack: float = 0.02  # rad/s, added to the caller's sigma
-    sure_limit: float = 4.0  # chi-square, 3 degrees: the rate is zero, to a caller ...
-    sure_rate: float = 0.03  # rad/s, ... whose sigma is below this; no need to wait for `steady`
+    sure_rate: float = 0.105  # rad/s; a caller whose rate is below it by 2 sigma need not wait for `steady`,
+    likely_rate: float = 0.19  # rad/s; below this only for `brief_span`
+    brief_span: int = 40  # samples
     patience_s: float = 6.0  # s of stillness by the axes alone that outweigh the caller's rate
     drift: float = 0.02  # 1/s^2, sigma by which biases of the quiet quantities may have moved since
     drift_now: float = 0.004  # rad/s^2, the same within one standstill
@@ -87,8 +88,10 @@ def limits(config: Config) -> Limits:
         raise ValueError(
             f"still detector: windows {config.short_window} <= {config.window} <= {config.guard} < {DEPTH}"
         )
-    if not 1 <= config.steady_span < 2 * DEPTH - config.window:
-        raise ValueError(f"still detector: span {config.steady_span} < {2 * DEPTH} - {config.window} samples")
+    if not 1 <= config.brief_span <= config.steady_span < 2 * DEPTH - config.window:
+        raise ValueError(
+            f"still detector: spans {config.brief_span} <= {config.steady_span} < {2 * DEPTH} - {config.window}"
+        )
     out = np.zeros(1, LIMITS)[0]
     for name in LIMITS.names:
         out[name] = getattr(config, name)
@@ -198,19 +201,31 @@ def _tilted(w: Watch, s: Sensor, window: int, drift: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _steady(w: Watch, s: Sensor, c: Limits) -> bool:
-    """Is the mean p of the window what it was `steady_span` samples ago (E-24)? Not before so many are there."""
-    if w.n[FILLED] < c.steady_span + c.window:
+def _steady(w: Watch, s: Sensor, c: Limits, span: int) -> bool:
+    """Is the mean p of the window what it was `span` samples ago (E-24)? Not before so many are there."""
+    if w.n[FILLED] < span + c.window:
         return False
-    last, first = w.n[COUNT] - 1 - c.steady_span, w.n[COUNT] - 1 - c.steady_span - c.window
+    last, first = w.n[COUNT] - 1 - span, w.n[COUNT] - 1 - span - c.window
     total = 0.0
     for r in range(9, 12):
         then = w.total[last % (2 * DEPTH), r]
-        if w.n[FILLED] > c.steady_span + c.window:
+        if w.n[FILLED] > span + c.window:
             then -= w.total[first % (2 * DEPTH), r]
         d = _mean(w, c.window, r) - then / c.window
         total += d * d / (s.R_p[r - 9, r - 9] * 2.0 / c.window + c.drift_steady**2)
     return total <= c.steady_limit
+
+
+@njit(cache=True, error_model="numpy")
+def _settled(w: Watch, s: Sensor, c: Limits, omega: Array, P: Array) -> bool:
+    """Has gravity kept its direction for as long as the caller's rate leaves in doubt?"""
+    if _steady(w, s, c, c.steady_span):
+        return True
+    size = np.sqrt(omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2])
+    most = size + 2.0 * np.sqrt(max(P[0, 0], P[1, 1], P[2, 2]))
+    if w.n[LEARNT] == 0 or most > c.likely_rate:
+        return False
+    return most < c.sure_rate or _steady(w, s, c, c.brief_span)
 
 
 @njit(cache=True, error_model="numpy")
@@ -270,12 +285,10 @@ def _stands(w: Watch, s: Sensor, c: Limits, omega: Array, P: Array, dt: float) -
     if w.n[FILLED] < c.window or _scatter(w, s, c.window) > c.spread_limit * c.sigma_axis**2 or w.n[HOLD] > 0:
         w.n[QUIET_FOR] = w.n[SLOW_FOR] = 0
         return False
-    zero, steady = rate_excludes_zero(omega, P, c.rate_slack), _steady(w, s, c)
-    sure = w.n[LEARNT] > 0 and zero < c.sure_limit and max(P[0, 0], P[1, 1], P[2, 2]) < c.sure_rate**2
-    if not steady and not sure:
+    if not _settled(w, s, c, omega, P):
         w.n[QUIET_FOR] = w.n[SLOW_FOR] = 0
         return False
-    slow = zero < c.rate_limit
+    slow = rate_excludes_zero(omega, P, c.rate_slack) < c.rate_limit
     if w.n[LEARNT] == 0 or (
         _moved(w, s, c.window, c.drift) <= c.quiet_limit and _moved(w, s, c.short_window, c.drift) <= c.quiet_limit
     ):
