@@ -1,6 +1,5 @@
 """The guided calibration: which pose next, is it being taken, is it good enough, save. Orders are for operators."""
 
-
 import numpy as np
 import viser
 
@@ -68,9 +67,7 @@ class Calibration(Panel):
         elif len(m.poses) < 4:
             self._show({ACTION.ACTION_CALIBRATE_CANCEL})
         else:
-            self._show(
-                {ACTION.ACTION_CALIBRATE_FIT, ACTION.ACTION_CALIBRATE_SAVE, ACTION.ACTION_CALIBRATE_CANCEL}
-            )
+            self._show({ACTION.ACTION_CALIBRATE_FIT, ACTION.ACTION_CALIBRATE_SAVE, ACTION.ACTION_CALIBRATE_CANCEL})
 
     @staticmethod
     def _card(s: Snapshot) -> str:

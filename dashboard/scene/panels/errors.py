@@ -43,6 +43,9 @@ class Errors(Panel):
                 t, r = s.rows("rate", name)
                 if len(true_t) < 2 or not len(t):
                     continue
+                if reference != "truth" and s.device.get("rate", name).message.aid:  # it would be scored by its own aid
+                    rms.append((f"RMS ω<sub>{axis}</sub>, {estimator_title(name)}", "aided by the tachometer"))
+                    continue
                 omega = r[:, RATE_OMEGA][:, k]
                 if reference == "truth":
                     true = np.interp(t, true_t, true_rows[:, TRUTH_OMEGA][:, k])

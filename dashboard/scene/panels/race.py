@@ -35,8 +35,13 @@ class Race(Panel):
 
 
 def _error(s: Snapshot, name: str) -> float:
-    """RMS against the tachometer, deg/s; infinite without one. Without a direction channel: of the magnitudes."""
+    """RMS against the tachometer, deg/s; infinite without one, and for an estimate that the tachometer itself aided.
+
+    Without a direction channel: of the magnitudes.
+    """
     latest = s.device.get("tacho")
+    if _aid(s, name):
+        return float("inf")
     true_t, true = s.rows("tacho")
     t, rows = s.rows("rate", name)
     if latest is None or len(true_t) < 2 or not len(t):
@@ -48,6 +53,12 @@ def _error(s: Snapshot, name: str) -> float:
     return float(np.sqrt(np.nanmean((omega - reference) ** 2)) * DEG) if inside.any() else float("inf")
 
 
+def _aid(s: Snapshot, name: str) -> str:
+    """What the newest estimate was aided by; empty: nothing."""
+    newest = s.device.get("rate", name)
+    return newest.message.aid if newest else ""
+
+
 def _row(s: Snapshot, name: str, error: float) -> str:
     _, rows = s.rows("rate", name)
     ratio = rows[:, RATE_NIS] / np.maximum(rows[:, RATE_NIS_DOF], 1.0) if len(rows) else np.empty(0)
@@ -55,10 +66,12 @@ def _row(s: Snapshot, name: str, error: float) -> str:
     status = s.device.get("estimator", name)
     cost = status.message.us_per_sample if status else float("nan")
     state = escape(status.message.state) if status else "–"
+    aid = _aid(s, name)
+    score = f"not scored: aided by the {escape(aid)}" if aid else number(error, 2)
     stale = ' class="gf-stale"' if s.stale("rate", name) else ""
     colour = estimator_colour(name, s.device.estimators("rate"))
     return (
         f'<tr{stale}><td><span style="color:{colour}">■</span> {escape(estimator_title(name))}</td>'
-        f"<td>{number(error, 2)}</td><td>{number(float(ratio.mean()) if len(ratio) else None, 2)}</td>"
+        f"<td>{score}</td><td>{number(float(ratio.mean()) if len(ratio) else None, 2)}</td>"
         f"<td>{number(cost, 0)}</td><td>{state}</td></tr>"
     )
