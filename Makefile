@@ -1,5 +1,5 @@
 # make demo   everything it needs, then the live dashboard on one printed URL (SOURCE=drive DATA=<folder> plays a log,
-#             BOARD=emulated runs the firmware image in the emulator)
+#             SOURCE=tilt or arm other simulated boards, BOARD=emulated the firmware image in the emulator)
 # make test   everything it needs, then all tests
 # make firmware  the board's image and map into build/firmware, with its size
 # make fuzz   libFuzzer on the board's decoder and commands (SECONDS=60)
