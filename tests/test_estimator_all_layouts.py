@@ -18,7 +18,7 @@ def test_a_turn_is_followed_on_every_layout(layout, name):
     t_s, readings, omega = (np.concatenate([getattr(b, k) for b in blocks]) for k in ("t_s", "readings", "omega_b"))
     track = ESTIMATORS[name](shape).run_batch(t_s, readings)
     assert np.isfinite(track.omega_b).all() and np.isfinite(track.P).all()
-    assert track.started[30:].all(), "began anew"
+    assert track.started[130:].all(), "began anew"
     error = track.omega_b - omega
     limit = 150.0 if name == "products-rls" else 12.0  # forgetting where nothing but integration is left
     assert np.rad2deg(np.sqrt(np.mean(error**2, axis=0))).max() < limit
