@@ -95,11 +95,12 @@ def live(rounds: int, rate: list[str] | None, size: int) -> None:
     say("live", estimators=settings.rate, samples_per_batch=size, us_per_sample=round(best, 1))
 
 
-def cubes(count: int, size: int) -> None:
+def cubes(count: int, rate: list[str] | None, size: int) -> None:
     """Many boards side by side, two seconds of turning, after the standstill."""
     _, readings, _ = table()
     streams = [messages(f"cube{k}", readings[: round(9.0 / DT)], size) for k in range(count)]
-    pipeline, start = Pipeline(EstimatorSettings()), round(7.0 / DT / size)
+    settings = EstimatorSettings() if rate is None else EstimatorSettings(rate=rate)
+    pipeline, start = Pipeline(settings), round(7.0 / DT / size)
     for k in range(start):
         for stream in streams:
             through(pipeline, stream[k : k + 1])
@@ -108,7 +109,7 @@ def cubes(count: int, size: int) -> None:
         for stream in streams:
             through(pipeline, stream[k : k + 1])
     share = (time.process_time() - began) / 2.0
-    say("cubes", boards=count, hz=round(1.0 / DT), cpu_s_per_s=round(share, 3))
+    say("cubes", estimators=settings.rate, boards=count, hz=round(1.0 / DT), cpu_s_per_s=round(share, 3))
 
 
 def say(figure: str, **values: object) -> None:
@@ -123,7 +124,8 @@ def main() -> None:
     for size in (5, 10):
         live(rounds, ["products-ekf"], size)
         live(rounds, None, size)
-    cubes(64, 10)
+    cubes(64, ["products-ekf"], 10)
+    cubes(64, None, 10)
 
 
 if __name__ == "__main__":
