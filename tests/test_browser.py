@@ -185,6 +185,18 @@ def test_a_chart_has_moving_data(anna):
     until(lambda: max(t for t in scene.evaluate(PLOTS) if t is not None) > max(newest) + 1.0, "the plots stand still")
 
 
+def test_charts_show_all_of_their_window(anna):
+    """No chart is left with the second that it was made with."""
+    limits = """() => Object.values(window.__viserTestpoints.uplots).map(({ chart }) =>
+        [chart.scales.x.min, chart.scales.x.max, chart.data[0][0], chart.data[0].at(-1)])"""
+
+    def whole():
+        charts = anna.scene.evaluate(limits)
+        return charts and all(abs((high - low) / (last - first) - 1.0) < 0.1 for low, high, first, last in charts)
+
+    until(whole, "a chart shows another stretch of time than it was given")
+
+
 def test_recording_is_started_stopped_downloaded_and_replayed(anna, tmp_path):
     page = anna.page
     button = page.locator("#record")

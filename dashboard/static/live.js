@@ -84,3 +84,18 @@ replay.addEventListener("click", async () => {
 });
 
 poll();
+
+// The scene keeps a chart's zoom as a share of its time axis, and reads that from a chart just made before the axis has
+// its limits: one second of thirty is then shown for good. Nobody can have zoomed a chart that is so new: show all of it.
+const firstSeen = new WeakMap();
+const NEW_MS = 3000;
+
+function showWholeOfNewCharts() {
+  const charts = byId("scene").contentWindow?.__viserTestpoints?.uplots ?? {};
+  for (const { chart } of Object.values(charts)) {
+    if (!firstSeen.has(chart)) firstSeen.set(chart, Date.now());
+    const t = chart.data?.[0];
+    if (t?.length && Date.now() - firstSeen.get(chart) < NEW_MS) chart.setScale("x", { min: t[0], max: t[t.length - 1] });
+  }
+}
+setInterval(showWholeOfNewCharts, 500);
