@@ -97,9 +97,7 @@ class Visitor:
             answer = request.get(f"{url}/{path}")
         else:
             csrf = request.get(f"{url}/me").json()["csrf"]
-            answer = request.post(
-                f"{url}/{path}", data=body, headers={"x-csrf-token": csrf, "origin": self.demo.url}
-            )
+            answer = request.post(f"{url}/{path}", data=body, headers={"x-csrf-token": csrf, "origin": self.demo.url})
         return answer.status, answer.json()
 
 
