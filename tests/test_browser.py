@@ -158,7 +158,7 @@ def test_the_printed_link_signs_in_once(browser, demo):
 def test_the_cube_in_the_scene_follows_the_truth(anna, demo):
     """The drawn truth is the simulator's, and the drawn estimate stays near it while the table turns.
 
-    Within 15 degrees: on a busy machine truth and estimate are drawn some 50 ms apart, in which the table turns 8 degrees.
+    Within 15 degrees: a busy machine draws truth and estimate some 50 ms apart, and the table turns 8 degrees in that.
     """
     settings = load(demo.config)
     sent = deque(maxlen=3000)
