@@ -75,17 +75,23 @@ def guard(serve: Callable[[Keeper], None]) -> None:
         if child[0]:
             os.kill(child[0], signal.SIGTERM)
 
+    # A signal that comes just before poll() sleeps does not wake it, and its handler would wait for the child's end.
+    awake, wake = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
     while True:
         born = time.monotonic()
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, forward)
+        signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
         mine, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         child[0] = os.fork()
         if not child[0]:
+            signal.set_wakeup_fd(-1)
+            for fd in (awake, wake):
+                os.close(fd)
             mine.close()
             _be_child(serve, guardian, Ward(its, kept))
         its.close()
-        status = _wait(child[0], mine, kept)
+        status = _wait(child[0], mine, kept, awake)
         child[0] = 0
         mine.close()
         if os.WIFEXITED(status):
@@ -97,15 +103,22 @@ def guard(serve: Callable[[Keeper], None]) -> None:
             time.sleep(GOOD_LIFE_S)
 
 
-def _wait(child: int, line: socket.socket, kept: dict[str, int]) -> int:
-    """Hold what the child gives until it ends; its wait status. Nothing it said before its end is overlooked."""
+def _wait(child: int, line: socket.socket, kept: dict[str, int], awake: int) -> int:
+    """Hold what the child gives until it ends; its wait status. Nothing it said before its end is overlooked.
+
+    awake: readable when a signal came, whose handler runs as soon as poll() is left.
+    """
     life = os.pidfd_open(child)
     poller = select.poll()
     poller.register(life, select.POLLIN)
     poller.register(line, select.POLLIN)
+    poller.register(awake, select.POLLIN)
     try:
         while True:
             ready = {fd for fd, _ in poller.poll()}
+            if awake in ready:
+                os.read(awake, WORD_BYTES)
+                continue
             if line.fileno() in ready and not _listen(line, kept):
                 poller.unregister(line)
             if ready == {life}:

@@ -24,7 +24,6 @@ PAUSE_LONGEST = 5.0  # s
 GOOD_LIFE = 20.0  # s
 LONGEST_WAIT = 30.0  # s, for a child that waits for another
 PATIENCE = 4.0  # s between SIGTERM and SIGKILL
-AGAIN = 1.0  # s between two SIGTERM
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 COLOURS = ("cyan", "green", "magenta", "blue", "yellow", "bright_cyan", "bright_green")
 LEVELS = {"WARNING": "yellow", "ERROR": "bold red", "CRITICAL": "bold red", "DEBUG": "dim"}
@@ -96,14 +95,9 @@ class Supervisor:
         """SIGTERM in reverse order, SIGKILL after PATIENCE; True when all ended by themselves."""
         self._stopping = True
         running = [child for child in reversed(self.children) if child.process and child.process.poll() is None]
+        for child in running:
+            child.process.terminate()
         end = time.monotonic() + PATIENCE
-        while running and time.monotonic() < end:
-            for child in running:  # again and again: a guardian that was busy with its child may have missed the first
-                child.process.terminate()
-            until = min(end, time.monotonic() + AGAIN)
-            while time.monotonic() < until and any(child.process.poll() is None for child in running):
-                time.sleep(0.02)
-            running = [child for child in running if child.process.poll() is None]
         clean = True
         for child in running:
             try:

@@ -190,3 +190,38 @@ def test_a_killed_child_leaves_its_port_open_and_the_next_one_reads_what_came_me
         guardian.kill()
         guardian.wait()
         link.close()
+
+
+SLEEPING = """
+import signal, sys, threading
+import typer
+sys.path.insert(0, {root!r})
+from gyrofree.guardian import guard
+def serve(keeper):
+    stop = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: stop.set())
+    print("serving", flush=True)
+    stop.wait()
+def elsewhere():
+    sys.stdin.readline()
+    signal.pthread_kill(threading.get_ident(), signal.SIGTERM)  # poll() in the main thread is not interrupted by it
+threading.Thread(target=elsewhere, daemon=True).start()
+try:
+    guard(serve)
+except typer.Exit as end:
+    sys.exit(end.exit_code)
+"""
+
+
+def test_a_signal_that_does_not_interrupt_the_guardians_sleep_reaches_the_child():
+    script = SLEEPING.format(root=str(Path(__file__).resolve().parent.parent))
+    guardian = subprocess.Popen(
+        [sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
+    )
+    try:
+        assert guardian.stdout.readline() == "serving\n"
+        guardian.stdin.write("now\n")
+        assert guardian.wait(20) == 0
+    finally:
+        guardian.kill()
+        guardian.wait()
