@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from estimator.ins.geodetic import ned_between
 from sessions.align import GOOD, Shift, correlate
-from sessions.curves import RATE, TACHO, Curves, Line, Track, ned_between
+from sessions.curves import RATE, TACHO, Curves, Line, Track
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,6 @@ Array = NDArray[np.floating[Any]]
 FILE = "curves.npz"
 FORMAT = 1
 BINS = 100_000  # at most, per line
-WGS84_A, WGS84_E2 = 6_378_137.0, 6.694379990141316e-3  # m; first eccentricity squared
 STEPS = (1, 2, 5)  # bins are 1, 2 or 5 times a power of ten, s
 
 RATE, GYRO, TACHO, TRUTH = "rate", "gyro", "tacho", "truth"
@@ -145,18 +144,6 @@ def bin_for(seconds: float, least_s: float, bins: int = BINS) -> float:
 def bins_of(seconds: float, bin_s: float) -> int:
     """How many bins hold 0 to seconds, both included."""
     return int(np.floor(seconds / bin_s + 1e-6)) + 1
-
-
-def ned_between(origin: tuple[float, float, float], place: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Metres north, east, down of a place (latitude, longitude rad, height m) from an origin, along the ellipsoid.
-
-    As estimator/ins/earth.py has it (E-20), but without its compiler, which takes longer to load than this to run.
-    """
-    root = np.sqrt(1.0 - WGS84_E2 * np.sin(origin[0]) ** 2)
-    meridian, normal = WGS84_A * (1.0 - WGS84_E2) / root**3, WGS84_A / root
-    east = (place[1] - origin[1] + np.pi) % (2.0 * np.pi) - np.pi
-    north = (place[0] - origin[0]) * (meridian + origin[2])
-    return float(north), float(east * (normal + origin[2]) * np.cos(origin[0])), float(origin[2] - place[2])
 
 
 def stamp(path: Path) -> list[int]:

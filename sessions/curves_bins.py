@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.curves import Line, Track, bins_of, ned_between
+from estimator.ins.geodetic import ned_between
+from sessions.curves import Line, Track, bins_of
 from sessions.report.data import Tacho
 from sessions.report.segments import reference
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from estimator.ins.geodetic import ned_between
 from estimator.layouts.layout import CUBE
 from messages import gyrofree_pb2 as pb
 
@@ -16,8 +17,6 @@ Q_DISPLAY_N = (0.0, 0.5**0.5, 0.5**0.5, 0.0)
 
 _CUBE = CUBE(half_side=1.0)
 SENSORS_B, DIRECTIONS_B = _CUBE.r_b, _CUBE.theta_b  # (12, 3): a11 a12 ... a43, in half sides
-
-_WGS84_A, _WGS84_E2 = 6378137.0, 6.69437999014e-3  # m, first eccentricity squared
 
 
 def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -53,16 +52,9 @@ def quaternion_between(a: np.ndarray, b: np.ndarray) -> tuple[float, float, floa
 def ned_from_geodetic(
     latitude_deg: float, longitude_deg: float, height_m: float, origin: tuple[float, float, float]
 ) -> np.ndarray:
-    """North, east, down in m from an origin (latitude deg, longitude deg, height m), by the radii of curvature there.
-
-    WGS-84; good to centimetres within 10 km, which is enough for a picture.
-    """
-    s2 = np.sin(np.radians(origin[0])) ** 2
-    meridian = _WGS84_A * (1 - _WGS84_E2) / (1 - _WGS84_E2 * s2) ** 1.5 + origin[2]
-    normal = _WGS84_A / np.sqrt(1 - _WGS84_E2 * s2) + origin[2]
-    north = np.radians(latitude_deg - origin[0]) * meridian
-    east = np.radians((longitude_deg - origin[1] + 180.0) % 360.0 - 180.0) * normal * np.cos(np.radians(origin[0]))
-    return np.array([north, east, origin[2] - height_m])
+    """North, east, down in m from an origin (latitude deg, longitude deg, height m); for places near by."""
+    there, here = np.radians((latitude_deg, longitude_deg)), np.radians(origin[:2])
+    return np.array(ned_between((here[0], here[1], origin[2]), (there[0], there[1], height_m)))
 
 
 def ellipsoid(covariance, sigmas: float = 3.0) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
