@@ -14,7 +14,7 @@ from gyrofree.cli_options import AsJson, Config, settings_of
 from gyrofree.cli_run import progress_bar
 from gyrofree.cli_sessions import AnySession, catalogue_of, file_of
 from gyrofree.process import EXIT_CONFIG, EXIT_FAILED, fail
-from sessions.manifest import SessionError
+from sessions.manifest import SessionError, name_of
 
 
 def export(
@@ -67,8 +67,7 @@ def report(
         if as_json:
             print(made.json, end="")
         else:
-            name = path.parent.name if path.stem in ("recording", "recovered") else path.stem
-            for file in made.write(out or Path(f"report-{name}")):
+            for file in made.write(out or Path(f"report-{name_of(path)}")):
                 print(file)
             print(f"verdict: {made.verdict}")
     except (ValueError, OSError) as error:

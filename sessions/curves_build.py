@@ -17,7 +17,7 @@ from estimator.settings import EstimatorSettings
 from messages.topics import GNSS, IMU, NAV, NOTE, RATE, TACHO, TRUTH, Topic, parse
 from sessions.curves import Curves, Line, Mark, bin_for, bins_of, load, save
 from sessions.curves_bins import Binner, PulseLine, TrackLine
-from sessions.manifest import SessionError, read_manifest
+from sessions.manifest import SessionError, name_of, read_manifest
 from sessions.scan import Block, Extent, Progress, extent, scan
 
 Array = NDArray[np.float64]
@@ -98,11 +98,10 @@ class _Reading:
         dark = {key: _dark(key, lines) for key in self._pulses}
         lines |= {key: pulses.line(n, width, self._coarse, dark[key]) for key, pulses in self._pulses.items()}
         tracks = {key: track.track() for key, track in self._tracks.items()}
-        session = self._path.parent.name if self._path.stem in ("recording", "recovered") else self._path.stem
         return Curves(
-            session, self._extent.first_ns, seconds, width, dict(sorted(lines.items())), dict(sorted(tracks.items())),
-            tuple(sorted(self._marks, key=lambda mark: mark.t)), tuple(sorted(self._clocks)), self._coarse,
-            leader_of(self._path),
+            name_of(self._path), self._extent.first_ns, seconds, width, dict(sorted(lines.items())),
+            dict(sorted(tracks.items())), tuple(sorted(self._marks, key=lambda mark: mark.t)),
+            tuple(sorted(self._clocks)), self._coarse, leader_of(self._path),
         )  # fmt: skip
 
     def _times(self, decoded: list[tuple[int, Message]]) -> Array:

@@ -22,6 +22,11 @@ class SessionError(ValueError):
     """A session that cannot be named, found or read; the text says which and why."""
 
 
+def name_of(recording: Path) -> str:
+    """What a recording is called: its session's id, else the file's own name."""
+    return recording.parent.name if recording.name in (RECORDING, RECOVERED) else recording.stem
+
+
 class KeyCount(BaseModel):
     """What came in on one bus key."""
 
