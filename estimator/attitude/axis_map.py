@@ -6,16 +6,15 @@ Forces and rates of b (forward-right-down) from the columns of ImuBatch (SI) or 
 
 import hashlib
 import json
-import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomli_w
 from numpy.typing import NDArray
 
 from estimator.attitude.axes import Assignment, Input
+from estimator.toml_file import read_versioned, write_whole
 
 Array = NDArray[np.float64]
 
@@ -128,25 +127,12 @@ def as_dict(m: AxisMap) -> dict[str, Any]:
 
 def write_map(m: AxisMap, path: Path) -> None:
     """Write a map whole or not at all; raises OSError."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(path.name + ".part")
-    draft.write_bytes(tomli_w.dumps(as_dict(m)).encode())
-    draft.replace(path)
+    write_whole(as_dict(m), path)
 
 
 def read_map(path: Path) -> AxisMap:
     """Read a map; raises MapError for a file that is none, OSError for one that cannot be read."""
-    try:
-        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise MapError(f"{path}: no axis map: {error}") from None
-    if table.get("version") != VERSION:
-        raise MapError(f"{path}: map version {table.get('version')!r}, this program reads {VERSION}")
-    try:
-        return _map(table)
-    except (KeyError, TypeError, ValueError) as error:
-        raise MapError(f"{path}: not a whole axis map ({type(error).__name__}: {error})") from None
+    return read_versioned(path, "axis map", VERSION, _map, MapError)
 
 
 def _map(table: dict[str, Any]) -> AxisMap:

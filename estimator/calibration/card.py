@@ -5,18 +5,17 @@ the card instead of the nominal one. Format version 1.
 """
 
 import hashlib
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomli_w
 from numpy.typing import NDArray
 
 from estimator.calibration.fit import Fit
 from estimator.layouts.layout import Layout
+from estimator.toml_file import read_versioned, write_whole
 
 Array = NDArray[np.float64]
 
@@ -172,25 +171,12 @@ def as_dict(card: Card) -> dict[str, Any]:
 
 def write_card(card: Card, path: Path) -> None:
     """Write a card whole or not at all; raises OSError."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(path.name + ".part")
-    draft.write_bytes(tomli_w.dumps(as_dict(card)).encode())
-    draft.replace(path)
+    write_whole(as_dict(card), path)
 
 
 def read_card(path: Path) -> Card:
     """Read a card; raises CardError for a file that is none, OSError for one that cannot be read."""
-    try:
-        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise CardError(f"{path}: no calibration card: {error}") from None
-    if table.get("version") != VERSION:
-        raise CardError(f"{path}: card version {table.get('version')!r}, this program reads {VERSION}: calibrate again")
-    try:
-        return _card(table)
-    except (KeyError, TypeError, ValueError) as error:
-        raise CardError(f"{path}: not a whole calibration card ({type(error).__name__}: {error})") from None
+    return read_versioned(path, "calibration card", VERSION, _card, CardError, ": calibrate again")
 
 
 def _card(table: dict[str, Any]) -> Card:
