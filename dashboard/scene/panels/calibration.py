@@ -4,11 +4,11 @@ import numpy as np
 import viser
 
 from dashboard.scene.palette import AXES, GREEN, escape, number, rgba, rows
-from dashboard.scene.panels.base import Panel, Snapshot
+from dashboard.scene.panels.base import Snapshot
+from dashboard.scene.panels.guided import Guided, guidance, head, silent
 from messages import gyrofree_pb2 as pb
 
 MG = 1e3 / 9.80665  # mg per m/s^2
-GONE_S = 3.0  # s without a word of a running calibration
 CAMERA = np.array([0.80, -0.52, 0.50])  # where the picture is seen from, in the frame whose z is up
 ACTION = pb.EstimatorCommand
 STATE = pb.CalibrationStatus
@@ -29,38 +29,21 @@ BUTTONS = (  # label, order, icon, colour
 )
 
 
-class Calibration(Panel):
+class Calibration(Guided):
     """Status, picture and four buttons; what they do is done by the estimator of the device."""
 
     title = "Calibrate"
-    _status = None
-
-    def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
-        super().__init__(client, folder)
-        self._device = ""
-        self._buttons: dict[int, viser.GuiButtonHandle] = {}
-        with folder:
-            for k, (label, action, icon, colour) in enumerate(BUTTONS):
-                button = client.gui.add_button(label, icon=icon, color=colour, order=2.0 + k, visible=False)
-                button.on_click(lambda _, action=action: self._order(action))
-                self._buttons[action] = button
-
-    @property
-    def uuids(self) -> frozenset[str]:
-        """The buttons: a viewer may not press them."""
-        return frozenset(button._impl.uuid for button in self._buttons.values())
+    buttons = BUTTONS
 
     def update(self, s: Snapshot) -> None:
         self._device = s.device.name
         if s.device.is_vehicle:
-            note = '<p class="gf-note">Boards of accelerometers are calibrated here.</p>'
-            self._status = self.html(note, self._status)
-            self._show(set())
+            self._not_here("Boards of accelerometers are calibrated here.")
             return
         latest = s.device.get("calibration")
         m = latest.message if latest is not None else STATE()
         running = m.state not in (STATE.STATE_IDLE, STATE.STATE_SAVED)
-        gone = running and latest.age(s.now) > GONE_S
+        gone = silent(s, "calibration", running)
         self._status = self.html(content(m, gone, s.dark, self._card(s)), self._status)
         if not running:
             self._show({ACTION.ACTION_CALIBRATE_START})
@@ -75,11 +58,6 @@ class Calibration(Panel):
         for name in s.device.estimators("rate"):
             return s.device.get("rate", name).message.calibration
         return ""
-
-    def _show(self, actions: set[int]) -> None:
-        for action, button in self._buttons.items():
-            if button.visible != (action in actions):
-                button.visible = action in actions
 
     def _order(self, action: int) -> None:
         command = pb.EstimatorCommand(action=action, device=self._device)
@@ -101,24 +79,13 @@ def content(m: pb.CalibrationStatus, gone: bool, dark: bool, card: str) -> str:
     if m.card:
         items.append(("saved as", escape(m.card)))
     good = f'<b style="color:{GREEN}">✓ good enough</b>' if m.good_enough else "not yet good enough"
-    head = (
-        f'<div class="gf-head"><span class="gf-name">{STATES.get(m.state, "")}</span>'
-        f"<span>{len(m.poses)} poses · {good}</span></div>"
-    )
-    silent = '<p class="gf-alert">the estimator is silent: does it still run?</p>' if gone else ""
-    said = f'<p class="gf-note">{escape(m.message)}</p>' if m.message else ""
+    first = head(STATES.get(m.state, ""), f"{len(m.poses)} poses · {good}", gone)
     wanted = np.array(m.next_up_b) if len(m.next_up_b) == 3 else None
     shown = wanted if m.state in (STATE.STATE_WAITING, STATE.STATE_FITTED) else None
     if m.state == STATE.STATE_TAKING and wanted is not None:
         shown = wanted
     drawing = picture(shown, dark) if shown is not None else ""
-    lead = f'<p style="margin:.2em .75em;font-size:1.15em;font-weight:600">{escape(m.instruction)}</p>'
-    bar = (
-        f'<div style="margin:.3em .75em;height:.5em;border-radius:.25em;background:rgba(128,128,128,.25)">'
-        f'<div style="height:100%;border-radius:.25em;width:{100 * min(max(m.progress, 0.0), 1.0):.0f}%;'
-        f'background:{GREEN}"></div></div>'
-    )
-    return silent + head + lead + drawing + bar + said + rows(items, stale=gone)
+    return first + guidance(m.instruction, drawing, m.progress, m.message) + rows(items, stale=gone)
 
 
 def upright(up_b: np.ndarray) -> np.ndarray:

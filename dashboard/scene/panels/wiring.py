@@ -2,12 +2,13 @@
 
 import numpy as np
 import viser
+from scipy.spatial.transform import Rotation
 
 from dashboard.scene.palette import AXES, GREEN, VERMILLION, escape, number, rgba, rows
-from dashboard.scene.panels.base import DEG, Panel, Snapshot
+from dashboard.scene.panels.base import DEG, Snapshot
+from dashboard.scene.panels.guided import Guided, guidance, head, silent
 from messages import gyrofree_pb2 as pb
 
-GONE_S = 3.0  # s without a word of a running detection
 ACTION = pb.EstimatorCommand
 STATUS = pb.WiringStatus
 STATES = {
@@ -33,48 +34,25 @@ TURNS = {  # rotation vector of each pose against level, b
 }
 
 
-class Wiring(Panel):
+class Wiring(Guided):
     """Status, two pictures (level, and the pose wanted) and four buttons; the estimator of the device does the rest."""
 
     title = "Wiring"
-    _status = None
-
-    def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
-        super().__init__(client, folder)
-        self._device = ""
-        self._buttons: dict[int, viser.GuiButtonHandle] = {}
-        with folder:
-            for k, (label, action, icon, colour) in enumerate(BUTTONS):
-                button = client.gui.add_button(label, icon=icon, color=colour, order=2.0 + k, visible=False)
-                button.on_click(lambda _, action=action: self._order(action))
-                self._buttons[action] = button
-
-    @property
-    def uuids(self) -> frozenset[str]:
-        """The buttons: a viewer may not press them."""
-        return frozenset(button._impl.uuid for button in self._buttons.values())
+    buttons = BUTTONS
 
     def update(self, s: Snapshot) -> None:
         self._device = s.device.name
         if s.device.get("imu") is None and s.device.get("adc") is None:
-            note = '<p class="gf-note">For boards with accelerometers and gyroscopes, of any wiring.</p>'
-            self._status = self.html(note, self._status)
-            self._show(set())
+            self._not_here("For boards with accelerometers and gyroscopes, of any wiring.")
             return
         latest = s.device.get("wiring")
         m = latest.message if latest is not None else STATUS()
         running = m.state in (STATUS.STATE_WAITING, STATUS.STATE_MOVING, STATUS.STATE_FOUND)
-        gone = running and latest.age(s.now) > GONE_S
-        self._status = self.html(content(m, gone, s.dark), self._status)
+        self._status = self.html(content(m, silent(s, "wiring", running), s.dark), self._status)
         wanted = {ACTION.ACTION_WIRING_CANCEL} if running else {ACTION.ACTION_WIRING_START}
         wanted |= {ACTION.ACTION_WIRING_SAVE} if running and m.complete else set()
         wanted |= {ACTION.ACTION_USE_MAP} if m.map and not running else set()
         self._show(wanted)
-
-    def _show(self, actions: set[int]) -> None:
-        for action, button in self._buttons.items():
-            if button.visible != (action in actions):
-                button.visible = action in actions
 
     def _order(self, action: int) -> None:
         self.order_estimator("Wiring", pb.EstimatorCommand(action=action, device=self._device))
@@ -89,20 +67,10 @@ def content(m: pb.WiringStatus, gone: bool, dark: bool) -> str:
             "right, each time from level; this page says when. What is found can be saved and is used at once."
         )
         return f'<p class="gf-note">{text}</p>' + rows(used)
-    head = (
-        f'<div class="gf-head"><span class="gf-name">{STATES.get(m.state, "")}</span>'
-        f"<span>{len(m.turns)} turns · {_found(m)} of {len(m.inputs)} inputs known</span></div>"
-    )
-    silent = '<p class="gf-alert">the estimator is silent: does it still run?</p>' if gone else ""
-    lead = f'<p style="margin:.2em .75em;font-size:1.15em;font-weight:600">{escape(m.instruction)}</p>'
-    bar = (
-        f'<div style="margin:.3em .75em;height:.5em;border-radius:.25em;background:rgba(128,128,128,.25)">'
-        f'<div style="height:100%;border-radius:.25em;width:{100 * min(max(m.progress, 0.0), 1.0):.0f}%;'
-        f'background:{GREEN}"></div></div>'
-    )
-    said = f'<p class="gf-note">{escape(m.message)}</p>' if m.message else ""
+    first = head(STATES.get(m.state, ""), f"{len(m.turns)} turns · {_found(m)} of {len(m.inputs)} inputs known", gone)
     drawing = picture(m.pose, dark) if m.state in (STATUS.STATE_WAITING, STATUS.STATE_MOVING) else ""
-    return silent + head + lead + drawing + bar + said + _inputs(m, gone) + _turns(m) + rows(used)
+    todo = guidance(m.instruction, drawing, m.progress, m.message)
+    return first + todo + _inputs(m, gone) + _turns(m) + rows(used)
 
 
 def _found(m: pb.WiringStatus) -> int:
@@ -133,17 +101,6 @@ def _turns(m: pb.WiringStatus) -> str:
     return rows(items) if items else ""
 
 
-def rotation(vector: tuple[float, float, float]) -> np.ndarray:
-    """Matrix (3, 3) of a rotation vector, rad: Rodrigues."""
-    v = np.asarray(vector, dtype=float)
-    angle = float(np.linalg.norm(v))
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = v / angle
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
-
-
 def picture(pose: int, dark: bool) -> str:
     """The board level, an arrow, and as it should lie, as SVG; only level where that is wanted."""
     line = "#e8e8e8" if dark else "#333333"
@@ -154,7 +111,9 @@ def picture(pose: int, dark: bool) -> str:
             f'<path d="M152,82 H184 M174,72 L186,82 L174,92" fill="none" stroke="{line}" stroke-width="3" '
             'stroke-linecap="round"/>'
         )
-        inner = _board(np.eye(3), 78.0, line) + arrow + _board(rotation(TURNS[pose]), 264.0, line)
+        inner = (
+            _board(np.eye(3), 78.0, line) + arrow + _board(Rotation.from_rotvec(TURNS[pose]).as_matrix(), 264.0, line)
+        )
     return (
         '<svg class="gf-pose" viewBox="0 0 352 160" width="100%" role="img" aria-label="the board as it should lie" '
         f'style="display:block;margin:.2em auto;max-width:420px">{inner}</svg>'
