@@ -21,7 +21,7 @@ from typing import Any
 from google.protobuf.message import DecodeError
 
 from estimator import convert
-from estimator.service import INPUTS, Output, Pipeline
+from estimator.service import Output, Pipeline
 from estimator.settings import EstimatorSettings
 from estimator.stream import worth_a_line
 from estimator.warm import warm
@@ -31,7 +31,7 @@ from messages.history import Asker, declare
 from messages.journal import JournalBusy
 from messages.mending import Arrival, Mender, Question
 from messages.spool import Spool
-from messages.topics import ESTIMATES, REPLAY_SUFFIX, TopicError, parse
+from messages.topics import ESTIMATES, PIPELINE_INPUTS, REPLAY_SUFFIX, TopicError, parse
 
 log = logging.getLogger(__name__)
 
@@ -62,7 +62,7 @@ class Worker:
     ) -> None:
         """`ask` puts a question to a gateway, its answer comes through `answered`; `save` keeps the state."""
         self.pipeline = pipeline
-        self.mender = Mender(ask or (lambda question: self.answered(question, None)), topics=INPUTS)
+        self.mender = Mender(ask or (lambda question: self.answered(question, None)), topics=PIPELINE_INPUTS)
         self._put, self._save = put, save
         self._queue: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._bad = self._dropped = 0
@@ -274,7 +274,8 @@ def _on(worker: Worker) -> Callable[[Any], None]:
             address = parse(str(sample.key_expr))
         except TopicError:
             return
-        if address.topic in INPUTS and not address.device.endswith(REPLAY_SUFFIX):  # a replay makes its own estimates
+        # a replay makes its own estimates
+        if address.topic in PIPELINE_INPUTS and not address.device.endswith(REPLAY_SUFFIX):
             payload = sample.payload.to_bytes()
             worker.offer(Arrival(address.topic, address.device, address.estimator, payload, time.time_ns()))
 

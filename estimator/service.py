@@ -33,20 +33,17 @@ from estimator.stream import Stream, every
 from messages import gyrofree_pb2 as pb
 from messages.bus import BusSettings
 from messages.topics import (
-    ACCEL,
-    ADC,
     ATTITUDE,
     AXES,
     CALIBRATION,
     ESTIMATOR,
-    GNSS,
-    IMU,
     INNOVATION,
     MUTE,
     NAV,
+    PIPELINE_INPUTS,
+    PIPELINE_ORDERS,
     POSE,
     RATE,
-    TACHO,
     WIRING,
     Topic,
 )
@@ -56,12 +53,10 @@ log = logging.getLogger(__name__)
 POSE_HZ = 20.0
 VERSION = metadata.version("gyrofree")  # once: it reads files
 Batch = pb.AccelBatch | pb.ImuBatch | pb.AdcBatch
-INPUTS = (ACCEL, IMU, ADC, GNSS, TACHO)
-ORDERS = (MUTE,)  # what the pipeline was told to do: published live, taken from a recording before all its inputs
 NO_TRANSLATION = (0.0, 0.0, 0.0)  # a cube on its table turns and stays
 
 
-__all__ = ["INPUTS", "ORDERS", "Output", "Pipeline", "UnknownEstimator", "make_layout", "run"]
+__all__ = ["Output", "Pipeline", "UnknownEstimator", "make_layout", "run"]
 
 
 class Output(NamedTuple):
@@ -107,7 +102,7 @@ class Pipeline:
 
     def on(self, topic: Topic, message: Message) -> list[Output]:
         """Take one message of any topic; raises convert.BadMessage for one that cannot be used."""
-        handler = getattr(self, f"on_{topic.name}") if topic in INPUTS or topic in ORDERS else None
+        handler = getattr(self, f"on_{topic.name}") if topic in PIPELINE_INPUTS or topic in PIPELINE_ORDERS else None
         return handler(message) if handler else []
 
     def order(self, command: pb.EstimatorCommand) -> tuple[pb.Reply, list[Output]]:
@@ -203,6 +198,8 @@ class Pipeline:
         """What the filters make of a batch, by the axis map in use; a map of the converter's inputs leaves it out."""
         samples, rates = convert.imu_samples(batch)
         device = batch.header.device
+        if device not in self._axes.used and not self._axes.wants(device, "imu"):
+            return self._inertial(batch, samples, rates)
         columns = np.hstack([samples.values, rates])
         out = self._watch(batch, "imu", columns)
         if device in self._axes.used:

@@ -83,6 +83,8 @@ TOPICS: tuple[Topic, ...] = (
 )  # fmt: skip
 
 BY_NAME = {topic.name: topic for topic in TOPICS}
+PIPELINE_INPUTS = (ACCEL, IMU, ADC, GNSS, TACHO)  # what estimates are made of, live and from a recording
+PIPELINE_ORDERS = (MUTE,)  # what people ordered: published live, given from a recording before all inputs
 
 
 @dataclass(frozen=True)

@@ -19,15 +19,14 @@ from pathlib import Path
 from google.protobuf.message import Message
 
 from messages import gyrofree_pb2 as pb
-from messages.topics import ACCEL, IMU, INNOVATION, NAV, NOTE, RATE, Address
+from messages.topics import ACCEL, IMU, NOTE, PIPELINE_INPUTS, RATE, Address
 from sessions.replay import INPUTS, LONGEST_NAME, SUFFIX, Input, rename, renamed
-from sessions.reproduce import PIPELINE_INPUTS, Pipeline, give_orders
+from sessions.reproduce import ESTIMATES, Pipeline, give_orders
 from sessions.source import Source
 
 log = logging.getLogger(__name__)
 
 PLAYED = (*INPUTS, NOTE)
-ESTIMATES = (RATE, NAV, INNOVATION)
 RECORDED = "-recorded"  # put behind an estimator's name when its recorded estimates are shown beside the new ones
 SLOWEST, FASTEST = 0.1, 100.0
 BEFORE_S = 10.0  # published at once before the moment jumped to, so that charts are not empty, s

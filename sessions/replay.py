@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import zenoh
 from google.protobuf.message import Message
 
-from messages.topics import ACCEL, ADC, BOARD, GNSS, IMU, LINK, LOCATION, TACHO, TRUTH, Address, Topic
+from messages.topics import BOARD, LINK, LOCATION, PIPELINE_INPUTS, TRUTH, Address, Topic
 
-INPUTS: tuple[Topic, ...] = (ACCEL, IMU, ADC, TACHO, GNSS, LINK, BOARD, TRUTH, LOCATION)
+INPUTS: tuple[Topic, ...] = (*PIPELINE_INPUTS, LINK, BOARD, TRUTH, LOCATION)
 SUFFIX = "-replay"
 LONGEST_NAME = 32  # of a device, see messages.topics.NAME
 MATCH_S = 0.25  # at most, for the router to say that somebody listens to a key

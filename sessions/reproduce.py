@@ -17,12 +17,11 @@ from typing import Protocol
 
 from google.protobuf.message import DecodeError, Message
 
-from messages.topics import ACCEL, ADC, GNSS, IMU, INNOVATION, MUTE, NAV, RATE, TACHO, Topic, TopicError, parse
+from messages.topics import ACCEL, INNOVATION, NAV, PIPELINE_INPUTS, PIPELINE_ORDERS, RATE, Topic, TopicError, parse
 from sessions.mcap_log import Damage, read
+from sessions.scan import scan
 
 ESTIMATES: tuple[Topic, ...] = (RATE, NAV, INNOVATION)
-PIPELINE_INPUTS: tuple[Topic, ...] = (ACCEL, IMU, ADC, TACHO, GNSS)
-PIPELINE_ORDERS: tuple[Topic, ...] = (MUTE,)  # they name the data that they are about: given before all inputs
 
 
 class Pipeline(Protocol):
@@ -107,13 +106,13 @@ def reproduce(path: Path, pipeline: Pipeline) -> Report:
 
 def give_orders(path: Path, pipeline: Pipeline) -> Pipeline:
     """Tell a new pipeline what people ordered while this recording was made; the pipeline itself. Raises OSError."""
-    for row in read(path, Damage()):
-        try:
-            topic = parse(row.key).topic
-            if topic in PIPELINE_ORDERS:
-                pipeline.on(topic, topic.type.FromString(row.payload))
-        except (TopicError, DecodeError):
-            continue
+    for block in scan(path, PIPELINE_ORDERS):
+        topic = parse(block.key).topic
+        for payload in block.payloads:
+            try:
+                pipeline.on(topic, topic.type.FromString(payload))
+            except DecodeError:
+                continue
     return pipeline
 
 

@@ -8,10 +8,10 @@ import shutil
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from messages.topics import ATTITUDE, AXES, ESTIMATOR, POSE, parse
+from messages.topics import ATTITUDE, AXES, ESTIMATOR, PIPELINE_INPUTS, POSE, parse
 from sessions.manifest import SESSION_ID, Manifest, SessionError, check_id
 from sessions.mcap_log import Damage
-from sessions.reproduce import ESTIMATES, PIPELINE_INPUTS, Pipeline, give_orders
+from sessions.reproduce import ESTIMATES, Pipeline, give_orders
 from sessions.settings import RecorderSettings
 from sessions.store import SessionStore, versions
 from sessions.table import Progress, Selection, messages, silent
