@@ -157,10 +157,11 @@ def _scatter(w: Watch, s: Sensor, window: int) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _mean(w: Watch, window: int, r: int) -> float:
-    """Mean of component r of y over the window."""
-    now, then = (w.n[COUNT] - 1) % (2 * DEPTH), (w.n[COUNT] - 1 - window) % (2 * DEPTH)
-    return (w.total[now, r] - (w.total[then, r] if w.n[FILLED] > window else 0.0)) / window
+def _mean(w: Watch, window: int, r: int, ago: int = 0) -> float:
+    """Mean of component r of y over the window that ended `ago` samples ago."""
+    last = w.n[COUNT] - 1 - ago
+    now, then = last % (2 * DEPTH), (last - window) % (2 * DEPTH)
+    return (w.total[now, r] - (w.total[then, r] if w.n[FILLED] > window + ago else 0.0)) / window
 
 
 @njit(cache=True, error_model="numpy")
@@ -205,13 +206,9 @@ def _steady(w: Watch, s: Sensor, c: Limits, span: int) -> bool:
     """Is the mean p of the window what it was `span` samples ago (E-24)? Not before so many are there."""
     if w.n[FILLED] < span + c.window:
         return False
-    last, first = w.n[COUNT] - 1 - span, w.n[COUNT] - 1 - span - c.window
     total = 0.0
     for r in range(9, 12):
-        then = w.total[last % (2 * DEPTH), r]
-        if w.n[FILLED] > span + c.window:
-            then -= w.total[first % (2 * DEPTH), r]
-        d = _mean(w, c.window, r) - then / c.window
+        d = _mean(w, c.window, r) - _mean(w, c.window, r, span)
         total += d * d / (s.R_p[r - 9, r - 9] * 2.0 / c.window + c.drift_steady**2)
     return total <= c.steady_limit
 
