@@ -5,30 +5,12 @@ import threading
 
 import numpy as np
 from pynmeagps import NMEAReader
+from wire import Wire
 
 from firmware_protocol.codec import FLAG_SIMULATED, Deframer, Frame
 from firmware_protocol.frames import Acc12, Gps, Hello, Tacho
 from gyrofree import simulate
 from messages.bus import BusSettings
-
-
-class Wire:
-    """Takes what a board sends."""
-
-    connected = True
-
-    def __init__(self):
-        self.data = bytearray()
-
-    def write(self, data):
-        self.data += data
-        return True
-
-    def read(self):
-        return b""
-
-    def close(self):
-        pass
 
 
 def run_at_once(monkeypatch, profile):

@@ -4,6 +4,7 @@ import threading
 
 import numpy as np
 import pytest
+from wire import Wire
 
 from estimator.attitude.rotation import to_dcm
 from estimator.service import Pipeline
@@ -20,22 +21,6 @@ from messages.journal_file import BOARD
 from messages.topics import ADC, ATTITUDE, IMU, WIRING
 
 SEED = 4
-
-
-class Wire:
-    """Takes what a board sends."""
-
-    connected = True
-
-    def __init__(self):
-        self.data = bytearray()
-
-    def write(self, data):
-        self.data += data
-        return True
-
-    def read(self):
-        return b""
 
 
 class Bench:
