@@ -5,6 +5,7 @@ import os
 import threading
 import time
 from collections import defaultdict
+from itertools import accumulate
 from pathlib import Path
 
 import pytest
@@ -303,7 +304,8 @@ def test_without_a_router_all_is_journalled_and_counted_and_not_published_later(
     )
     reply = ask(bench.session, bench.bus.prefix, "cube", "gateway", asked)
     before = [pb.AccelBatch.FromString(item.payload) for item in reply.items]
-    assert [b.first_index for b in before] == list(range(0, 100, 100 // len(before)))
+    ends = list(accumulate(len(b.counts) // 12 for b in before))  # how a busy machine cuts the batches is its own
+    assert [b.first_index for b in before] == [0, *ends[:-1]] and ends[-1] == 100
     assert [b.header.sequence for b in before] == list(range(1, got[0].header.sequence))
     assert [c for b in got for c in b.counts] == [c for s in samples(100, first=100) for c in s.counts12]
     assert sum(b.lost_samples for b in got) == 0
