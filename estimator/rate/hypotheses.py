@@ -1,6 +1,6 @@
 """What could explain readings that do not fit: a memory of blocks, and the likeliest hypothesis about the axes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +22,8 @@ SURE = 12.0  # -2 log likelihood by which the best must beat every explanation b
 BETTER = 25.0  # and by which it must beat "nothing is wrong"
 KIND_SURE = 22.0  # by which it must beat another fault of the same axis ...
 KIND_BLOCKS = 15  # ... until so many blocks after the onset
+CLEAN = 0.3  # NIS per degree of freedom that the right explanation leaves at most; good readings leave 0.1
+ALONE = 1.0  # NIS per degree of freedom of a fault of one axis that is preferred to a swap which leaves more than CLEAN
 FIT = 2.5  # NIS per degree of freedom that an explanation may leave
 
 SWAPPED, FLIPPED, BIASED, SUSPECT = AxisState.SWAPPED, AxisState.FLIPPED, AxisState.BIASED, AxisState.SUSPECT
@@ -152,12 +154,18 @@ def explain(monitor: "HealthMonitor", late: bool) -> Finding | None:
     best = tried[0]
     if not best[1] < FIT or nothing[0] - best[0] < BETTER:
         return None
+    half = len(best[2]) == 2 and best[1] > CLEAN  # a swap that does not explain all: one of its axes may do as well
+    one = [t for t in tried if half and len(t[2]) == 1 and t[2][0] in best[2] and t[1] < ALONE]
+    pair, best = (best, one[0]) if one else (None, best)
     others = [t for t in tried if not set(t[2]) & set(best[2])]
-    kinds = [t for t in tried if t[2] == best[2] and _state(t[3]) != _state(best[3])]
+    kinds = [t for t in tried if t[2] == best[2] and _state(t[3]) != _state(best[3])] + ([pair] if pair else [])
     sure = late or not others or others[0][0] - best[0] > SURE
     told_apart = not kinds or kinds[0][0] - best[0] > KIND_SURE
     sure &= told_apart or monitor.history.since_onset() >= KIND_BLOCKS
-    return _finding(monitor, best, sure, run)
+    finding = _finding(monitor, best, sure, run)
+    if pair:
+        finding = replace(finding, text=f"{finding.text}, or {_swapped(monitor, pair[2])}")
+    return finding
 
 
 def _finding(monitor: "HealthMonitor", best: tuple, sure: bool, run) -> Finding:
@@ -165,8 +173,7 @@ def _finding(monitor: "HealthMonitor", best: tuple, sure: bool, run) -> Finding:
     offset = float(x[parity.OFFSET]) if kind == parity.OFFSET_OF else 0.0
     if who:  # go on with the state of those who never used the axes
         *_, x, P = run(parity.IGNORE, who[0], who[1] if len(who) > 1 else -1, since)
-    names = monitor.layout.axis_names
-    swapped = "swapped: " + " and ".join(names[i] for i in who)
+    swapped = _swapped(monitor, who)
     text = {
         parity.NONE: "",
         parity.OFFSET_OF: f"off by {offset:+.2f} m/s²",
@@ -177,6 +184,10 @@ def _finding(monitor: "HealthMonitor", best: tuple, sure: bool, run) -> Finding:
         parity.SWAP_CHANGES: swapped,
     }[kind]
     return Finding(who, kind, _state(kind), text, offset, sure, x, P)
+
+
+def _swapped(monitor: "HealthMonitor", who: tuple[int, ...]) -> str:
+    return "swapped: " + " and ".join(monitor.layout.axis_names[i] for i in who)
 
 
 def _state(kind: int) -> AxisState:
