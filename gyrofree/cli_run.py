@@ -42,6 +42,12 @@ def run(
     tacho_aid: Annotated[
         bool, typer.Option("--tacho-aid", help="Cube logs: correct by the log's tachometer; not scored against it.")
     ] = False,
+    resolve: Annotated[
+        bool,
+        typer.Option(
+            "--resolve", help="Cube logs that begin while turning: correct what was before the sign was known."
+        ),
+    ] = False,
     estimators: Filters = "",
     filters: Filters = "",
     imu: Annotated[str, typer.Option(help="Drives: file of inertial samples, in the folder or a path.")] = "imu.csv",
@@ -79,7 +85,7 @@ def run(
 
                 result = run_cube(
                     log, layout=layout, half_side_m=half_side, lsb_mg=lsb_mg, card=card, estimators=names,
-                    tacho_aid=tacho_aid, plot=plot, progress=progress,
+                    tacho_aid=tacho_aid, resolve=resolve, plot=plot, progress=progress,
                 )  # fmt: skip
     except (ValueError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None

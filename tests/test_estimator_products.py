@@ -119,7 +119,12 @@ def test_the_kernel_is_the_model_without_its_zeros(x, alpha, seed):
     arm = x[18:21] @ x[18:21] + np.trace(P[18:21, 18:21])
     C = H @ P @ H.T + s.R_p + (t.centre + arm * s.R_alpha[0, 0]) * np.eye(3)
     e = p - model.measured_force(x, alpha, s.SQ)
-    agrees(lambda x, P: correct.by_force(x, P, work, tuple(p), tuple(alpha), True, s, t), H, C, e)
+    agrees(lambda x, P: correct.by_force(x, P, work, tuple(p), tuple(alpha), tuple(alpha), True, s, t), H, C, e)
+    late = alpha + np.array([0.3, -0.2, 0.5])  # the Jacobian is that of the mean before, the prediction that of now
+    H = model.measured_force_jacobian(x, late, s.SQ)
+    doubt = np.trace(P[18:21, 18:21]) * float((alpha - late) @ (alpha - late))
+    C = H @ P @ H.T + s.R_p + (t.centre + arm * s.R_alpha[0, 0] + doubt) * np.eye(3)
+    agrees(lambda x, P: correct.by_force(x, P, work, tuple(p), tuple(alpha), tuple(late), True, s, t), H, C, e)
     H, C = np.eye(6, 22), P[:6, :6] + np.diag([t.still_rate] * 3 + [0.0] * 3)
     C[3:, 3:] += s.R_alpha
     e = np.concatenate([-x[:3], alpha - x[3:6]])
@@ -290,7 +295,8 @@ def test_reversals_and_a_cube_off_the_axis_are_followed():
 def test_a_start_while_turning_is_ambiguous_until_the_motion_tells_the_sign():
     table = TableTest(1, profile=TURNING)
     states, omegas = run(ProductsRate(table.layout), table, 16.0)
-    assert states[20].sight == (BLIND,) * 3 and "keep still" in states[20].sight_reason
+    assert states[3].sight == (BLIND,) * 3 and "keep still" in states[3].sight_reason
+    assert states[12].sight[2] == AMBIGUOUS and "began while turning, at" in states[12].sight_reason
     seen = [s.sight[2] for s in states]
     assert AMBIGUOUS in seen and VALID in seen[300:]
     assert np.rad2deg(np.abs(states[-1].omega_b - omegas[-1])).max() < 6.0

@@ -16,9 +16,10 @@ from estimator.layouts.catalogue import find
 from estimator.layouts.layout import GeometryError, Layout
 from estimator.offline.cube_axes import examine
 from estimator.offline.cube_log import CubeLog, LogError, read_log
+from estimator.rate import resolved
 from estimator.rate.beliefs import make
 from estimator.rate.bound import IN_USE, rate_bound
-from estimator.rate.estimators import ESTIMATORS
+from estimator.rate.estimators import ESTIMATORS, ProductsRate
 from estimator.rate.tachometer import SUFFIX
 from estimator.settings import EstimatorSettings
 
@@ -62,11 +63,13 @@ def run_cube(
     card: Path | None = None,
     estimators: list[str] | None = None,
     tacho_aid: bool = False,
+    resolve: bool = False,
     plot: Path | None = None,
     progress: Progress = nothing,
 ) -> dict[str, Any]:
     """Run the log; the JSON object of `gyrofree run`: estimators, default, gaps, axes, and notes for people.
 
+    resolve: where a log begins while turning, correct what came before the sign was decided; such a track is named so.
     A value that cannot be known (no truth for x and y, say) is None. Raises LogError, GeometryError, CardError
     (all ValueError) and OSError.
     """
@@ -78,17 +81,20 @@ def run_cube(
     used = read_card(card) if card is not None else None
     if tacho_aid and data.tacho is None:
         raise LogError(f"--tacho-aid: {log} has no column tacho_rad_s")
-    tracks, notes = run_log(data, shape, used, estimators, progress, tacho_aid)
+    tracks, notes = run_log(data, shape, used, estimators, progress, tacho_aid, resolve)
     truth = reference(data)
     aided = [name for name in tracks if name.endswith(SUFFIX)]
     if truth.name == "tachometer":
         notes += [f"{name}: aided by the tachometer that it would be scored against: not scored" for name in aided]
     elif aided:
         notes.append(f"{', '.join(aided)}: aided by the tachometer")
+    if late := [name for name in tracks if name.endswith(resolved.SUFFIX)]:
+        notes.append(f"{', '.join(late)}: corrected backwards once the sign of the rate was known; live it is not")
     progress(0.95, "bound")
     bound = _bound(data, used.layout(shape) if used is not None else shape, truth)
-    known = list(dict.fromkeys([*tracks, *(n for n in estimators or ESTIMATORS if n + SUFFIX not in tracks)]))
-    default = next((name for name in tracks if name.removesuffix(SUFFIX) == EstimatorSettings().rate[0]), None)
+    plain = [name.partition("+")[0] for name in tracks]
+    known = [*tracks, *(name for name in estimators or ESTIMATORS if name not in plain)]
+    default = next((name for name, of in zip(tracks, plain, strict=True) if of == EstimatorSettings().rate[0]), None)
     result = {
         "estimators": {name: score(tracks.get(name), truth, bound) for name in known},
         "default": default or next(iter(tracks), None),
@@ -116,6 +122,7 @@ def run_log(
     names: Sequence[str] | None,
     progress: Progress = nothing,
     tacho_aid: bool = False,
+    resolve: bool = False,
 ) -> tuple[dict[str, Track], list[str]]:
     """Tracks of the estimators that can use this layout, and why the others cannot. Raises LogError, CardError."""
     f_axis = data.f_axis * np.array(shape.gain)
@@ -132,7 +139,7 @@ def run_log(
                 track = run_estimator(
                     name, data, shape, f_axis,
                     lambda part, k=k, name=name: progress(0.05 + 0.9 * (k + part) / len(chosen), name),
-                    card, tacho_aid,
+                    card, tacho_aid, resolve,
                 )  # fmt: skip
             tracks[track.name] = track
         except GeometryError as error:
@@ -150,10 +157,12 @@ def run_estimator(
     progress: Callable[[float], None] = lambda part: None,
     card: Card | None = None,
     tacho_aid: bool = False,
+    resolve: bool = False,
 ) -> Track:
     """Every sample of a log through one estimator; missing samples are announced to it as on the live path.
 
-    With tacho_aid the name of the track ends in SUFFIX, once the estimator has used the tachometer.
+    With tacho_aid the name of the track ends in SUFFIX, once the estimator has used the tachometer; with resolve in
+    resolved.SUFFIX, where the log began while turning and a sign was decided.
     """
     warm = make(ESTIMATORS[name], shape)
     for k in range(min(WARM_SAMPLES, len(data.t_s))):
@@ -178,6 +187,12 @@ def run_estimator(
         if k % 200 == 0:
             progress(k / n)
     called = name + SUFFIX if aided else name
+    fresh = make(ESTIMATORS[name], shape, card)
+    if resolve and isinstance(fresh, ProductsRate):
+        whole = int(np.argmax(missing[1:] > 0)) + 1 if (missing[1:] > 0).any() else n
+        if past := resolved.resolve(fresh.core, data.t_s[:whole], np.ascontiguousarray(f_axis[:whole])):
+            called += resolved.SUFFIX
+            past.into(omega, P, angle, q)
     return Track(called, omega, P, q, angle, alpha, force, still, p_n, busy / n / 1000.0)
 
 

@@ -91,6 +91,7 @@ class RateEstimator(Protocol):
 EMPTY = np.zeros(0)
 EMPTY.setflags(write=False)
 KEEP_STILL, WAITING = "finding biases: keep still", "no standstill yet: keep still"
+LOST = "; the filter lost its covariance and began anew: this motion or layout is not for it"
 TWO_SIGNS = "turning, sign of the rate unknown"
 
 
@@ -243,11 +244,13 @@ class ProductsRate(_Stepping):
         still, started, two, sign = row[track.STILL : track.SIGN + 1].tolist()
         angle, nis = row[track.ANGLE : track.NIS + 1].tolist()
         P = row[track.P : track.P + 9].reshape(3, 3)
-        sights, reason = sight.ALL_BLIND, WAITING
+        sights, reason = sight.ALL_BLIND, WAITING + LOST * (self.core.lost > 0)
         if started:
             sights, reason = tuple(map(int, row[track.SIGHT : track.SIGHT + 3].tolist())), ""
             if sights != sight.ALL_VALID:
-                reason = sight.reason(sights, row[track.P : track.P + 9 : 4], sign, two > 0.0)
+                variances = row[track.P : track.P + 9 : 4]
+                size = math.hypot(*row[track.OMEGA : track.OMEGA + 3].tolist(), math.sqrt(sum(variances.tolist())))
+                reason = sight.reason(sights, variances, sign, two > 0.0, size)
         m = self._m if started and nis != 0.0 else 0
         phase = KEEP_STILL if not started else TWO_SIGNS if two else "still" if still else "turning"
         return RateState(

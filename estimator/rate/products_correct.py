@@ -108,18 +108,26 @@ def _add_spread(P: Array, work: Array, s: Sensor) -> None:
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
 def by_force(
-    x: Array, P: Array, work: Array, p: Three, alpha: Three, turning: bool, s: Sensor, t: Tuning
+    x: Array, P: Array, work: Array, p: Three, alpha: Three, late: Three, turning: bool, s: Sensor, t: Tuning
 ) -> tuple[float, float]:
     """Correct by gravity and the motion of the centre about its pivot (E-35); NIS and log det.
 
-    p: specific force of the centre, m/s^2; alpha: omega', rad/s^2.
+    p: specific force of the centre, m/s^2; alpha: omega', rad/s^2, of this sample; late: its mean before. The Jacobian
+    is that of `late`: alpha's noise in it would seem to say that the centre, which does not follow it, is on the axis.
     """
-    # at rest omega' is noise: it must not seem to measure the pivot
-    force_rows(x, P, work, p, alpha if turning else (0.0, 0.0, 0.0), s, 1.0)
+    if not turning:  # omega' is noise: it must not seem to measure the pivot
+        alpha = late = (0.0, 0.0, 0.0)
+    force_rows(x, P, work, p, late, s, 1.0)
     if turning:
-        arm = x[18] * x[18] + x[19] * x[19] + x[20] * x[20] + P[23 * 18] + P[23 * 19] + P[23 * 20]
+        r0, r1, r2 = x[18], x[19], x[20]
+        d0, d1, d2 = alpha[0] - late[0], alpha[1] - late[1], alpha[2] - late[2]
+        work[RESIDUAL] -= d1 * r2 - d2 * r1
+        work[RESIDUAL + 1] -= d2 * r0 - d0 * r2
+        work[RESIDUAL + 2] -= d0 * r1 - d1 * r0
+        doubt = P[23 * 18] + P[23 * 19] + P[23 * 20]
+        noise = (r0 * r0 + r1 * r1 + r2 * r2 + doubt) * s.R_alpha[0, 0] + doubt * (d0 * d0 + d1 * d1 + d2 * d2)
         for k in range(3):
-            work[COV + 7 * k] += t.centre + arm * s.R_alpha[0, 0]
+            work[COV + 7 * k] += t.centre + noise
     return absorb_three(x, P, work, t.force_gate)
 
 

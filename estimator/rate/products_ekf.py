@@ -101,6 +101,11 @@ class ProductsFilter:
         marks = self.memory.marks
         return {"products": int(marks[frame.REFUSED]), "force": int(marks[frame.REFUSED_FORCE])}
 
+    @property
+    def lost(self) -> int:
+        """How often the filter had to start anew: a rate beyond all bounds, or a covariance that is none."""
+        return int(self.memory.marks[frame.LOST])
+
     def rows(self, t_s: Array, f_axis: Array, bound: Along | None = None) -> Array:
         """Samples (n, N), m/s^2, at t_s (n,), s, both checked: a row of products_track (n, WIDTH) after each.
 
@@ -138,6 +143,7 @@ class ProductsFilter:
         stillness.forget(w)
         w.n[stillness.LEARNT] = 0
         m.kept_at[:] = -1
+        m.marks[frame.FITTED] = 0
         for core in (m.core, m.other):
             x, P = core[:STATES], core[STATES:PP].reshape(STATES, STATES)
             full = np.eye(STATES)

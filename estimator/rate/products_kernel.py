@@ -4,7 +4,7 @@ Model and equations: products_model.py (E-30 to E-39). The functions here are th
 compares them. Corrections: products_correct.py. One flat array can be put aside and taken back:
 
     x (22) | P (22 x 22) | q_nb (4) v_n (3) p_n (3) alpha_m (3) force_n (3) sign_variance
-    | biases at rest (12), their variances, those now by scale errors | readings at rest (N)
+    | biases at rest (12), their variances, those now by scale errors | readings at rest (N) | alpha_m of late (3)
 
 P is handed on flat, (484,), row by row, and stays symmetric to the bit. Loops run along its rows, which the compiler
 turns into vector instructions; small matrices are tuples, which it keeps in registers.
@@ -27,7 +27,8 @@ GRAVITY = 9.80665  # m/s^2, standard
 PP = STATES + STATES * STATES  # where navigation begins
 Q_NB, V_N, P_N, ALPHA, FORCE, SIGN = PP, PP + 4, PP + 7, PP + 10, PP + 13, PP + 16
 REST_BIAS, REST_VARIANCE, LEVEL, REST = PP + 17, PP + 29, PP + 41, PP + 53
-SIZE = REST + MOST_AXES
+LATE = REST + MOST_AXES
+SIZE = LATE + 3
 # of the output of a step
 INNOVATION, SIGMA, NIS, USED, FORCE_NIS, FORCE_USED, LIKELIHOOD, OUT = 0, 6, 12, 13, 14, 15, 16, 17
 EKF, UKF, FORGET, HORIZON = range(4)

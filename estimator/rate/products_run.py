@@ -2,8 +2,8 @@
 
 A turn begins before the detector sees it. The filter keeps its states of the last 128 samples of standstill, every
 eighth; when a turn is noticed it goes back to where that began and runs those samples again as turning. At a start
-while turning the products give omega but for its sign. Two filters run, one for each sign, until what they say of
-omega' and of gravity's turn tells them apart (E-46).
+while turning the products give omega but for its sign. The first samples are fitted for both (products_start.py), then
+two filters run, until what they say of omega' and of gravity's turn tells the signs apart (E-46).
 """
 
 import numpy as np
@@ -13,26 +13,21 @@ from numpy.typing import NDArray
 from estimator.rate import still as stillness
 from estimator.rate.observed import Sensor
 from estimator.rate.products_kernel import (
-    ALPHA,
     FORCE_USED,
-    GRAVITY,
     HORIZON,
-    LEVEL,
     LIKELIHOOD,
     OUT,
     P_N,
     PP,
     Q_NB,
-    REST,
-    REST_VARIANCE,
-    SIGN,
     SIZE,
     USED,
     V_N,
     WORK,
     Tuning,
 )  # fmt: skip
-from estimator.rate.products_model import BIASES, FIRST, SECOND, STATES, TURNED
+from estimator.rate.products_model import STATES, TURNED
+from estimator.rate.products_start import FEWEST, FITS, MOST, SURE_FROM, begin, begin_turning, carry, mean, turning
 from estimator.rate.products_step import back, step
 from estimator.rate.still import COUNT, DEPTH, FILLED, Limits, Watch
 
@@ -43,7 +38,8 @@ KEPT = DEPTH // EVERY + 1
 ARRIVALS = 4
 WINDOW = 24  # samples of the moving horizon
 ITERATIONS = 2  # of Gauss and Newton
-STARTED, STILL, MOVED, BRANCHES, REFUSED, REFUSED_FORCE, TAKEN_BACK, STEPS, FREE, UNLIKE = range(10)  # of Memory.marks
+# of Memory.marks
+STARTED, STILL, MOVED, BRANCHES, REFUSED, REFUSED_FORCE, TAKEN_BACK, STEPS, FREE, UNLIKE, FITTED, LOST = range(12)
 LAST_S, DT, BALANCE = range(3)  # of Memory.clock
 LONGEST_GAP_S = 0.5  # s; after a longer one the rate is unknown
 UNKNOWN_RATE = 10.0  # rad/s, sigma before any standstill
@@ -63,7 +59,7 @@ MEMORY = np.dtype(
             ("other_out", "f8", (OUT,)),
             ("arrival", "f8", (ARRIVALS, SIZE)),  # of the moving horizon: states before samples of this turn
             ("arrival_at", "i8", (ARRIVALS,)),
-            ("marks", "i8", (10,)),
+            ("marks", "i8", (12,)),
             ("clock", "f8", (3,)),
             ("work", "f8", (WORK,)),  # of one step, of no meaning after it
         ],
@@ -88,6 +84,7 @@ def gap(m: Memory, w: Watch) -> None:
     stillness.forget(w)
     m.kept_at[:] = -1
     m.arrival_at[:] = -1
+    m.marks[FITTED] = 0
 
 
 @njit(cache=True, error_model="numpy")
@@ -97,83 +94,6 @@ def restart(m: Memory, w: Watch) -> None:
     m.marks[STARTED] = m.marks[STILL] = m.marks[MOVED] = m.marks[BRANCHES] = 0
     m.core[:] = 0.0
     m.core[Q_NB] = 1.0
-
-
-@njit(cache=True, error_model="numpy")
-def begin(core: Array, s: Sensor, t: Tuning, mean: Array, theta_b: Array) -> None:
-    """First state from the mean y (12,) of a short standstill (E-36)."""
-    core[:] = 0.0
-    P = core[STATES:PP].reshape(STATES, STATES)
-    up = mean[9:12] / np.sqrt(np.sum(mean[9:12] ** 2))
-    core[12:15] = GRAVITY * up
-    for i in range(12):
-        for j in range(12):
-            P[BIASES[i], BIASES[j]] = t.bias * s.drift[i, j]
-    for i in range(3):
-        P[i, i] = t.still_rate / 25.0
-        P[18 + i, 18 + i] = t.pivot
-        for j in range(3):
-            along = up[i] * up[j]
-            P[12 + i, 12 + j] = t.gravity * along + t.tilt * ((1.0 if i == j else 0.0) - along)
-    core[ALPHA : ALPHA + 3] = mean[0:3]
-    core[SIGN] = t.still_rate / 25.0
-    core[Q_NB : Q_NB + 4] = _level(up)
-    for k in range(12):
-        core[REST_VARIANCE + k] = core[LEVEL + k] = t.bias * s.drift[k, k]
-    for i in range(s.n):
-        core[REST + i] = theta_b[i, 0] * core[12] + theta_b[i, 1] * core[13] + theta_b[i, 2] * core[14]
-
-
-@njit(cache=True, error_model="numpy")
-def _level(up: Array) -> Array:
-    """q_nb of a body at rest whose up is `up`; x_b points north, or z_b where x_b is vertical (E-11)."""
-    ahead = np.array([1.0, 0.0, 0.0]) if abs(up[0]) < 0.999 else np.array([0.0, 0.0, 1.0])
-    north = ahead - np.sum(ahead * up) * up
-    north /= np.sqrt(np.sum(north * north))
-    east = np.array([north[1] * up[2] - north[2] * up[1], north[2] * up[0] - north[0] * up[2],
-                     north[0] * up[1] - north[1] * up[0]])  # fmt: skip
-    C = np.empty((3, 3))
-    C[0], C[1], C[2] = north, east, -up
-    w = C[0, 0] + C[1, 1] + C[2, 2]
-    squares = np.array([1.0 + w, 1.0 - w + 2.0 * C[0, 0], 1.0 - w + 2.0 * C[1, 1], 1.0 - w + 2.0 * C[2, 2]])
-    a, b, c = C[2, 1] - C[1, 2], C[0, 2] - C[2, 0], C[1, 0] - C[0, 1]
-    xy, xz, yz = C[0, 1] + C[1, 0], C[0, 2] + C[2, 0], C[1, 2] + C[2, 1]
-    table = np.array([[squares[0], a, b, c], [a, squares[1], xy, xz], [b, xy, squares[2], yz], [c, xz, yz, squares[3]]])
-    q = table[np.argmax(squares)]
-    q = q / np.sqrt(np.sum(q * q))
-    return q if q[0] >= 0.0 else -q
-
-
-@njit(cache=True, error_model="numpy")
-def _mean(w: Watch, window: int) -> Array:
-    mean = np.zeros(12)
-    for k in range(1, window + 1):
-        mean += w.y[(w.n[COUNT] - k) % DEPTH] / window
-    return mean
-
-
-@njit(cache=True, error_model="numpy")
-def _begin_turning(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits) -> None:
-    """Two filters, for omega and -omega, when the products say that the body turns (E-46)."""
-    if w.n[FILLED] < 2 * c.window or not s.plain:
-        return
-    mean = _mean(w, c.window)
-    Z = np.empty((3, 3))
-    for k in range(6):
-        Z[FIRST[k], SECOND[k]] = Z[SECOND[k], FIRST[k]] = mean[3 + k]
-    sizes, directions = np.linalg.eigh(Z)
-    if not sizes[2] ** 2 > t.start_turning * (t.bias * s.drift[3, 3] + s.R_c[0, 0]):
-        return
-    omega = np.sqrt(sizes[2]) * directions[:, 2]
-    for sign in (1.0, -1.0):
-        core = m.core if sign > 0.0 else m.other
-        begin(core, s, t, mean, s.theta_b)
-        core[0:3] = sign * omega
-        P = core[STATES:PP].reshape(STATES, STATES)
-        for i in range(3):
-            P[i, i] = t.bias * s.drift[3, 3] / sizes[2]
-            P[12 + i, 12 + i] += 3.0 * t.tilt
-    m.marks[STARTED], m.marks[BRANCHES], m.marks[MOVED], m.clock[BALANCE] = 1, 2, 1, 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -207,6 +127,37 @@ def _two_signs(m: Memory, still: bool) -> None:
         m.clock[BALANCE] = -m.clock[BALANCE]
     if still or m.clock[BALANCE] > DECIDED:
         m.marks[BRANCHES] = 1
+
+
+@njit(cache=True, error_model="numpy")
+def _fit_start(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, still: bool) -> None:
+    """One more sample of a start while turning: fitted anew now and then, carried on between (E-46)."""
+    m.marks[FITTED] += 1
+    n = m.marks[FITTED]
+    if still:  # it was no turn
+        begin(m.core, s, t, mean(w, c.window), s.theta_b)
+        m.marks[BRANCHES], m.marks[MOVED], m.marks[FITTED] = 1, 0, 0
+    elif n in FITS:
+        m.clock[BALANCE] = begin_turning(m.core, m.other, m.kept[0], m.kept[1], w, s, t, n)
+        m.marks[BRANCHES] = 1 if m.clock[BALANCE] > DECIDED and n >= SURE_FROM else 2
+    else:
+        k = (w.n[COUNT] - 1) % DEPTH
+        carry(m.core, m.work, w.y[k], w.dt[k], s, t)
+        carry(m.other, m.work, w.y[k], w.dt[k], s, t)
+    if n >= MOST:  # from here a filter, that does not know yet whether the axis is fixed
+        m.marks[FITTED], m.marks[FREE] = 0, 200
+
+
+@njit(cache=True, error_model="numpy")
+def _diverged(m: Memory, w: Watch) -> bool:
+    """Start anew when the rate is beyond all bounds or no number at all, or its covariance is none any more."""
+    x, P = m.core[0:3], m.core[STATES:PP]
+    if x[0] ** 2 + x[1] ** 2 + x[2] ** 2 < FASTEST**2 and P[0] > 0.0 and P[23] > 0.0 and P[46] > 0.0:
+        return False
+    m.marks[LOST] += 1
+    restart(m, w)
+    m.out[:] = 0.0
+    return True
 
 
 @njit(cache=True, error_model="numpy")
@@ -266,13 +217,19 @@ def advance(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, t_s: float, a:
         still, _ = stillness.detect(w, s, c, np.zeros(3), UNKNOWN_RATE**2 * np.eye(3), dt)
         m.marks[STILL] = 1 if still else 0
         if still:
-            begin(m.core, s, t, _mean(w, c.window), s.theta_b)
+            begin(m.core, s, t, mean(w, c.window), s.theta_b)
             m.marks[STARTED], m.marks[BRANCHES] = 1, 1
-        else:
-            _begin_turning(m, w, s, t, c)
+        elif turning(w, s, t):
+            m.marks[STARTED], m.marks[BRANCHES], m.marks[MOVED], m.marks[FITTED] = 1, 2, 1, FEWEST
+            m.clock[BALANCE] = begin_turning(m.core, m.other, m.kept[0], m.kept[1], w, s, t, FEWEST)
         return
     P = m.core[STATES:PP].reshape(STATES, STATES)
     still, depth = stillness.detect(w, s, c, m.core[0:3], P[0:3, 0:3], dt)
+    if m.marks[FITTED] > 0:
+        m.marks[STILL] = 1 if still else 0
+        _fit_start(m, w, s, t, c, still)
+        _diverged(m, w)
+        return
     now = w.n[COUNT] - 1
     first = now
     if still and now % EVERY == 0:
@@ -307,9 +264,7 @@ def advance(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, t_s: float, a:
                 step(core, m.work, s, t, w.y[k], at, w.dt[k], not still, fixed, grow, out)
     if m.marks[BRANCHES] == 2:
         _two_signs(m, still)
-    if not m.core[0] ** 2 + m.core[1] ** 2 + m.core[2] ** 2 < FASTEST**2:  # diverged, or no number at all
-        restart(m, w)
-        m.out[:] = 0.0
+    if _diverged(m, w):
         return
     if still and m.marks[MOVED] == 0:  # position counts from the end of the first standstill
         m.core[V_N : V_N + 3] = 0.0

@@ -17,6 +17,7 @@ from estimator.rate.products_kernel import (
     FORCE_USED,
     FORGET,
     GRAVITY,
+    LATE,
     LEVEL,
     LIKELIHOOD,
     NIS,
@@ -38,6 +39,7 @@ from estimator.rate.products_model import BIASES, FIRST, SECOND, STATES
 Array = NDArray[np.float64]
 
 SURE = 16.0  # of |omega|^2 over its variance: the sign is certain, products may narrow the variance
+LATELY = 1.0 / 16.0  # weight of one sample in the mean omega' that the pivot is told by
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
@@ -78,10 +80,12 @@ def step(core: Array, work: Array, s: Sensor, t: Tuning, y: Array, at: Three, dt
     if used:
         if t.centre_sees:
             free = (alpha[0] - x[3], alpha[1] - x[4], alpha[2] - x[5])
-            force_nis, force_logdet = by_force(x, P, work, (y[9], y[10], y[11]), free, turning, s, t)
+            late = (core[LATE] - x[3], core[LATE + 1] - x[4], core[LATE + 2] - x[5])
+            force_nis, force_logdet = by_force(x, P, work, (y[9], y[10], y[11]), free, late, turning, s, t)
         if not turning:
             by_standstill(x, P, work, (y[0], y[1], y[2]), earth_b, s, t)
         for i in range(3):
+            core[LATE + i] += LATELY * (core[ALPHA + i] - core[LATE + i])
             core[ALPHA + i] = y[i]
         f_b = (y[9] - x[15], y[10] - x[16], y[11] - x[17])
     out[NIS], out[USED], out[FORCE_NIS] = nis, 1.0 if used else 0.0, force_nis
@@ -139,8 +143,13 @@ def _grow(core: Array, P: Array, work: Array, s: Sensor, t: Tuning, seconds: flo
     bias, variance, level = core[REST_BIAS:REST_VARIANCE], core[REST_VARIANCE:LEVEL], core[LEVEL:REST]
     away, follow = work[0 : s.n], work[s.n : s.n + STATES]
     away[:], follow[:] = 0.0, 1.0
+    f0, f1, f2 = x[12], x[13], x[14]
+    if turning:  # the centre's own way about the pivot
+        w0, w1, w2, r0, r1, r2 = x[0], x[1], x[2], x[18], x[19], x[20]
+        wr, ww = w0 * r0 + w1 * r1 + w2 * r2, w0 * w0 + w1 * w1 + w2 * w2
+        f0, f1, f2 = f0 + w0 * wr - ww * r0, f1 + w1 * wr - ww * r1, f2 + w2 * wr - ww * r2
     for i in range(s.n):
-        reading = s.theta_b[i, 0] * x[12] + s.theta_b[i, 1] * x[13] + s.theta_b[i, 2] * x[14]
+        reading = s.theta_b[i, 0] * f0 + s.theta_b[i, 1] * f1 + s.theta_b[i, 2] * f2
         if turning:
             for k in range(6):
                 reading += s.Q[i, k] * x[FIRST[k]] * x[SECOND[k]]

@@ -68,13 +68,13 @@ def run(
         row[SIGHT : SIGHT + 3] = sight.VALID if started else sight.BLIND
         if follows and started:
             alpha, q_nb = row[ALPHA : ALPHA + 3], row[Q_NB : Q_NB + 4]
-            bound_live.step(b, whole, row[OMEGA : OMEGA + 3], alpha, q_nb, still, m.clock[frame.DT])
+            bound_live.step(b, whole, m.core[0:3], alpha, q_nb, still, m.clock[frame.DT])
         for i in range(3):
             row[BOUND + i] = b.sigma[i] if follows else 0.0
         if started and not still:
-            variances, two = (row[P], row[P + 4], row[P + 8]), m.marks[frame.BRANCHES] == 2
-            omega, out = row[OMEGA : OMEGA + 3], row[SIGHT : SIGHT + 3]
-            sight.judge(omega, variances, row[SIGN], two, s, m.clock[frame.DT], out)
+            core, out, two = m.core, row[SIGHT : SIGHT + 3], m.marks[frame.BRANCHES] == 2
+            variances = (core[STATES], core[STATES + STATES + 1], core[STATES + 2 * STATES + 2])
+            sight.judge(core[0:3], variances, row[SIGN], two, s, m.clock[frame.DT], out)
 
 
 @njit(cache=True, error_model="numpy")
@@ -98,3 +98,18 @@ def write(m: frame.Memory, w: stillness.Watch, row: Array) -> None:
     row[ANGLE], row[NIS], row[SIGN] = core[TURNED], m.out[kernel.NIS], core[kernel.SIGN]
     row[STARTED], row[STILL] = 1.0 if started else 0.0, 1.0 if m.marks[frame.STILL] == 1 else 0.0
     row[TWO] = 1.0 if m.marks[frame.BRANCHES] == 2 else 0.0
+    if m.marks[frame.BRANCHES] == 2:
+        _between(m, row)
+
+
+@njit(cache=True, error_model="numpy")
+def _between(m: frame.Memory, row: Array) -> None:
+    """omega and the angle become the mean over both signs by their probability, P the covariance about it (E-46)."""
+    wrong = 1.0 / (1.0 + np.exp(m.clock[frame.BALANCE]))
+    for i in range(3):
+        row[OMEGA + i] += wrong * (m.other[i] - m.core[i])
+        for j in range(3):
+            at = STATES + STATES * i + j
+            apart = (m.other[i] - m.core[i]) * (m.other[j] - m.core[j])
+            row[P + 3 * i + j] = (1.0 - wrong) * m.core[at] + wrong * m.other[at] + wrong * (1.0 - wrong) * apart
+    row[ANGLE] += wrong * (m.other[TURNED] - m.core[TURNED])

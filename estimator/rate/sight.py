@@ -51,11 +51,12 @@ def judge(
             out[k] = BLIND
 
 
-def reason(sights: tuple[int, int, int], variances: Array, sign_variance: float, two: bool) -> str:
-    """Why, for people; empty when all components are valid. variances (3,) of omega."""
+def reason(sights: tuple[int, int, int], variances: Array, sign_variance: float, two: bool, size: float) -> str:
+    """Why, for people; empty when all components are valid. variances (3,) of omega, size of it, rad/s."""
     said = []
     if AMBIGUOUS in sights:
-        said.append(f"sign unknown: {'began while turning' if two else f'passed zero with {_deg(sign_variance)}'}")
+        began = f"began while turning, at {size * DEG:.0f} deg/s"
+        said.append(f"sign unknown: {began if two else f'passed zero with {_deg(sign_variance)}'}")
     for k, axis in enumerate("xyz"):
         if sights[k] == BLIND:
             said.append(f"{axis}: integration only, now {_deg(variances[k])} uncertain")

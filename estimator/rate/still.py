@@ -1,4 +1,4 @@
-"""Is the body still? Questions on the newest samples, with stated limits (E-20 to E-24).
+"""Is the body still? Questions on the newest samples, with stated limits (E-20 to E-25).
 
     spread    do the axes scatter more than their noise?                   chi-square of N (window - 1) degrees
     quiet     do the mean omega' and products of two windows differ
@@ -8,7 +8,8 @@
     tilt      does p differ from that of this standstill?                  chi-square of 3 degrees
     steady    is p now what it was a second ago? Gravity turns in a body
               that turns slowly about an axis that is not quite vertical.  chi-square of 3 degrees
-    rate      does the caller's rate exclude zero?                         waived after `patience_s` of the others
+    rate      does the caller's rate exclude zero? In doubt: it and
+              `steady` together?                                           waived after `patience_s` of the others
     biases    when they have moved for good, `quiet` would fail for ever: it is waived after twice `patience_s`
 
 `turn` and `tilt` are asked of a body that stands; they end a standstill and say how many samples ago it ended. A body
@@ -50,7 +51,8 @@ class Config:
     rate_slack: float = 0.02  # rad/s, added to the caller's sigma
     sure_rate: float = 0.105  # rad/s; a caller whose rate is below it by 2 sigma need not wait for `steady`,
     likely_rate: float = 0.19  # rad/s; below this only for `brief_span`
-    brief_span: int = 40  # samples
+    brief_span: int = 60  # samples
+    begin_limit: float = 18.0  # chi-square, 6 degrees: of `rate` and `steady` together
     patience_s: float = 6.0  # s of stillness by the axes alone that outweigh the caller's rate
     drift: float = 0.02  # 1/s^2, sigma by which biases of the quiet quantities may have moved since
     drift_now: float = 0.004  # rad/s^2, the same within one standstill
@@ -202,27 +204,27 @@ def _tilted(w: Watch, s: Sensor, window: int, drift: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _steady(w: Watch, s: Sensor, c: Limits, span: int) -> bool:
-    """Is the mean p of the window what it was `span` samples ago (E-24)? Not before so many are there."""
-    if w.n[FILLED] < span + c.window:
-        return False
+def _swung(w: Watch, s: Sensor, c: Limits, span: int) -> float:
+    """Chi-square of the mean p of the window against that of `span` samples ago, which must be there (E-24)."""
     total = 0.0
     for r in range(9, 12):
         d = _mean(w, c.window, r) - _mean(w, c.window, r, span)
         total += d * d / (s.R_p[r - 9, r - 9] * 2.0 / c.window + c.drift_steady**2)
-    return total <= c.steady_limit
+    return total
 
 
 @njit(cache=True, error_model="numpy")
-def _settled(w: Watch, s: Sensor, c: Limits, omega: Array, P: Array) -> bool:
-    """Has gravity kept its direction for as long as the caller's rate leaves in doubt?"""
-    if _steady(w, s, c, c.steady_span):
-        return True
+def _settled(w: Watch, s: Sensor, c: Limits, omega: Array, P: Array, told: float) -> bool:
+    """Has gravity kept its direction for as long as the caller's rate leaves in doubt? told: chi-square of `rate`."""
     size = np.sqrt(omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2])
     most = size + 2.0 * np.sqrt(max(P[0, 0], P[1, 1], P[2, 2]))
-    if w.n[LEARNT] == 0 or most > c.likely_rate:
+    if w.n[LEARNT] > 0 and most < c.sure_rate:
+        return True
+    span = c.brief_span if w.n[LEARNT] > 0 and most <= c.likely_rate else c.steady_span
+    if w.n[FILLED] < span + c.window:
         return False
-    return most < c.sure_rate or _steady(w, s, c, c.brief_span)
+    swung = _swung(w, s, c, span)
+    return swung <= c.steady_limit and (told >= c.rate_limit or told + swung < c.begin_limit)
 
 
 @njit(cache=True, error_model="numpy")
@@ -282,10 +284,11 @@ def _stands(w: Watch, s: Sensor, c: Limits, omega: Array, P: Array, dt: float) -
     if w.n[FILLED] < c.window or _scatter(w, s, c.window) > c.spread_limit * c.sigma_axis**2 or w.n[HOLD] > 0:
         w.n[QUIET_FOR] = w.n[SLOW_FOR] = 0
         return False
-    if not _settled(w, s, c, omega, P):
+    told = rate_excludes_zero(omega, P, c.rate_slack)
+    slow = told < c.rate_limit
+    if not _settled(w, s, c, omega, P, told):
         w.n[QUIET_FOR] = w.n[SLOW_FOR] = 0
         return False
-    slow = rate_excludes_zero(omega, P, c.rate_slack) < c.rate_limit
     if w.n[LEARNT] == 0 or (
         _moved(w, s, c.window, c.drift) <= c.quiet_limit and _moved(w, s, c.short_window, c.drift) <= c.quiet_limit
     ):

@@ -84,7 +84,7 @@ def correct(m: frame.Memory, w: Watch, s: Sensor, axis_b: Array, report: Report)
         core[:STATES] += gain * (y / S)
         P -= np.outer(gain, gain) / S
         core[SIGN] = min(core[SIGN], noise)
-        used = True
+        used, marks[frame.FITTED] = True, 0  # a later fit would not know of it
     return used
 
 
