@@ -5,6 +5,7 @@
 Each service is a process that does what it does live, with the real parts, as fast as it can (soak_services.py says
 what); with the dashboard comes a real router. Private memory of each (USS) is read at every hundredth of the way; the
 slope is that of a straight line through the second half, when everything that is kept up to a bound has reached it.
+Ctrl-C ends it early: the figures are those of what was done.
 """
 
 import multiprocessing
@@ -43,7 +44,7 @@ def watch(name: str, process: Any, hours: float, done: Any, rows: list[tuple[flo
 
 
 def say(service: str, hours: float, rows: list[tuple[float, float]], seconds: float) -> None:
-    """Figures of a service; of what was done when it was cut short."""
+    """Figures of a service."""
     if len(rows) < 8:
         line(f"soak_memory_slope_{service}", None, "MB/h", target=0.0, not_measured="it ended too soon")
         return
@@ -58,52 +59,50 @@ def say(service: str, hours: float, rows: list[tuple[float, float]], seconds: fl
     )  # fmt: skip
 
 
-def alone(service: str, hours: float) -> None:
+def alone(service: str, hours: float, told: dict[str, list]) -> None:
     """A service that needs no other."""
     with tempfile.TemporaryDirectory() as name:
-        done, rows, begun = CONTEXT.Value("d", 0.0), [], time.monotonic()
+        done = CONTEXT.Value("d", 0.0)
         process = CONTEXT.Process(target=getattr(services, service), args=(Path(name), hours, done), daemon=True)
         process.start()
-        watch(service, process, hours, done, rows)
+        watch(service, process, hours, done, told.setdefault(service, []))
         process.join()
-        say(service, hours, rows, time.monotonic() - begun)
 
 
-def on_a_bus(hours: float) -> None:
+def on_a_bus(hours: float, told: dict[str, list]) -> None:
     """Router and dashboard, and one who talks to them."""
     bus, done, taken = services.bus_of(), CONTEXT.Value("d", 0.0), CONTEXT.Value("q", 0)
-    parts = [
-        CONTEXT.Process(target=services.router, args=(bus,), daemon=True),
-        CONTEXT.Process(target=services.dashboard, args=(bus, hours, done, taken), daemon=True),
-        CONTEXT.Process(target=services.talk, args=(bus, hours, taken), daemon=True),
-    ]
-    for part in parts:
+    parts = {
+        "router": CONTEXT.Process(target=services.router, args=(bus,), daemon=True),
+        "dashboard": CONTEXT.Process(target=services.dashboard, args=(bus, hours, done, taken), daemon=True),
+        "talk": CONTEXT.Process(target=services.talk, args=(bus, hours, taken), daemon=True),
+    }
+    for part in parts.values():
         part.start()
-    begun, found = time.monotonic(), {"router": [], "dashboard": []}
-    threads = [
-        threading.Thread(target=watch, args=(name, part, hours, done, rows), daemon=True)
-        for part, (name, rows) in zip(parts, found.items(), strict=False)
-    ]
-    for thread in threads:
-        thread.start()
-    parts[2].join()
-    seconds = time.monotonic() - begun
-    for part in parts[:2]:
+    talking = parts.pop("talk")
+    for name, part in parts.items():
+        arguments = (name, part, hours, done, told.setdefault(name, []))
+        threading.Thread(target=watch, args=arguments, daemon=True).start()
+    talking.join()
+    for part in parts.values():
         part.kill()
         part.join()
-    for service, rows in found.items():
-        say(service, hours, rows, seconds)
 
 
 def main(hours: float = 8.0, *names: str) -> None:
     """Run side by side and print."""
-    names = names or (*ALONE, "dashboard")
-    threads = [threading.Thread(target=alone, args=(name, hours)) for name in names if name in ALONE]
-    threads += [threading.Thread(target=on_a_bus, args=(hours,))] if "dashboard" in names else []
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    names, told, begun = names or (*ALONE, "dashboard"), {}, time.monotonic()
+    works = [threading.Thread(target=alone, args=(name, hours, told), daemon=True) for name in names if name in ALONE]
+    works += [threading.Thread(target=on_a_bus, args=(hours, told), daemon=True)] if "dashboard" in names else []
+    for work in works:
+        work.start()
+    try:
+        for work in works:
+            work.join()
+    except KeyboardInterrupt:
+        print("ended early", file=sys.stderr)
+    for service, rows in told.items():
+        say(service, hours, rows, time.monotonic() - begun)
 
 
 if __name__ == "__main__":
