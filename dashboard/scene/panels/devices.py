@@ -1,6 +1,7 @@
 """The summary on the left: which device, where its data come from, is it well, and the numbers one looks for first."""
 
 import re
+import time
 
 import numpy as np
 
@@ -47,14 +48,25 @@ class Devices(Panel):
         text, colour = SOURCES[self._source(s)]
         data = "imu" if device.is_vehicle else "accel"
         newest = device.get(data) or max(device.latest.values(), key=lambda latest: latest.arrived)
-        old = newest.age(s.now)
-        state = '<span class="gf-live">● live</span>' if old < 1.0 else f'<b class="gf-bad">■ stale, {age(old)}</b>'
+        state = self._state(s, newest.age(s.now))
         head = (
             f'<div class="gf-head"><span class="gf-badge" style="background:{colour}">{text}</span>'
             f'<span class="gf-name">{escape(device.name)}</span>{state}</div>'
         )
         body = self._vehicle(s) if device.is_vehicle else self._cube(s)
         return head + self._alerts(s) + self._advice(s) + body + rows(self._health(s), s.stale("link")) + self._logs(s)
+
+    @staticmethod
+    def _state(s: Snapshot, old: float) -> str:
+        """Live, stale, or what the replay does that these data are of."""
+        replay = s.store.replay.state(s.device.name, time.monotonic())
+        if replay == "ended":
+            return '<b class="gf-bad">■ replay ended</b>'
+        if replay == "paused":
+            return '<b class="gf-replay">❚❚ replay paused</b>'
+        if old >= 1.0:
+            return f'<b class="gf-bad">■ stale, {age(old)}</b>'
+        return '<b class="gf-replay">▶ replay</b>' if replay else '<span class="gf-live">● live</span>'
 
     @staticmethod
     def _source(s: Snapshot) -> int:
