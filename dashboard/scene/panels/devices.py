@@ -18,6 +18,7 @@ from dashboard.scene.palette import (
     rows,
 )
 from dashboard.scene.panels.base import DEG, Panel, Snapshot
+from dashboard.scene.tilt import roll_pitch
 from messages import gyrofree_pb2 as pb
 
 _COUNTS = re.compile(r"fixes (\w+) (\d+)")
@@ -53,7 +54,7 @@ class Devices(Panel):
             f'<div class="gf-head"><span class="gf-badge" style="background:{colour}">{text}</span>'
             f'<span class="gf-name">{escape(device.name)}</span>{state}</div>'
         )
-        body = self._vehicle(s) if device.is_vehicle else self._cube(s)
+        body = {"nav": self._vehicle, "attitude": self._board, "rate": self._cube}[device.body](s)
         return head + self._alerts(s) + self._advice(s) + body + rows(self._health(s), s.stale("link")) + self._logs(s)
 
     @staticmethod
@@ -107,6 +108,14 @@ class Devices(Panel):
             quality = pb.GnssFix.Quality.Name(fix.message.quality).removeprefix("QUALITY_").replace("_", " ").lower()
             satellites = str(fix.message.satellites) if fix.message.satellites else "–"
             tiles.append(_raw_tile("GNSS", FIX, satellites, "satellites", quality, s.stale("gnss")))
+        return f'<div class="gf-tiles">{"".join(tiles)}</div>'
+
+    @staticmethod
+    def _board(s: Snapshot) -> str:
+        tiles = []
+        for name in s.device.estimators("attitude"):
+            roll, pitch = (number(angle * DEG, 1) for angle in roll_pitch(s.device.get("attitude", name).message.q_nb))
+            tiles.append(_tile(s, name, "attitude", f"{roll} / {pitch}", "°", "roll / pitch"))
         return f'<div class="gf-tiles">{"".join(tiles)}</div>'
 
     @staticmethod
