@@ -97,6 +97,8 @@ class Spool:
             seen = self._glances.setdefault((topic, device), deque(maxlen=int(OVERVIEW_LENGTH_S / OVERVIEW_S)))
             if not seen or abs(utc_ns - seen[-1].utc_ns) >= OVERVIEW_S * 1e9:
                 seen.append(Glance(utc_ns, segment, offset))
+                while abs(utc_ns - seen[0].utc_ns) > OVERVIEW_LENGTH_S * 1e9:  # of a rare topic fewer stay
+                    seen.popleft()
 
     def close(self) -> None:
         """Sync and let the folder go."""
