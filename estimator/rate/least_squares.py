@@ -17,7 +17,7 @@ from estimator.layouts.layout import Layout
 from estimator.rate import still as stillness
 from estimator.rate.direct import Direct
 from estimator.rate.observed import Sensor, sensor
-from estimator.rate.products_run import _level as level
+from estimator.rate.products_start import level
 from estimator.rate.still import COUNT, DEPTH, LEARNING, Limits, Watch
 
 Array = NDArray[np.float64]

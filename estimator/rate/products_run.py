@@ -11,28 +11,25 @@ from numba import njit
 from numpy.typing import NDArray
 
 from estimator.rate import still as stillness
+from estimator.rate.compiling import lean, making
 from estimator.rate.observed import Sensor
 from estimator.rate.products_kernel import (
-    ALPHA,
+    DENSITY,
     FORCE_USED,
-    GRAVITY,
     HORIZON,
-    LEVEL,
-    LIKELIHOOD,
+    MISFIT,
     OUT,
     P_N,
     PP,
     Q_NB,
-    REST,
-    REST_VARIANCE,
-    SIGN,
     SIZE,
     USED,
     V_N,
     WORK,
     Tuning,
 )  # fmt: skip
-from estimator.rate.products_model import BIASES, FIRST, SECOND, STATES, TURNED
+from estimator.rate.products_model import FIRST, SECOND, STATES, TURNED
+from estimator.rate.products_start import begin
 from estimator.rate.products_step import back, step
 from estimator.rate.still import COUNT, DEPTH, FILLED, Limits, Watch
 
@@ -63,6 +60,7 @@ MEMORY = np.dtype(
             ("other_out", "f8", (OUT,)),
             ("arrival", "f8", (ARRIVALS, SIZE)),  # of the moving horizon: states before samples of this turn
             ("arrival_at", "i8", (ARRIVALS,)),
+            ("end", "f8", (6,)),  # of the moving horizon: omega and b_alpha at the newest sample
             ("marks", "i8", (10,)),
             ("clock", "f8", (3,)),
             ("work", "f8", (WORK,)),  # of one step, of no meaning after it
@@ -82,15 +80,21 @@ def memory() -> Memory:
     return m
 
 
-@njit(cache=True, error_model="numpy")
+@lean
+def put(target: Array, source: Array) -> None:
+    """target becomes the first numbers of source; an assignment would ask whether they overlap, and copy."""
+    for k in range(len(target)):
+        target[k] = source[k]
+
+
+@lean
 def gap(m: Memory, w: Watch) -> None:
     """Samples are missing: the next step predicts across."""
     stillness.forget(w)
-    m.kept_at[:] = -1
-    m.arrival_at[:] = -1
+    m.kept_at[:] = m.arrival_at[:] = -1
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def restart(m: Memory, w: Watch) -> None:
     """The rate is unknown: wait for a standstill, or start while turning."""
     gap(m, w)
@@ -99,52 +103,7 @@ def restart(m: Memory, w: Watch) -> None:
     m.core[Q_NB] = 1.0
 
 
-@njit(cache=True, error_model="numpy")
-def begin(core: Array, s: Sensor, t: Tuning, mean: Array, theta_b: Array) -> None:
-    """First state from the mean y (12,) of a short standstill (E-36)."""
-    core[:] = 0.0
-    P = core[STATES:PP].reshape(STATES, STATES)
-    up = mean[9:12] / np.sqrt(np.sum(mean[9:12] ** 2))
-    core[12:15] = GRAVITY * up
-    for i in range(12):
-        for j in range(12):
-            P[BIASES[i], BIASES[j]] = t.bias * s.drift[i, j]
-    for i in range(3):
-        P[i, i] = t.still_rate / 25.0
-        P[18 + i, 18 + i] = t.pivot
-        for j in range(3):
-            along = up[i] * up[j]
-            P[12 + i, 12 + j] = t.gravity * along + t.tilt * ((1.0 if i == j else 0.0) - along)
-    core[ALPHA : ALPHA + 3] = mean[0:3]
-    core[SIGN] = t.still_rate / 25.0
-    core[Q_NB : Q_NB + 4] = _level(up)
-    for k in range(12):
-        core[REST_VARIANCE + k] = core[LEVEL + k] = t.bias * s.drift[k, k]
-    for i in range(s.n):
-        core[REST + i] = theta_b[i, 0] * core[12] + theta_b[i, 1] * core[13] + theta_b[i, 2] * core[14]
-
-
-@njit(cache=True, error_model="numpy")
-def _level(up: Array) -> Array:
-    """q_nb of a body at rest whose up is `up`; x_b points north, or z_b where x_b is vertical (E-11)."""
-    ahead = np.array([1.0, 0.0, 0.0]) if abs(up[0]) < 0.999 else np.array([0.0, 0.0, 1.0])
-    north = ahead - np.sum(ahead * up) * up
-    north /= np.sqrt(np.sum(north * north))
-    east = np.array([north[1] * up[2] - north[2] * up[1], north[2] * up[0] - north[0] * up[2],
-                     north[0] * up[1] - north[1] * up[0]])  # fmt: skip
-    C = np.empty((3, 3))
-    C[0], C[1], C[2] = north, east, -up
-    w = C[0, 0] + C[1, 1] + C[2, 2]
-    squares = np.array([1.0 + w, 1.0 - w + 2.0 * C[0, 0], 1.0 - w + 2.0 * C[1, 1], 1.0 - w + 2.0 * C[2, 2]])
-    a, b, c = C[2, 1] - C[1, 2], C[0, 2] - C[2, 0], C[1, 0] - C[0, 1]
-    xy, xz, yz = C[0, 1] + C[1, 0], C[0, 2] + C[2, 0], C[1, 2] + C[2, 1]
-    table = np.array([[squares[0], a, b, c], [a, squares[1], xy, xz], [b, xy, squares[2], yz], [c, xz, yz, squares[3]]])
-    q = table[np.argmax(squares)]
-    q = q / np.sqrt(np.sum(q * q))
-    return q if q[0] >= 0.0 else -q
-
-
-@njit(cache=True, error_model="numpy")
+@making
 def _mean(w: Watch, window: int) -> Array:
     mean = np.zeros(12)
     for k in range(1, window + 1):
@@ -152,7 +111,13 @@ def _mean(w: Watch, window: int) -> Array:
     return mean
 
 
-@njit(cache=True, error_model="numpy")
+@making
+def _begin_still(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits) -> None:
+    begin(m.core, s, t, _mean(w, c.window), s.theta_b)
+    m.marks[STARTED], m.marks[BRANCHES] = 1, 1
+
+
+@making
 def _begin_turning(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits) -> None:
     """Two filters, for omega and -omega, when the products say that the body turns (E-46)."""
     if w.n[FILLED] < 2 * c.window or not s.plain:
@@ -176,7 +141,7 @@ def _begin_turning(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits) -> None
     m.marks[STARTED], m.marks[BRANCHES], m.marks[MOVED], m.clock[BALANCE] = 1, 2, 1, 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _take_back(m: Memory, depth: int, now: int) -> int:
     """Core becomes the state before sample now - depth, or the nearest that is kept; returns that sample."""
     best = -1
@@ -188,17 +153,17 @@ def _take_back(m: Memory, depth: int, now: int) -> int:
             best = k
     first = now
     if best >= 0:
-        m.core[:] = m.kept[best]
+        put(m.core, m.kept[best])
         first = m.kept_at[best]
     m.marks[TAKEN_BACK] += now - first
     m.kept_at[:] = -1
     return first
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _two_signs(m: Memory, still: bool) -> None:
     """Keep the better one of two signs in core, and only that once it is sure."""
-    m.clock[BALANCE] += m.out[LIKELIHOOD] - m.other_out[LIKELIHOOD]
+    m.clock[BALANCE] += np.log(m.out[DENSITY] / m.other_out[DENSITY]) - 0.5 * (m.out[MISFIT] - m.other_out[MISFIT])
     if m.clock[BALANCE] < 0.0:
         for k in range(len(m.core)):
             m.core[k], m.other[k] = m.other[k], m.core[k]
@@ -209,7 +174,7 @@ def _two_signs(m: Memory, still: bool) -> None:
         m.marks[BRANCHES] = 1
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _horizon(m: Memory, t: Tuning, still: bool, now: int) -> int:
     """First sample of the moving horizon's window when it is due and all of it was turning; else -1 (E-49)."""
     first = now + 1 - WINDOW
@@ -218,7 +183,7 @@ def _horizon(m: Memory, t: Tuning, still: bool, now: int) -> int:
     return first if m.arrival_at[(first // EVERY) % ARRIVALS] == first else -1
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _on_axis(m: Memory, w: Watch, s: Sensor, t: Tuning) -> bool:
     """Does omega keep its direction? Not while omega' across it, summed over 16 or 64 samples, is more than noise.
 
@@ -262,21 +227,21 @@ def advance(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, t_s: float, a:
     m.marks[STEPS] += 1
     stillness.take(w, s, a, dt)
     m.out[:] = 0.0
+    P = m.core[STATES:PP].reshape(STATES, STATES)
     if m.marks[STARTED] == 0:
-        still, _ = stillness.detect(w, s, c, np.zeros(3), UNKNOWN_RATE**2 * np.eye(3), dt)
+        P[0, 0] = P[1, 1] = P[2, 2] = UNKNOWN_RATE**2
+    still, depth = stillness.detect(w, s, c, m.core[0:3], P[0:3, 0:3], dt)
+    if m.marks[STARTED] == 0:
         m.marks[STILL] = 1 if still else 0
         if still:
-            begin(m.core, s, t, _mean(w, c.window), s.theta_b)
-            m.marks[STARTED], m.marks[BRANCHES] = 1, 1
+            _begin_still(m, w, s, t, c)
         else:
             _begin_turning(m, w, s, t, c)
         return
-    P = m.core[STATES:PP].reshape(STATES, STATES)
-    still, depth = stillness.detect(w, s, c, m.core[0:3], P[0:3, 0:3], dt)
     now = w.n[COUNT] - 1
     first = now
     if still and now % EVERY == 0:
-        m.kept[(now // EVERY) % KEPT] = m.core
+        put(m.kept[(now // EVERY) % KEPT], m.core)
         m.kept_at[(now // EVERY) % KEPT] = now
     elif not still and m.marks[STILL]:
         m.marks[MOVED] = 1
@@ -291,17 +256,16 @@ def advance(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, t_s: float, a:
             first = _horizon(m, t, still, now)
             if first < 0:
                 break
-            end = m.core[0:6].copy()
-            m.core[:] = m.arrival[(first // EVERY) % ARRIVALS]
+            put(m.end, m.core)
+            put(m.core, m.arrival[(first // EVERY) % ARRIVALS])
         for sample in range(first, now + 1):
             k = sample % DEPTH
             grow = EVERY * dt if sample % EVERY == 0 else 0.0
             if sample % EVERY == 0 and t.method == HORIZON and not still:
-                m.arrival[(sample // EVERY) % ARRIVALS] = m.core
+                put(m.arrival[(sample // EVERY) % ARRIVALS], m.core)
                 m.arrival_at[(sample // EVERY) % ARRIVALS] = sample
             if turn > 0:  # back from the end by what omega' was since
-                gained = w.total[now % (2 * DEPTH)] - w.total[sample % (2 * DEPTH)]
-                at = back(end, gained, now - sample, dt)
+                at = back(m.end, w.total[now % (2 * DEPTH)], w.total[sample % (2 * DEPTH)], now - sample, dt)
             for branch in range(m.marks[BRANCHES]):
                 core, out = (m.core, m.out) if branch == 0 else (m.other, m.other_out)
                 step(core, m.work, s, t, w.y[k], at, w.dt[k], not still, fixed, grow, out)
@@ -312,8 +276,7 @@ def advance(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, t_s: float, a:
         m.out[:] = 0.0
         return
     if still and m.marks[MOVED] == 0:  # position counts from the end of the first standstill
-        m.core[V_N : V_N + 3] = 0.0
-        m.core[P_N : P_N + 3] = 0.0
+        m.core[V_N : P_N + 3] = 0.0
         m.core[TURNED] = 0.0
         P[TURNED, :] = 0.0
         P[:, TURNED] = 0.0
