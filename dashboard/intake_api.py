@@ -102,9 +102,9 @@ class ChoicesOut(BaseModel):
 @routes.get("/estimators", summary="Names that a session can be estimated again with")
 def choices(request: Request, who: SignedIn) -> ChoicesOut:
     from estimator.ins.navigation import NAVIGATORS  # here: compiled code that no page waits for
-    from estimator.rate.estimators import ESTIMATORS
+    from estimator.rate.estimators import VARIANTS
 
-    return ChoicesOut(rate=sorted(ESTIMATORS), navigators=sorted(NAVIGATORS))
+    return ChoicesOut(rate=sorted(VARIANTS), navigators=sorted(NAVIGATORS))
 
 
 @routes.post("/sessions/{session}/rerun", summary="Estimate it again, as a new session (operator)")

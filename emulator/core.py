@@ -119,10 +119,6 @@ class Core:
                 continue
             self._slice(deadline)
 
-    def drop_events(self) -> None:
-        """Forget everything scheduled."""
-        self._events.clear()
-
     def _slice(self, deadline: int) -> None:
         code = self.engine.run(self._pc, deadline)
         self._pc = self.engine.get("PC") & ~1

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from estimator.ins.fix import Fix, typical_sigma
 from estimator.ins.fuzzy import MEMBERSHIPS, memberships
 from estimator.ins.solution import HEADING, INNOVATIONS, Correction, HorizonChoice, Mode, Solution
-from estimator.packed import Doubles
 from estimator.stream import Stream
 from messages import gyrofree_pb2 as pb
 
@@ -41,15 +40,17 @@ class Samples:
 
 def _rows(what: str, header: pb.Header, values: Iterable[float], columns: int, period_s: float) -> Samples:
     flat = np.array(values, dtype=np.float64)
-    where = f"{what} {header.sequence} of {header.device}"
+    problem = ""
     if columns < 1 or flat.size == 0 or flat.size % columns:
-        raise BadMessage(f"{where}: {flat.size} values do not fill rows of {columns}")
-    if not np.isfinite(flat).all():
-        raise BadMessage(f"{where}: not all values are finite")
-    if not 0.0 < period_s < 10.0:
-        raise BadMessage(f"{where}: period {period_s} s, want 0 to 10 s")
-    n = flat.size // columns
-    return Samples(header.device_us * MICRO + period_s * np.arange(n), flat.reshape(n, columns))
+        problem = f"{flat.size} values do not fill rows of {columns}"
+    elif not math.isfinite(flat.dot(flat)) and not np.isfinite(flat).all():
+        problem = "not all values are finite"
+    elif not 0.0 < period_s < 10.0:
+        problem = f"period {period_s} s, want 0 to 10 s"
+    if problem:
+        raise BadMessage(f"{what} {header.sequence} of {header.device}: {problem}")
+    n, start = flat.size // columns, header.device_us * MICRO
+    return Samples(np.array([start + period_s * k for k in range(n)]), flat.reshape(n, columns))
 
 
 def accel_samples(batch: pb.AccelBatch) -> Samples:
@@ -131,47 +132,6 @@ def tacho_report(message: pb.TachoRate) -> tuple[float, float, float, bool]:
     return t_s, rate, sigma, message.direction_known
 
 
-_RATE_ARRAYS = Doubles(
-    pb.RateEstimate, "omega_ib_b_radps", "omega_covariance", "alpha_b_radps2", "f_b_mps2", "q_nb", "innovation",
-    "innovation_sigma", "p_n_m", "v_n_mps", "bias", "bound_sigma_radps",
-)  # fmt: skip
-_NONE = np.zeros(0)
-
-
-def rate_message(header: pb.Header, batch: pb.AccelBatch, index: int, name: str, state: Any) -> pb.RateEstimate:
-    """RateState as published. This runs for every sample: assignments, for a constructor takes twice the time."""
-    message = pb.RateEstimate()
-    message.MergeFromString(
-        _RATE_ARRAYS.wire(
-            state.omega_b,
-            state.P,
-            state.alpha_b,
-            state.f_b,
-            state.q_nb,
-            state.innovation,
-            state.innovation_sigma,
-            state.p_n,
-            state.v_n,
-            state.bias,
-            _NONE if state.bound_sigma is None else state.bound_sigma,
-        )
-    )
-    message.header.CopyFrom(header)
-    message.estimator = name
-    message.for_sequence = batch.header.sequence
-    message.for_index = index
-    message.angle_z_rad = state.angle_z
-    message.nis = state.nis
-    message.nis_dof = state.nis_dof
-    message.still = state.still
-    message.innovation_unit = state.innovation_unit
-    message.sight.extend(state.sight)
-    message.sight_reason = state.sight_reason
-    message.excluded_mask = state.excluded
-    message.aid = state.aid
-    return message
-
-
 def attitude_message(header: pb.Header, batch: pb.ImuBatch, index: int, name: str, state: Any) -> pb.AttitudeEstimate:
     """AttitudeState as published; no filter of that kind knows north."""
     return pb.AttitudeEstimate(
@@ -185,32 +145,6 @@ def attitude_message(header: pb.Header, batch: pb.ImuBatch, index: int, name: st
         resting=bool(state.resting),
         heading_known=False,
     )
-
-
-def axes_message(header: pb.Header, layout: Any, monitor: Any, now_s: float) -> pb.AxisHealth:
-    """HealthMonitor as published; header is for the sample at now_s (s, board's clock)."""
-    newest = monitor.newest
-    message = pb.AxisHealth(
-        header=header,
-        layout=layout.name,
-        chi2=float(newest.nis),
-        dof=max(0, int(newest.degrees) - 6),
-        message=monitor.message,
-        scale_m=layout.scale_m,
-    )
-    for i, fault in enumerate(monitor.faults):
-        message.axes.add(
-            name=layout.axis_names[i],
-            state=int(fault.state),
-            excluded=fault.excluded,
-            residual_mps2=float(newest.residual[i]),
-            residual_sigma_mps2=float(newest.sigma[i]),
-            since_utc_ns=header.utc_ns + round((fault.since_s - now_s) * 1e9),
-            text=fault.text,
-            position_b_m=as_list(layout.r_b[i]),
-            direction_b=as_list(layout.theta_b[i]),
-        )
-    return message
 
 
 def status_message(header: pb.Header, stream: Stream, name: str, us: float, version: str) -> pb.EstimatorStatus:
@@ -248,8 +182,8 @@ def pose_message(header: pb.Header, name: str, p_n_m: Iterable[float], q_nb: Ite
     message = FrameTransform(parent_frame_id=f"{header.device}/n", child_frame_id=f"{header.device}/{name}")
     message.timestamp.seconds, message.timestamp.nanos = divmod(header.utc_ns, 10**9)
     t, q = message.translation, message.rotation
-    t.x, t.y, t.z = (float(value) for value in p_n_m)
-    q.w, q.x, q.y, q.z = (float(value) for value in q_nb)
+    t.x, t.y, t.z = map(float, p_n_m)
+    q.w, q.x, q.y, q.z = map(float, q_nb)
     return message
 
 

@@ -38,6 +38,7 @@ log = logging.getLogger(__name__)
 BACKLOG = 20_000  # messages; more than a minute of a full-rate board, then the newest are dropped and asked for again
 SAVE_S = 2.0
 RESUME_S = 600.0  # an older state is of another measurement
+END_S = 3.0  # for what is queued when the service is to end
 STATE = "state.pickle"
 CONTROL = "estimator-control"
 
@@ -199,12 +200,16 @@ def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) ->
         subscriber.undeclare()
         orders.undeclare()
         worker.finish()
-        thread.join(timeout=3.0)
+        thread.join(timeout=END_S)
+        behind = thread.is_alive()  # the next start goes on from the saved state, and this one's words go nowhere
         for queryable in answering:
             queryable.undeclare()
         asker.close()
     if spool is not None:
         spool.close()
+    if behind:
+        log.warning("ended while samples waited%s", ": the next start takes them up" if saved is not None else "")
+        return
     if worker.failure is not None:
         raise worker.failure
     if saved is not None:

@@ -8,11 +8,15 @@ import sys
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from estimator.rate.direct import Direct
 
-PACKED = 2  # wire type of a field with a length
+Array = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+
+FIXED64, PACKED = 1, 2  # wire types: of eight bytes, of a field with a length
 
 
 def varint(value: int) -> bytes:
@@ -58,6 +62,42 @@ class Doubles:
                 parts += (head[len(data)], data)
         return b"".join(parts)
 
+
+class RowFields:
+    """Double fields of one kind of message, copied from rows of float64 that hold them side by side."""
+
+    def __init__(self, kind: Any, **columns: tuple[int, int]) -> None:
+        """By field: its first column and how many it takes. Raises as Doubles does."""
+        template, moves = bytearray(), []
+        for name, (first, size) in columns.items():
+            field = kind.DESCRIPTOR.fields_by_name[name]
+            if field.type != field.TYPE_DOUBLE or field.is_repeated and not field.is_packed:
+                raise TypeError(f"{kind.DESCRIPTOR.name}.{name} is not made of packed doubles")
+            head = varint(field.number << 3 | (PACKED if field.is_repeated else FIXED64))
+            template += head + varint(8 * size) if field.is_repeated else head
+            moves.append((8 * first, len(template), 8 * size))
+            template += bytes(8 * size)
+        self.size = len(template)  # bytes of one row
+        self._template, self._moves = np.frombuffer(bytes(template), np.uint8), np.array(moves)
+
+    def wire(self, rows: Array) -> bytes:
+        """Rows (n, columns) as n pieces of `size` bytes, each of which a message parses (MergeFromString)."""
+        out = np.empty((len(rows), self.size), np.uint8)
+        _fill(rows.view(np.uint8), self._moves, self._template, out)
+        return out.tobytes()
+
+
+@njit(cache=True)
+def _copy(rows: Bytes, moves: NDArray[np.int64], template: Bytes, out: Bytes) -> None:
+    for r in range(len(rows)):
+        out[r] = template
+        for k in range(len(moves)):
+            source, target, size = moves[k]
+            for i in range(size):
+                out[r, target + i] = rows[r, source + i]
+
+
+_fill = Direct(_copy)
 
 if sys.byteorder != "little":
     raise ImportError("estimator.packed copies numbers as they stand in memory, which must be little-endian")

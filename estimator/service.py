@@ -27,7 +27,8 @@ from estimator.ins.gyro_free import GyroFreeNavigation
 from estimator.ins.navigation import NAVIGATORS, Correction, NavigatorConfig
 from estimator.mute_orders import MuteDesk
 from estimator.orders import CalibrationDesk
-from estimator.rate.board import RateBoard, WrongAxes
+from estimator.rate.board import RateBoard, RateOutput, WrongAxes
+from estimator.rate_messages import BoardMessages, RateMessages
 from estimator.settings import EstimatorSettings
 from estimator.stream import Stream, every
 from messages import gyrofree_pb2 as pb
@@ -53,8 +54,6 @@ log = logging.getLogger(__name__)
 POSE_HZ = 20.0
 VERSION = metadata.version("gyrofree")  # once: it reads files
 Batch = pb.AccelBatch | pb.ImuBatch | pb.AdcBatch
-NO_TRANSLATION = (0.0, 0.0, 0.0)  # a cube on its table turns and stays
-
 
 __all__ = ["Output", "Pipeline", "UnknownEstimator", "make_layout", "run"]
 
@@ -90,6 +89,7 @@ class Pipeline:
         self._settings = settings
         self._clock = clock
         self._boards: dict[str, RateBoard] = {}
+        self._messages: dict[str, BoardMessages] = {}
         self._vehicles: dict[str, NavBoard] = {}
         self._gyro_free: dict[str, GyroFreeNavigation] = {}
         self._attitudes: dict[str, AttitudeBoard] = {}
@@ -146,6 +146,7 @@ class Pipeline:
         board = self._boards.get(device)
         if board is None:
             board = self._boards[device] = self._board(device)
+            self._messages[device] = BoardMessages(device, board.layout)
         started = self._clock()
         try:
             states = board.feed(
@@ -154,24 +155,14 @@ class Pipeline:
         except WrongAxes as error:
             raise convert.BadMessage(str(error)) from None
         self._cost.add(device, self._clock() - started, len(samples.t_s))
-        pose_step = every(batch.period_s, POSE_HZ)
-        out = []
-        at, header, card = -1, batch.header, "" if board.card is None else board.card.id
-        for row, index, name, state in states:
-            if row != at:  # one header for all estimators of a sample
-                at, header = row, convert.sample_header(batch.header, row * batch.period_s)
-            rate = convert.rate_message(header, batch, index, name, state)
-            rate.calibration = card
-            out.append(Output(RATE, device, name, rate))
-            if index % pose_step == pose_step - 1:
-                pose = convert.pose_message(header, name, NO_TRANSLATION, state.q_nb)
-                out.append(Output(POSE, device, name, pose))
-        if self._new_second(device, "axes", AXES.rate * samples.t_s[-1]):
+        out = self._estimates(batch, board, states)
+        last_s = float(samples.t_s[-1])
+        axes_due, due = self._new_second(device, "axes", AXES.rate * last_s), self._new_second(device, "accel", last_s)
+        if axes_due or due:
             header = convert.sample_header(batch.header, (len(samples.t_s) - 1) * batch.period_s)
-            axes = convert.axes_message(header, board.layout, board.health, float(samples.t_s[-1]))
-            out.append(Output(AXES, device, "", axes))
-        if self._new_second(device, "accel", samples.t_s[-1]):
-            header = convert.sample_header(batch.header, (len(samples.t_s) - 1) * batch.period_s)
+        if axes_due:
+            out.append(Output(AXES, device, "", self._messages[device].axes(header, board.health, last_s)))
+        if due:
             for name in self._settings.rate:
                 out.append(Output(ESTIMATOR, device, name, self._rate_status(header, board, name)))
         status = self._desk.feed(batch, samples, board.wiring)
@@ -182,6 +173,18 @@ class Pipeline:
         if navigation is not None:
             said = navigation.feed(batch.header.epoch, batch.period_s, samples.t_s, states)
             out += self._navigated(batch, samples, navigation.board, said, navigation.names)
+        return out
+
+    def _estimates(self, batch: pb.AccelBatch, board: RateBoard, states: list[RateOutput]) -> list[Output]:
+        """States as messages, and poses now and then."""
+        device, step, out = board.device, every(batch.period_s, POSE_HZ), []
+        shared = self._messages[device]
+        estimates = RateMessages(batch, "" if board.card is None else board.card.id, shared.shared)
+        for row, index, name, state in states:
+            out.append(Output(RATE, device, name, estimates.estimate(row, index, name, state)))
+            if index % step == step - 1:
+                utc_ns = out[-1].message.header.utc_ns
+                out.append(Output(POSE, device, name, shared.pose(name, utc_ns, state.q_nb)))
         return out
 
     def _board(self, device: str) -> RateBoard:

@@ -30,13 +30,17 @@ HERE = Path(__file__).resolve().parent
 
 def drop_stale(folder: Path = HERE) -> int:
     """Remove compiled functions that are older than a source of the folder; returns how many files went."""
-    newest = max(s.stat().st_mtime for s in folder.rglob("*.py") if "@njit" in s.read_text(encoding="utf-8"))
+    newest = max(s.stat().st_mtime for s in folder.rglob("*.py") if _compiles(s.read_text(encoding="utf-8")))
     everything = list(folder.rglob("__pycache__/*.nb[ic]"))
     if all(f.stat().st_mtime >= newest for f in everything):
         return 0
     for file in everything:
         file.unlink(missing_ok=True)
     return len(everything)
+
+
+def _compiles(source: str) -> bool:
+    return any(word in source for word in ("@njit", "@intrinsic", "rate.compiling import"))
 
 
 def warm() -> None:

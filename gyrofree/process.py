@@ -8,6 +8,7 @@ import errno
 import gc
 import logging
 import os
+import queue
 import signal
 import sys
 import threading
@@ -38,10 +39,20 @@ def start_logging(verbose: bool = False) -> None:
 
 
 def stop_on_signals() -> threading.Event:
-    """An event that SIGTERM and Ctrl-C set."""
-    stop = threading.Event()
+    """An event that SIGTERM and Ctrl-C set.
+
+    Not in the handler itself: that runs in the main thread, which may be inside stop.wait() and hold the event's lock;
+    set() would then wait for it for good. A SimpleQueue may be put into anywhere.
+    """
+    stop, told = threading.Event(), queue.SimpleQueue()
+
+    def listen() -> None:
+        told.get()
+        stop.set()
+
+    threading.Thread(target=listen, name="signals", daemon=True).start()
     for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
+        signal.signal(number, lambda number, _: told.put(number))
     return stop
 
 

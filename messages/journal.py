@@ -2,10 +2,9 @@
 
 The gateway journals every raw read of a board with it, and gateway and estimator what they publish (spool.py).
 journal_file.py says what stands in a segment. One write per record; a thread calls fdatasync, which may take half a
-second and must never hold up the writer. `durable_seq` is what has
-reached the disk. Sequence numbers go on over restarts; `run` is new at every start. A tail that a crash has torn is
-cut at the next start. A lock on the file `lock` in the folder keeps a second gateway out; the system frees it when the
-process ends, however that happens.
+second and must never hold up the writer. `durable_seq` is what has reached the disk. Sequence numbers go on over
+restarts; `run` is new at every start. A tail that a crash has torn is cut at the next start. A lock on the file `lock`
+in the folder keeps a second gateway out; the system frees it when the process ends, however that happens.
 """
 
 import errno
@@ -18,14 +17,12 @@ from collections.abc import Iterator
 from itertools import zip_longest
 from pathlib import Path
 
-from messages.journal_file import RECORD_MAGIC, SEGMENT_HEAD, SEGMENT_MAGIC, Record, last_whole, pack, scan
+from messages.journal_file import RECORD_MAGIC, SEGMENT_HEAD, SEGMENT_MAGIC, Record, last_whole, pack, scan, walk
 
 log = logging.getLogger(__name__)
 
 LOOK_BYTES = 1 << 18  # of a segment's end, to find its last record
 RETRY_S = 2.0  # after a failed write the next attempt waits this long
-
-
 REMEDIES = {errno.ENOSPC: "free some space", errno.EAGAIN: "stop the other one, or set another `journal` folder"}
 
 
@@ -138,12 +135,13 @@ class Journal:
                 data = name.read_bytes()
             except FileNotFoundError:
                 continue  # retention was faster
-            for start, end, record in scan(data).records:
-                if first <= record.sequence <= last:
-                    total += end - start
-                    yield data[start:end]
-                    if total >= max_bytes:
-                        return
+            for start, end, record in walk(data, first=first):
+                if record.sequence > last:
+                    return
+                total += end - start
+                yield data[start:end]
+                if total >= max_bytes:
+                    return
 
     def tail(self, max_bytes: int) -> list[Record]:
         """The newest records, oldest first: those in the last max_bytes of the segments."""

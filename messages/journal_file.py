@@ -69,21 +69,41 @@ def unpack_at(data: bytes, start: int) -> tuple[Record, int] | None:
     return Record(sequence, monotonic_ns, utc_ns, channel, bytes(data[body:end])), end + CRC.size
 
 
-def scan(data: bytes, start: int = SEGMENT_HEAD.size) -> Scan:
-    """All good records from `start` on; damage is stepped over to the next magic and counted."""
-    records = []
-    damaged = 0
-    while start < len(data):
+def walk(data: bytes, start: int = SEGMENT_HEAD.size, first: int = 0) -> Iterator[tuple[int, int, Record]]:
+    """Good records from `start` on, one at a time: (start, end, record); damage is stepped over to the next magic.
+
+    Those before sequence `first` are left out without a look at their CRC, where the next record follows as it should.
+    """
+    while 0 <= start < len(data):
+        end = _skip(data, start, first) if first else None
+        if end is not None:
+            start = end
+            continue
         found = unpack_at(data, start)
         if found:
-            records.append((start, found[1], found[0]))
+            if found[0].sequence >= first:
+                yield start, found[1], found[0]
             start = found[1]
-            continue
-        following = data.find(RECORD_MAGIC, start + 1)
-        following = len(data) if following < 0 else following
-        damaged += following - start
-        start = following
-    return Scan(records, damaged)
+        else:
+            start = data.find(RECORD_MAGIC, start + 1)
+
+
+def _skip(data: bytes, start: int, first: int) -> int | None:
+    """Where the record behind this one begins, when both come before `first` and look sound; else None."""
+    if start + RECORD_HEAD.size > len(data):
+        return None
+    magic, sequence, _, _, length, _ = RECORD_HEAD.unpack_from(data, start)
+    end = start + RECORD_HEAD.size + length + CRC.size
+    if magic != RECORD_MAGIC or sequence + 1 >= first or end + RECORD_HEAD.size > len(data):
+        return None
+    magic, following, *_ = RECORD_HEAD.unpack_from(data, end)
+    return end if magic == RECORD_MAGIC and following == sequence + 1 else None
+
+
+def scan(data: bytes, start: int = SEGMENT_HEAD.size) -> Scan:
+    """All good records from `start` on; damage is stepped over to the next magic and counted."""
+    records = list(walk(data, start))
+    return Scan(records, max(0, len(data) - start) - sum(end - begin for begin, end, _ in records))
 
 
 def last_whole(data: bytes) -> int | None:
@@ -98,5 +118,5 @@ def last_whole(data: bytes) -> int | None:
 
 def records(data: bytes) -> Iterator[Record]:
     """Good records of concatenated record bytes, as a history reply carries them."""
-    for _, _, record in scan(data, 0).records:
+    for _, _, record in walk(data, 0):
         yield record

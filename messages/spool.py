@@ -17,13 +17,14 @@ import threading
 import time
 from collections import deque
 from collections.abc import Iterator
-from itertools import zip_longest
+from itertools import groupby, zip_longest
+from operator import itemgetter
 from pathlib import Path
 from typing import NamedTuple
 
 from messages import gyrofree_pb2 as pb
 from messages.journal import Journal, first_of
-from messages.journal_file import PUBLISHED, Record, scan, unpack_at
+from messages.journal_file import MAX_BYTES, PUBLISHED, RECORD_HEAD, RECORD_MAGIC, Record, unpack_at, walk
 
 log = logging.getLogger(__name__)
 
@@ -31,6 +32,7 @@ HEAD = struct.Struct("<QQqBB")
 REPLY_BYTES = 1 << 20  # of one reply; who wants more asks on
 OVERVIEW_S = 0.5  # an overview is no finer than this
 OVERVIEW_LENGTH_S = 900.0  # and reaches back so far
+GLANCE_BYTES = 4096  # most messages are shorter
 LATE_S = 5.0  # a message is published at most so long after the time in its header
 
 
@@ -95,6 +97,8 @@ class Spool:
             seen = self._glances.setdefault((topic, device), deque(maxlen=int(OVERVIEW_LENGTH_S / OVERVIEW_S)))
             if not seen or abs(utc_ns - seen[-1].utc_ns) >= OVERVIEW_S * 1e9:
                 seen.append(Glance(utc_ns, segment, offset))
+                while abs(utc_ns - seen[0].utc_ns) > OVERVIEW_LENGTH_S * 1e9:  # of a rare topic fewer stay
+                    seen.popleft()
 
     def close(self) -> None:
         """Sync and let the folder go."""
@@ -192,9 +196,8 @@ class Spool:
         for name, following in zip_longest(names, names[1:]):
             if following is not None and first_of(following) <= position:
                 continue
-            for record in _records(name):
-                if record.sequence >= position:
-                    yield entry_of(record)
+            for record in _records(name, first=position):
+                yield entry_of(record)
 
     def _summary(self, name: Path) -> dict[tuple[str, str, int], list[int]]:
         """First and last sequence of every topic, device and run in a segment; read once."""
@@ -236,17 +239,21 @@ class Spool:
         return [entry_of(record) for record in self._read(sorted(wanted))]
 
     def _read(self, places: list[tuple[int, int]]) -> Iterator[Record]:
-        data, held = b"", None
-        for segment, offset in places:
-            if segment != held:
-                held = segment
-                try:
-                    data = (self.journal.folder / f"{segment:020d}.gfj").read_bytes()
-                except OSError:
-                    data = b""  # retention was faster
-            found = unpack_at(data, offset)
-            if found is not None:
-                yield found[0]
+        """Single records of many segments, and no more of these than that."""
+        for segment, group in groupby(places, key=itemgetter(0)):
+            try:
+                stream = (self.journal.folder / f"{segment:020d}.gfj").open("rb")
+            except FileNotFoundError:
+                continue  # retention was faster
+            with stream:
+                for _, offset in group:
+                    data = os.pread(stream.fileno(), GLANCE_BYTES, offset)
+                    found = unpack_at(data, 0)
+                    if found is None and len(data) == GLANCE_BYTES and data.startswith(RECORD_MAGIC):
+                        length = RECORD_HEAD.unpack_from(data)[4]
+                        found = unpack_at(os.pread(stream.fileno(), GLANCE_BYTES + min(length, MAX_BYTES), offset), 0)
+                    if found is not None:
+                        yield found[0]
 
     def _look_back(self) -> None:
         """Find for the overview what an earlier process wrote; beside the work, for it may take a second."""
@@ -256,7 +263,7 @@ class Spool:
             for name in self.journal.segments():
                 if first_of(name) > self._until or name.stat().st_mtime < since:
                     continue
-                for start, _, record in scan(name.read_bytes()).records:
+                for start, _, record in walk(name.read_bytes()):
                     entry = entry_of(record)
                     seen = found.setdefault((entry.topic, entry.device), [])
                     if entry.position <= self._until and (
@@ -287,8 +294,11 @@ def _older(name: Path, run: int) -> bool:
         return True
 
 
-def _records(name: Path, limit: int = 0) -> Iterator[Record]:
-    """Good records of a segment; with a limit only those in its first bytes. Nothing when retention was faster."""
+def _records(name: Path, limit: int = 0, first: int = 0) -> Iterator[Record]:
+    """Good records of a segment from sequence `first` on; with a limit only those in its first bytes.
+
+    Nothing when retention was faster.
+    """
     try:
         if limit:
             with name.open("rb") as stream:
@@ -297,5 +307,5 @@ def _records(name: Path, limit: int = 0) -> Iterator[Record]:
             data = name.read_bytes()
     except FileNotFoundError:
         return
-    for _, _, record in scan(data).records:
+    for _, _, record in walk(data, first=first):
         yield record

@@ -33,6 +33,7 @@ class Intake:
         self._mender = None if ask is None else Mender(ask, since_ns=since_ns)
         self._answers: deque[tuple[Question, pb.HistoryReply | None]] = deque()
         self._addresses: dict[str, Address | None] = {}
+        self._keys: dict[tuple[str, str, str], str] = {}  # bus keys by topic, device, estimator: checked names cost
         self._last_ns: dict[tuple[str, str], int] = {}  # by device and source: the time of recording goes on
 
     @property
@@ -80,6 +81,7 @@ class Intake:
         if key not in self._addresses:
             if len(self._addresses) > 4096:  # a foreign publisher with ever new keys
                 self._addresses.clear()
+                self._keys.clear()
             try:
                 self._addresses[key] = parse(key)
             except TopicError:
@@ -93,5 +95,8 @@ class Intake:
             if arrival.late:  # the publisher's clock may differ from ours; the order must not
                 at_ns = min(at_ns, time.time_ns())
             at_ns = self._last_ns[stream] = max(at_ns, self._last_ns.get(stream, 0))
-            key = arrival.topic.key(self._prefix, arrival.device, arrival.estimator)
+            name = arrival.topic.name, arrival.device, arrival.estimator
+            key = self._keys.get(name)
+            if key is None:
+                key = self._keys[name] = arrival.topic.key(self._prefix, arrival.device, arrival.estimator)
             yield Entry(at_ns, key, arrival.payload, arrival.late)

@@ -35,6 +35,7 @@ KEPT = 400  # states
 STATUS_S = 0.2
 BEGINNING_S = 10.0  # of recording in which the estimators' first inputs are looked for
 LOOK_EVERY = 200  # inputs between two looks at the orders while running through
+BATCHES = 1024  # more than are published before the moment jumped to
 
 Put = Callable[[Address, str, Message], None]
 
@@ -69,6 +70,7 @@ class Playback:
         self._sequence: dict[str, int] = {}
         self._states: dict[float, tuple[int, bytes]] = {}  # position -> log time to go on from, pickled pipeline
         self._steps = 0
+        self._batches: deque[float] = deque(maxlen=BATCHES)  # positions of the newest batches, for steps back
         self._first = self._first_used() if make_pipeline is not None else {}
         self._begin(self.source.start_ns, self._fresh())
         self._target: float | None = min(at_s, self.source.length_s) if at_s > 0.0 else None
@@ -144,7 +146,8 @@ class Playback:
             if command.value >= 0:
                 self._steps += int(command.value) or 1
             else:
-                self._target = max(self.position_s + command.value * self._batch_s, 0.0)
+                before = [at for at in self._batches if at < self.position_s]
+                self._target = before[max(int(command.value), -len(before))] if before else 0.0
         elif command.action == kind.ACTION_LOOP:
             begin, end = command.value, command.until
             if not 0.0 <= begin <= end <= self.source.length_s + 1e-3:
@@ -201,7 +204,7 @@ class Playback:
     def _begin(self, from_ns: int, pipeline: Pipeline | None) -> None:
         self._items = self.source.items(from_ns)
         self._pipeline = pipeline
-        self._batch_s = getattr(self, "_batch_s", 0.01)
+        self._batches.clear()
         self._next = next(self._items, None)
         self._kept_s = (from_ns - self.source.start_ns) / 1e9
 
@@ -211,8 +214,8 @@ class Playback:
         self._next = next(self._items, None)
         self.position_s = self._seconds(item)
         outputs: Iterable = ()
-        if item.address.topic in (ACCEL, IMU) and len(item.message.ListFields()) and item.message.period_s:
-            self._batch_s = item.message.period_s * max(1, _samples(item.message))
+        if item.address.topic in (ACCEL, IMU):
+            self._batches.append(self.position_s)
         if self._pipeline is not None and item.address.topic in PIPELINE_INPUTS and self._used(item):
             try:
                 outputs = self._pipeline.on(item.address.topic, item.message)
@@ -252,7 +255,7 @@ class Playback:
             self._restore(publish_from)
         said = time.monotonic()
         count = 0
-        while self._next is not None and self._seconds(self._next) < target:
+        while self._next is not None and self._seconds(self._next) <= target:
             self._advance(publish=self._seconds(self._next) >= publish_from)
             count += 1
             if count % LOOK_EVERY == 0:
@@ -312,9 +315,3 @@ class Playback:
             name = item.address.device, item.message.header.run
             first[name] = min(first.get(name, item.message.for_sequence), item.message.for_sequence)
         return first
-
-
-def _samples(message: Message) -> int:
-    if isinstance(message, pb.AccelBatch):
-        return len(message.f_mps2) // max(1, message.axes)
-    return len(message.f_b_mps2) // 3

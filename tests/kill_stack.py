@@ -152,7 +152,8 @@ def _holes(result: Account, covered: dict, kills: list[tuple[str, int]], estimat
             result.missing_s[cause] = max(result.missing_s.get(cause, 0.0), hole_s)
         for indices in estimates.values():
             mine = indices & set(range(min(have), max(have) + 1))
-            result.estimates_missing += len({i for i in have if i > min(mine, default=0)} - mine) if mine else 0
+            first = min(mine, default=0)
+            result.estimates_missing += len({i for i in have if i > first} - mine) if mine else 0
 
 
 def journal_records(folder: Path) -> tuple[int, int]:

@@ -21,6 +21,7 @@ ESTIMATOR_SHELL = {
     "service.py",
     "live.py",
     "convert.py",
+    "rate_messages.py",
     "mute_orders.py",
     "orders.py",
     "wiring_orders.py",

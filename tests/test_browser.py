@@ -230,6 +230,53 @@ def test_recording_is_started_stopped_downloaded_and_replayed(anna, tmp_path):
         lambda: [d for d in anna.api("devices")[1] if d["name"] == "cube-replay"], "the replayed device does not appear"
     )
     assert devices
+
+
+REPLAY = """() => [...document.querySelectorAll('.gf-note')].map((note) => note.innerText)
+  .find((text) => text.startsWith('Replay ')) ?? ''"""
+
+
+def test_a_replay_is_driven_by_keys_buttons_and_slider(anna):
+    """The live page opens on the replay's device; K, J, L, the buttons and the slider move it."""
+    page = anna.page
+    page.wait_for_selector("#scene")
+    scene = anna.scene
+    until(lambda: "cube-replay" in scene.locator(".gf-head").inner_text(), "the page does not show the replay")
+
+    def position():
+        clock = scene.evaluate(REPLAY).split(" · ")[1].split(" of ")[0]
+        minutes, seconds = clock.split(":")
+        return 60 * int(minutes) + float(seconds)
+
+    def key(name):
+        page.mouse.click(SMALL["width"] / 2, 250)  # keys go to the scene
+        page.keyboard.press(name)
+
+    def start():
+        scene.get_by_text("start", exact=True).click()
+        until(lambda: position() < 3.0, "start does not go to the start")
+
+    start()
+    if "paused" in scene.evaluate(REPLAY):  # a short recording may have ended meanwhile
+        key("k")
+        until(lambda: "▶" in scene.evaluate(REPLAY), "K does not play")
+    key("k")
+    until(lambda: "paused" in scene.evaluate(REPLAY), "K does not pause")
+    until(lambda: "replay paused" in scene.locator(".gf-head").inner_text(), "the device is not shown as paused")
+    start()
+    until(lambda: position() == 0.0, "the page does not show the start")
+    key("l")
+    first = until(position, "L does not step on")
+    key("l")
+    until(lambda: position() > first, "L does not step on again")
+    key("j")
+    until(lambda: position() <= first, "J does not step back")
+    slider = scene.get_by_role("slider").first
+    slider.press("End")
+    length = float(slider.get_attribute("aria-valuemax"))
+    until(lambda: position() >= length - 1.0, "the slider does not go to the end")
+    anna.api("replay/stop", {})
+    until(lambda: not scene.evaluate(REPLAY), "the replay does not end")
     page.goto(anna.demo.url)
 
 

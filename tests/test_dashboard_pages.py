@@ -124,12 +124,12 @@ def test_allowed_hosts_are_bare_names(host):
 
 
 SERVE = """
-import signal, sys, threading
+import sys, threading
 from dashboard import service
 from dashboard.settings import DashboardSettings
+from gyrofree.process import stop_on_signals
 from messages.bus import BusSettings
-stop = threading.Event()
-signal.signal(signal.SIGTERM, lambda *_: stop.set())
+stop = stop_on_signals()
 service.run(DashboardSettings.model_validate_json(sys.argv[1]), BusSettings(router=sys.argv[2]), stop)
 print("ended", threading.active_count())
 """

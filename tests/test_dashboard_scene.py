@@ -18,6 +18,7 @@ from dashboard.scene.palette import estimator_colour, number
 from dashboard.scene.panels import PAGES, Snapshot
 from dashboard.scene.panels.base import Panel
 from dashboard.scene.panels.devices import Devices, counts
+from dashboard.scene.replayed import Replayed
 from dashboard.scene.service import SceneError, start
 from dashboard.scene.store import NAV_POSITION, RATE_OMEGA, Ring, Store
 from messages import gyrofree_pb2 as pb
@@ -437,3 +438,29 @@ def test_what_comes_late_takes_its_place_and_is_marked():
     edges = np.linspace(0.0, 6.0, 13)
     assert list(series.stretch_mask(device.late, edges)) == [0.0] * 8 + [1.0] * 12 + [0.0] * 4
     assert list(np.flatnonzero(series.moment_mask([0.1, 5.9, 7.0], edges))) == [0, 22]
+
+
+def test_a_replay_that_is_paused_does_not_age():
+    replay = Replayed()
+    assert replay.state("cube-replay", 10.0) == "ended" and replay.state("cube", 10.0) == ""
+    replay.take(pb.ReplayStatus(session="a"), 10.0)
+    assert replay.began == 10.0 and replay.clock("cube-replay", 10.5) == 10.5
+    for now in (11.0, 12.0):
+        replay.take(pb.ReplayStatus(session="a", paused=True), now)
+    assert replay.state("cube-replay", 12.5) == "paused"
+    assert replay.clock("cube-replay", 12.5) == 11.0 and replay.clock("cube", 12.5) == 12.5
+    replay.take(pb.ReplayStatus(session="a"), 13.0)
+    assert replay.state("cube-replay", 13.5) == "playing" and replay.clock("cube-replay", 13.5) == 13.5
+    replay.take(pb.ReplayStatus(session="b"), 14.0)
+    assert replay.began == 14.0
+
+
+def test_the_device_of_a_replay_is_one_heard_since_it_began():
+    store = Store()
+    header = pb.Header(device="cube-replay", utc_ns=10**18)
+    store.put(tp.ACCEL, "cube-replay", "", pb.AccelBatch(header=header), arrived=5.0)
+    store.put(tp.REPLAY, "", "", pb.ReplayStatus(session="a"), arrived=10.0)
+    store.put(tp.ACCEL, "cube", "", pb.AccelBatch(header=header), arrived=11.0)
+    assert store.replay.device(store.devices) is None
+    store.put(tp.ACCEL, "cube-replay", "", pb.AccelBatch(header=header), arrived=12.0)
+    assert store.replay.device(store.devices) == "cube-replay"

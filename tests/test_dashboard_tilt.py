@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from dashboard.scene.panels.devices import Devices
 from dashboard.scene.panels.tilt import Tilt
 from dashboard.scene.store import Store
 from dashboard.scene.tilt import between, horizon_svg, roll_pitch
@@ -73,3 +74,11 @@ def test_the_page_says_what_the_fixed_weight_costs():
     assert "VQF: roll, pitch" in html and "20.0 °" in html and "−10.0 °" in html
     assert "2.95 °" in re.sub(r"<[^>]+>", " ", html)
     assert "needs a board" in Tilt._head(s, [])
+
+
+def test_the_summary_has_a_tile_of_each_filter():
+    store = Store()
+    feed(store)
+    s = SimpleNamespace(device=store.device("board"), stale=lambda *_: False)
+    text = re.sub(r"<[^>]+>", " ", Devices._board(s))
+    assert "20.0 / −10.0" in text and "23.0 / −10.0" in text and "roll / pitch" in text

@@ -7,7 +7,7 @@ from estimator.layouts.layout import CUBE, LAYOUTS
 from estimator.packed import Doubles, varint
 from estimator.rate import bound, bound_live, sight
 from estimator.rate.board import RateBoard, RateOutput
-from estimator.rate.estimators import ESTIMATORS, ProductsRate
+from estimator.rate.estimators import ESTIMATORS, ProductsRate, RateState
 from estimator.rate.observed import sensor
 from estimator.rate.products_model import STATES, measured_force_jacobian, measured_products_jacobian, squares_jacobian
 from estimator.simulation.faults import Faults, parse
@@ -42,7 +42,7 @@ def bits(outputs: list[RateOutput]) -> list[tuple]:
     """Everything that is said, arrays as bytes."""
     plain = []
     for o in outputs:
-        state = [getattr(o.state, name) for name in o.state.__slots__]
+        state = [getattr(o.state, name) for name in RateState.__slots__]
         plain.append((o.row, o.index, o.estimator, *(v.tobytes() if isinstance(v, np.ndarray) else v for v in state)))
     return plain
 
@@ -129,20 +129,24 @@ def test_arrays_become_the_fields_of_a_message():
 
 
 def test_a_state_becomes_the_message_it_did():
-    """rate_message against the constructor, with and without innovation and bound."""
-    from estimator.convert import rate_message
+    """RateMessages against the constructor, with and without innovation and bound."""
+    from estimator.rate_messages import RateMessages
 
     block, estimator = TableTest(1).block(0), ProductsRate(CUBE(0.05))
     states = estimator.feed(block.t_s[:700], block.readings[:700], (0, 699))
-    header, batch = pb.Header(device="cube", run=7), pb.AccelBatch(header=pb.Header(sequence=9))
+    batch = pb.AccelBatch(header=pb.Header(device="cube", run=7, sequence=9, device_us=5, utc_ns=9), period_s=0.01)
+    messages = RateMessages(batch, "card")
     for index, s in enumerate(states):
+        header = pb.Header(device="cube", run=7, device_us=5 + 10_000 * index, utc_ns=9 + 10**7 * index)
         expected = pb.RateEstimate(
-            header=header, estimator="e", for_sequence=9, for_index=index, omega_ib_b_radps=s.omega_b,
+            header=header, estimator="e", calibration="card", for_sequence=9, for_index=index,
+            omega_ib_b_radps=s.omega_b,
             omega_covariance=s.P.ravel(), alpha_b_radps2=s.alpha_b, f_b_mps2=s.f_b, q_nb=s.q_nb,
             angle_z_rad=s.angle_z, innovation=s.innovation, innovation_sigma=s.innovation_sigma, nis=s.nis,
             nis_dof=s.nis_dof, still=s.still, p_n_m=s.p_n, v_n_mps=s.v_n, bias=s.bias,
             innovation_unit=s.innovation_unit, sight=s.sight, sight_reason=s.sight_reason,
             bound_sigma_radps=[] if s.bound_sigma is None else s.bound_sigma, excluded_mask=s.excluded,
         )  # fmt: skip
-        assert rate_message(header, batch, index, "e", s) == expected
+        said = messages.estimate(index, index, "e", s)
+        assert said == expected and said.SerializeToString() == expected.SerializeToString()
     assert states[0].bound_sigma is None and len(states[1].bound_sigma) == 3 and states[1].nis_dof == 6

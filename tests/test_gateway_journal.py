@@ -9,7 +9,7 @@ import time
 import pytest
 
 from messages.journal import Journal, JournalBusy
-from messages.journal_file import SEGMENT_HEAD, records, scan
+from messages.journal_file import SEGMENT_HEAD, records, scan, walk
 
 
 def fill(journal: Journal, n: int, size: int = 100) -> None:
@@ -78,6 +78,8 @@ def test_any_damage_costs_only_the_records_it_hits(tmp_path):
         data[at] ^= 1 << draw.randrange(8)
         found = scan(bytes(data))
         assert len(found.records) == 99 and found.damaged_bytes == len(clean[SEGMENT_HEAD.size :]) // 100
+        later = [record for record in found.records if record[2].sequence >= 60]
+        assert list(walk(bytes(data), first=60)) == later  # those before are passed over, damage among them as well
 
 
 def test_oldest_segments_go_first_and_history_says_what_is_left(tmp_path):

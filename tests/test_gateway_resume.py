@@ -147,6 +147,7 @@ import os, select, sys
 sys.path.insert(0, {root!r})
 from gateway.ports import adopt_port, open_port
 from gyrofree.guardian import guard
+from gyrofree.process import stop_on_signals
 def serve(keeper):
     left = keeper.take({path!r})
     port = open_port({path!r}) if left is None else adopt_port({path!r}, left.fd)
@@ -197,9 +198,9 @@ import signal, sys, threading
 import typer
 sys.path.insert(0, {root!r})
 from gyrofree.guardian import guard
+from gyrofree.process import stop_on_signals
 def serve(keeper):
-    stop = threading.Event()
-    signal.signal(signal.SIGTERM, lambda *_: stop.set())
+    stop = stop_on_signals()
     print("serving", flush=True)
     stop.wait()
 def elsewhere():

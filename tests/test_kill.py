@@ -3,6 +3,7 @@
 tests/bench/bench_crash.py does this twenty times to every service of the whole stack.
 """
 
+import itertools
 import os
 import signal
 import subprocess
@@ -122,7 +123,9 @@ def test_killed_gateway_and_recorder_are_back_by_themselves_and_nothing_acknowle
         assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))
     indices = [batch.first_index for batch in batches]
     assert indices == sorted(set(indices))
-    covered = sorted((b.first_index, len(b.counts) // b.axes) for b in batches)
-    assert all(at + n == following for (at, n), (following, _) in zip(covered, covered[1:], strict=False))
+    # A machine that gives the gateway no time for seconds overflows the port itself: lost on the line, and said so.
+    for before, after in itertools.pairwise(batches):
+        assert before.first_index + len(before.counts) // before.axes + after.lost_samples == after.first_index
     assert len({b.header.run for b in batches}) == 2  # one gateway read the first half of a frame, the other the rest
-    assert catalogue.manifest(sessions[0].id).certificate["cube"]["complete"]
+    lost = any(pb.AccelBatch.FromString(row.payload).lost_samples for row in rows[0])
+    assert lost or catalogue.manifest(sessions[0].id).certificate["cube"]["complete"]

@@ -182,13 +182,13 @@ def test_the_recorder_applies_the_rules_of_retention_when_it_starts(client, reco
 
 
 RECORD = """
-import signal, sys, threading
+import sys
 from pathlib import Path
+from gyrofree.process import stop_on_signals
 from messages.bus import BusSettings
 from sessions import recorder
 from sessions.settings import RecorderSettings
-stop = threading.Event()
-signal.signal(signal.SIGTERM, lambda *_: stop.set())
+stop = stop_on_signals()
 recorder.run(RecorderSettings(root=Path(sys.argv[1])), BusSettings(prefix="t", router=sys.argv[2]), stop)
 """
 

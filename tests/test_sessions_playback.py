@@ -129,6 +129,23 @@ def test_pause_step_speed_and_loop():
         player._thread.join(PATIENCE)
 
 
+def test_a_step_back_undoes_a_step_and_the_next_one_goes_on():
+    """Batches of any size: where one stands after a step back is where the last batch but one was."""
+    with Player(paused=True) as player:
+        stood = []
+        for count in range(1, 6):
+            player.order(KIND.ACTION_STEP, 1)
+            until(lambda: sum(row[0] == ACCEL.name for row in player.sent) >= count, "the step")  # noqa: B023
+            stood.append(player.playback.position_s)
+        for at in reversed(stood[1:-1]):
+            player.order(KIND.ACTION_STEP, -1)
+            until(lambda: player.playback.position_s == at and player.playback._target is None, f"{at:g} s")  # noqa: B023
+        player.order(KIND.ACTION_STEP, 1)
+        until(lambda: player.playback.position_s == stood[2], "the step on")
+        player.order(KIND.ACTION_STEP, -5)
+        until(lambda: player.playback.position_s <= stood[0], "the beginning")
+
+
 def test_real_time_is_kept_and_a_link_to_a_moment_begins_there():
     with Player(make=None, at_s=12.0, speed=2.0) as player:
         player.at(12.0)

@@ -1,12 +1,17 @@
 """The supervisor with real child processes."""
 
 import io
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import pytest
 from rich.console import Console
 
 from gyrofree.supervisor import Supervisor
+
+ROOT = Path(__file__).resolve().parent.parent
 
 
 class Scripts(Supervisor):
@@ -72,3 +77,21 @@ def test_a_child_that_does_not_listen_is_killed_and_named(supervisor):
     until(supervisor, lambda: "up" in text(supervisor))
     assert not supervisor.stop()
     assert "deaf did not end" in text(supervisor)
+
+
+HELD = """
+import signal, sys
+from gyrofree.process import stop_on_signals
+stop = stop_on_signals()
+with stop._cond:  # as the main thread is for a moment inside every stop.wait()
+    signal.raise_signal(signal.SIGINT)
+    signal.raise_signal(signal.SIGTERM)
+assert stop.wait(30.0)
+print("ended")
+"""
+
+
+def test_a_signal_may_come_at_any_moment():
+    """Ctrl-C of a terminal and the supervisor's SIGTERM reach a service within a millisecond of each other."""
+    done = subprocess.run([sys.executable, "-c", HELD], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert done.stdout == "ended\n", done.stderr

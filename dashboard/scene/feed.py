@@ -21,7 +21,7 @@ from messages.mending import Arrival, Mender, Question
 log = logging.getLogger(__name__)
 
 # POSE and LOCATION repeat what RATE, NAV and GNSS say, for other viewers.
-TOPICS = tuple(topic for topic in tp.TOPICS if topic not in (tp.POSE, tp.LOCATION))
+TOPICS = {topic.name: topic for topic in tp.TOPICS if topic not in (tp.POSE, tp.LOCATION)}
 QUEUE = 20000  # messages; about 20 s of a busy bench
 PAST_S = 600.0  # a device's history is asked for so far back ...
 PAST_EVERY_S = 1.0  # ... with one message of each topic in this time, s
@@ -138,7 +138,7 @@ class Feed:
             self._taken += 1
             try:
                 address = tp.parse(key)
-                if address.topic in TOPICS:
+                if address.topic.name in TOPICS:
                     self._take(Arrival(address.topic, address.device, address.estimator, payload, 0), arrived)
             except Exception as error:  # a foreign message must not stop the picture
                 log.warning("%s: not shown (%s: %s)", key, type(error).__name__, error)
@@ -172,13 +172,13 @@ class Feed:
             repaired, late = False, []
             for item in reply.items if reply is not None else ():
                 name, _, estimator = item.topic.partition("/")
-                topic = tp.BY_NAME.get(name)
-                if topic in TOPICS:
+                topic = TOPICS.get(name)
+                if topic is not None:
                     late.append(Arrival(topic, device, estimator, item.payload, item.published_ns, late=True))
             if reply is not None and reply.next:
                 query.position = reply.next
                 self._asker.ask(token, device, source, query)
-        decoded = [(a.topic, a.estimator, busmod.decode(a.topic, a.payload)) for a in late if a.topic in TOPICS]
+        decoded = [(a.topic, a.estimator, busmod.decode(a.topic, a.payload)) for a in late if a.topic.name in TOPICS]
         self._store.put_late(device, [row for row in decoded if row[2] is not None], repaired)
 
     def _ask(self, question: Question) -> None:

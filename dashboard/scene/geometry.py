@@ -38,17 +38,6 @@ def quaternion(values) -> tuple[float, float, float, float] | None:
     return tuple(float(v) for v in q / norm)
 
 
-def quaternion_between(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float, float]:
-    """The shortest rotation that turns direction a into direction b (w, x, y, z)."""
-    a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
-    w = 1.0 + float(a @ b)
-    axis = np.cross(a, b)
-    if w < 1e-9:
-        w, axis = 0.0, np.cross(a, [1.0, 0.0, 0.0] if abs(a[0]) < 0.9 else [0.0, 1.0, 0.0])
-    q = np.array([w, *axis])
-    return tuple(float(v) for v in q / np.linalg.norm(q))
-
-
 def ned_from_geodetic(
     latitude_deg: float, longitude_deg: float, height_m: float, origin: tuple[float, float, float]
 ) -> np.ndarray:

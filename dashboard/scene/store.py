@@ -12,6 +12,7 @@ import numpy as np
 from google.protobuf.message import Message
 
 from dashboard.scene.geometry import Track, ned_from_geodetic, yaw_of
+from dashboard.scene.replayed import Replayed
 from dashboard.scene.ring import Ring
 from dashboard.scene.tilt import tilt_rows
 from messages import gyrofree_pb2 as pb
@@ -116,7 +117,7 @@ class Store:
         self.lock = threading.RLock()
         self.devices: dict[str, Device] = {}
         self.recorder: Latest | None = None
-        self.replay: Latest | None = None
+        self.replay = Replayed()
         self.logs: list[tuple[float, str, str]] = []  # arrived, device, text
         self.dropped = 0  # messages the feed could not keep up with
 
@@ -137,7 +138,7 @@ class Store:
             if topic is tp.STATUS:
                 self.recorder = Latest(message, arrived, 0.0)
             elif topic is tp.REPLAY:
-                self.replay = Latest(message, arrived, 0.0)
+                self.replay.take(message, arrived)
             elif topic is tp.LOG:
                 self.logs = [*self.logs[-49:], (arrived, device, message.message)]
             else:

@@ -14,6 +14,7 @@ from messages import gyrofree_pb2 as pb
 
 WINDOWS = {"10 s": 10.0, "30 s": 30.0, "60 s": 60.0, "5 min": 300.0, "10 min": 600.0}
 TRACK_S = 0.2  # trajectories grow five times a second
+ASKED_FOR_S = 20.0  # a replay that begins this near to the opening of a page was asked for by the person at it
 
 
 class View:
@@ -29,6 +30,8 @@ class View:
         self._client, self._store, self._feed = client, store, feed
         self._choice = Choice()
         self._device_name = ""
+        self._device_chosen = False  # by the person, or by the replay that it began
+        self._opened_at = time.monotonic()
         self._generation = -1
         self._window_s = WINDOWS["30 s"]
         self._paused_at: float | None = None
@@ -70,6 +73,7 @@ class View:
             self._record.update(self._store.recorder, now)
             self._timeline.update(now)
             self._update_chooser()
+            self._show_replay_asked_for()
             device = self._device()
             if device is None:
                 router = "no router: is `gyrofree router` running?"
@@ -81,7 +85,8 @@ class View:
             self._generation = device.generation
             t1 = device.t_newest if self._paused_at is None else self._paused_at
             t0 = max(t1 - self._window_s, device.t_first)
-            snapshot = Snapshot(self._store, device, t0, max(t1, t0 + 1.0), now, self._choice.dark)
+            clock = self._store.replay.clock(device.name, now)
+            snapshot = Snapshot(self._store, device, t0, max(t1, t0 + 1.0), clock, self._choice.dark)
             if not self._page_chosen:
                 first = {"nav": Position, "attitude": Tilt, "rate": PAGES[0]}[device.body]
                 self._open(PAGES.index(first))
@@ -95,7 +100,7 @@ class View:
         gui = self._client.gui
         gui.set_panel_label("gyrofree")
         self._chooser = gui.add_dropdown("Device", ("–",), visible=False)
-        self._chooser.on_update(lambda _: self._choose(self._chooser.value))
+        self._chooser.on_update(lambda event: self._choose(self._chooser.value, by_person=event.client is not None))
         self._devices = Devices(self._client, gui.add_folder(None))
         self._paused_note = gui.add_html('<div class="gf-paused">❚❚ PAUSED · data keep coming in</div>', visible=False)
         self._pause_button = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, color="gray", hint="Key P")
@@ -174,8 +179,9 @@ class View:
             device = self._device()
             self.scene.reset_camera(device is not None and device.body == "nav")
 
-    def _choose(self, name: str) -> None:
+    def _choose(self, name: str, by_person: bool) -> None:
         with self._lock:
+            self._device_chosen |= by_person
             if name != self._device_name and self._store.device(name) is not None:
                 self._device_name = name
                 self._paused_at and self._pause(False)
@@ -203,6 +209,15 @@ class View:
             self._chooser.visible = len(names) > 1
             if self._device_name in names:
                 self._chooser.value = self._device_name
+
+    def _show_replay_asked_for(self) -> None:
+        """Turn to the device of a replay that began about when this page was opened, unless another was chosen."""
+        if self._device_chosen or abs(self._store.replay.began - self._opened_at) > ASKED_FOR_S:
+            return
+        name = self._store.replay.device(self._store.devices)
+        if name is not None:
+            self._device_name, self._device_chosen = name, True
+            self._chooser.value = name
 
     def _device(self) -> Device | None:
         """The chosen device; the first one heard with data until somebody chooses."""

@@ -6,14 +6,13 @@ Compiled.
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from estimator.rate.compiling import fused, making
 from estimator.rate.observed import Sensor
 from estimator.rate.products_correct import force_rows, products_rows, standstill_rows
 from estimator.rate.products_kernel import (
     COV,
-    FAST,
     GRAVITY,
     RESIDUAL,
     WORK,
@@ -65,7 +64,7 @@ def memory(what: Any) -> Followed:
     return m
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def _up(q: Array) -> Three:
     """-C_bn g_n: what a body at rest feels."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -73,7 +72,7 @@ def _up(q: Array) -> Three:
             -GRAVITY * (1.0 - 2.0 * (x * x + y * y)))  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@making
 def _begin(m: Followed, s: Sensor, u: Three) -> None:
     """What is known after the first standstill; tilt and bias of p are known together, not apart."""
     P = m.P
@@ -101,7 +100,7 @@ def _begin(m: Followed, s: Sensor, u: Three) -> None:
     m.known = 1
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def step(m: Followed, s: Sensor, omega: Array, alpha: Array, q_nb: Array, still: bool, dt: float) -> None:
     """One sample of the estimate: omega (3,) rad/s, alpha (3,) rad/s^2, attitude (4,), the still detector's word."""
     m.count += 1
@@ -137,7 +136,7 @@ def step(m: Followed, s: Sensor, omega: Array, alpha: Array, q_nb: Array, still:
         m.sigma[i] = np.sqrt(P[23 * i])
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def _noise(P: Array, N: tuple[float, float, float, float, float, float], f: float, wander: float, s: Sensor) -> None:
     """P += f N R_alpha N + wander (I - N), on omega."""
     full = ((N[0], N[1], N[2]), (N[1], N[3], N[4]), (N[2], N[4], N[5]))

@@ -11,11 +11,11 @@ class Direct:
         self._function = function
         self._entry: Callable[..., Any] | None = None
 
-    def __call__(self, *arguments: Any) -> None:
+    def __call__(self, *arguments: Any) -> Any:
         if self._entry is not None:
-            self._entry(*arguments)
-            return
-        self._function(*arguments)
+            return self._entry(*arguments)
+        result = self._function(*arguments)
         overloads = getattr(self._function, "overloads", None)  # none where numba is switched off
         if overloads is not None and len(overloads) == 1:
             self._entry = next(iter(overloads.values())).entry_point
+        return result

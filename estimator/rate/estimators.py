@@ -18,13 +18,17 @@ from estimator.rate import products_run as frame
 from estimator.rate import products_track as track
 from estimator.rate.observed import sensor
 from estimator.rate.samples import Samples
+from estimator.rate.track_state import KEEP_STILL, TOLD, WAITING, TrackState
 
 Array = NDArray[np.float64]
 
 
 @dataclass(slots=True)  # not frozen: that would cost as much as the filter
 class RateState:
-    """Rotation and motion by one estimator, at one sample. Arrays are parts of one row: read them, do not write."""
+    """Rotation and motion by one estimator, at one sample. Arrays are parts of one row: read them, do not write.
+
+    TrackState offers the same and stands for it wherever a RateState is wanted.
+    """
 
     omega_b: Array  # rad/s, (3,), of b against inertial
     P: Array  # (rad/s)^2, (3, 3), covariance of omega_b
@@ -90,9 +94,7 @@ class RateEstimator(Protocol):
 
 EMPTY = np.zeros(0)
 EMPTY.setflags(write=False)
-KEEP_STILL, WAITING = "finding biases: keep still", "no standstill yet: keep still"
 LOST = "; the filter lost its covariance and began anew: this motion or layout is not for it"
-TWO_SIGNS = "turning, sign of the rate unknown"
 
 
 class _Stepping:
@@ -184,11 +186,11 @@ class ProductsRate(_Stepping):
         self.calibration = calibration
         self._taken = Samples()
         self._bound = bound.Along(layout) if self.with_bound else None
-        self._unseen = config.unseen_rate**2 * np.eye(3)
+        self._unseen = (config.unseen_rate**2 * np.eye(3)).ravel()  # of a standing body, which may have begun to turn
         self._m = int(self.core.sensor["m"])
         self._reports, self._axis_b, self._aid = tachometer.Reports(), np.array([0.0, 0.0, 1.0]), ""
 
-    def feed(self, t_s: Array, f_axis: Array, wanted: Sequence[int]) -> list[RateState]:
+    def feed(self, t_s: Array, f_axis: Array, wanted: Sequence[int]) -> list[TrackState]:
         """See RateEstimator.feed."""
         t_s, f_axis = self._taken.take(self.core.layout, t_s, f_axis)
         parts, aids, row = [], [], 0
@@ -199,8 +201,18 @@ class ProductsRate(_Stepping):
             parts.append(self.core.rows(t_s[row:end], f_axis[row:end], self._bound))
             aids += [self._aid] * (end - row)
             row = end
-        rows = parts[0] if len(parts) == 1 else np.concatenate(parts)
-        return [self._state(rows[k], aids[k]) for k in wanted]
+        return self._states(parts[0] if len(parts) == 1 else np.concatenate(parts), aids, wanted)
+
+    def _states(self, rows: Array, aids: list[str], wanted: Sequence[int]) -> list[TrackState]:
+        said, mask = rows.take(TOLD, axis=1).tolist(), self.core.excluded
+        for k, (_, still, started, *_) in enumerate(said):
+            if still and started:
+                rows[k, track.P : track.P + 9] += self._unseen
+        states = [TrackState(rows, k, said[k], self._m, aids[k], mask, self.calibration) for k in wanted]
+        for state in states if self.core.lost else ():
+            if not state.started:
+                state.sight_reason += LOST
+        return states
 
     def skip(self, n: int) -> None:
         """See RateEstimator.skip; the next step predicts across the gap."""
@@ -239,44 +251,6 @@ class ProductsRate(_Stepping):
     def refused(self) -> dict[str, int]:
         """Corrections not used because their NIS was beyond its gate: by the products, by gravity ("force")."""
         return self.core.refused
-
-    def _state(self, row: Array, aid: str) -> RateState:
-        still, started, two, sign = row[track.STILL : track.SIGN + 1].tolist()
-        angle, nis = row[track.ANGLE : track.NIS + 1].tolist()
-        P = row[track.P : track.P + 9].reshape(3, 3)
-        sights, reason = sight.ALL_BLIND, WAITING + LOST * (self.core.lost > 0)
-        if started:
-            sights, reason = tuple(map(int, row[track.SIGHT : track.SIGHT + 3].tolist())), ""
-            if sights != sight.ALL_VALID:
-                variances = row[track.P : track.P + 9 : 4]
-                size = math.hypot(*row[track.OMEGA : track.OMEGA + 3].tolist(), math.sqrt(sum(variances.tolist())))
-                reason = sight.reason(sights, variances, sign, two > 0.0, size)
-        m = self._m if started and nis != 0.0 else 0
-        phase = KEEP_STILL if not started else TWO_SIGNS if two else "still" if still else "turning"
-        return RateState(
-            omega_b=row[track.OMEGA : track.OMEGA + 3],
-            P=P + self._unseen if still and started else P,
-            alpha_b=row[track.ALPHA : track.ALPHA + 3],
-            f_b=row[track.F : track.F + 3],
-            q_nb=row[track.Q_NB : track.Q_NB + 4],
-            angle_z=angle,
-            innovation=row[track.INNOVATION : track.INNOVATION + m],
-            innovation_sigma=row[track.SIGMA : track.SIGMA + m],
-            nis=nis if m else 0.0,
-            nis_dof=m,
-            still=still > 0.0,
-            p_n=row[track.P_N : track.P_N + 3],
-            v_n=row[track.V_N : track.V_N + 3],
-            bias=row[track.BIAS : track.BIAS + 12],
-            phase=f"{phase}, aided by the tachometer" if aid else phase,
-            innovation_unit="(rad/s)^2",
-            sight=sights,
-            sight_reason=reason,
-            excluded=self.core.excluded,
-            calibration=self.calibration,
-            aid=aid,
-            bound_sigma=row[track.BOUND : track.BOUND + 3] if row[track.BOUND] > 0.0 else None,
-        )
 
 
 class UnscentedRate(ProductsRate):

@@ -7,7 +7,7 @@ swapped, or not to be used at all. The likeliest names the fault, if it fits and
 Deterministic: no time of day, no random. docs/equations-layouts.md, H-1 to H-10.
 """
 
-from dataclasses import dataclass, field
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,33 +15,13 @@ from numpy.typing import NDArray
 from estimator.layouts.layout import RANK_TOLERANCE, Layout
 from estimator.rate import axis_samples, parity
 from estimator.rate.axis_fault import AxisState, Fault
-from estimator.rate.health_config import STANDSTILL, Config
+from estimator.rate.direct import Direct
+from estimator.rate.health_config import STANDSTILL, Config, Counts, Newest
 from estimator.rate.hypotheses import Finding, History, explain, start
 
 Array = NDArray[np.float64]
 
-
-@dataclass
-class Counts:
-    """What the monitor did."""
-
-    named: int = 0
-    returned: int = 0
-    restarts: int = 0  # readings did not fit any motion and no axis explains it
-    explained_by_start: int = 0
-    spikes_removed: int = 0
-    blocks: int = 0
-
-
-@dataclass
-class _Newest:
-    """Of the last block."""
-
-    residual: Array
-    sigma: Array
-    nis: float = 0.0
-    degrees: int = 0
-    filled: bool = field(default=False)
+_gather = Direct(axis_samples.gather)
 
 
 class HealthMonitor:
@@ -54,8 +34,9 @@ class HealthMonitor:
         self.per_block = max(1, round(config.block_s / period_s))
         self.faults = [Fault() for _ in range(n)]
         self.counts = Counts()
-        self.newest = _Newest(np.zeros(n), np.ones(n))
+        self.newest = Newest(np.zeros(n), np.ones(n))
         self.message = ""
+        self._mask = 0
         self._limits = np.array([s.limit for s in layout.sensors])
         self._J, self._Q = np.ascontiguousarray(layout.J), np.ascontiguousarray(layout.Q)
         self._noise = layout.noise
@@ -83,7 +64,10 @@ class HealthMonitor:
     @property
     def mask(self) -> int:
         """Bit k: axis k is excluded."""
-        return sum(1 << k for k, fault in enumerate(self.faults) if fault.excluded)
+        return self._mask
+
+    def _excluded(self) -> int:
+        return sum([1 << k for k, fault in enumerate(self.faults) if fault.excluded])
 
     @property
     def constants(self) -> tuple[Array, Array, Array, Array, Array, Array]:
@@ -110,7 +94,7 @@ class HealthMonitor:
         f, row, parts, mask = np.ascontiguousarray(f_axis, dtype=np.float64), 0, [], self.mask
         near, marks = self._near, self._marks
         while row < len(f):
-            row = axis_samples.gather(f, row, self.per_block, near, marks, self._noise, self._limits, self._count)
+            row = _gather(f, row, self.per_block, near, marks, self._noise, self._limits, self._count)
             self._stale |= stale
             filled = int(marks[axis_samples.FILLED])
             if filled < self.per_block:
@@ -145,11 +129,14 @@ class HealthMonitor:
     def _block(self, block: Array, dt: float) -> None:
         self.counts.blocks += 1
         self._single_axes()
-        if self._sees and self.used.sum() > 6:
+        if self._sees and np.count_nonzero(self.used) > 6:
             self._check(block, dt)
-        self._returns(block)
-        bad = [self.layout.axis_names[i] for i, fault in enumerate(self.faults) if fault.excluded]
-        if bad:
+        self._mask = self._excluded()
+        if self._mask:
+            self._returns(block)
+            self._mask = self._excluded()
+        if self._mask:
+            bad = [name for name, fault in zip(self.layout.axis_names, self.faults, strict=True) if fault.excluded]
             self.message = f"not used: {', '.join(bad)}"
         elif self.counts.blocks - self._clean_blocks > 0:
             self.message = ""
@@ -176,15 +163,14 @@ class HealthMonitor:
         if self._x is None:
             self._x, self._P = start(self.layout, block - self.bias, self.used, float(self.offset.max()) ** 0.5)
         before = (self._x, self._P)
-        f = block - self.bias
-        R = parity.variances(block, self.white, self.offset, c.scale, np.where(self.learned, self.reference, block))
-        x, P = parity.predict(self._x, self._P, dt, c.sigma_alpha, c.sigma_force)
-        x, P, nis, _, residual, sigma = parity.correct(x, P, f, R, self.used, self._J, self._Q, -1)
-        if not np.isfinite(nis):
+        x, P, nis, _, residual, sigma = parity.step(
+            self._x, self._P, block, dt, self.used, self.learned, self.constants, self.tuning
+        )
+        if not math.isfinite(nis):
             return self._restart()
         self._x, self._P = x, P
-        degrees = int(self.used.sum())
-        self.newest = _Newest(residual, sigma, nis, degrees, True)
+        degrees = np.count_nonzero(self.used)
+        self.newest = Newest(residual, sigma, nis, degrees, True)
         expected = c.gate * (degrees - 6) + 6.0
         self._sum = max(0.0, self._sum + min(nis, 4.0 * degrees) - expected)
         self.history.add(block, dt, *before, self._sum == 0.0)

@@ -1,6 +1,11 @@
-"""Limits of the axis monitor (health.py)."""
+"""Limits of the axis monitor (health.py), and what it tells."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 STANDSTILL = 50  # blocks that offsets are learned from: long enough to tell a slow turn by gravity's own
 
@@ -25,3 +30,26 @@ class Config:
     longest_good_s: float = 16.0  # that time doubles with every relapse, up to this
     relapse_s: float = 60.0  # s after which a fault is a new one and no relapse
     evidence: float = 30.0  # -2 log likelihood ratio for good against the fault
+
+
+@dataclass
+class Counts:
+    """What the monitor did."""
+
+    named: int = 0
+    returned: int = 0
+    restarts: int = 0  # readings did not fit any motion and no axis explains it
+    explained_by_start: int = 0
+    spikes_removed: int = 0
+    blocks: int = 0
+
+
+@dataclass
+class Newest:
+    """Of the last block."""
+
+    residual: Array
+    sigma: Array
+    nis: float = 0.0
+    degrees: int = 0
+    filled: bool = field(default=False)

@@ -94,11 +94,6 @@ def sensor(layout: Layout, sigma_axis: float, excluded: int = 0) -> Sensor:
     return out
 
 
-def observable_products(layout: Layout) -> int:
-    """How many combinations of the six products the axes see without integration: 6 for the cube, 0 for "nine"."""
-    return len(_solve(layout, np.arange(layout.axes))[1])
-
-
 def _solve(layout: Layout, keep: NDArray[np.int64]) -> tuple[Array, Array]:
     """S (6, n) and the rows of B (m, n) of the kept axes, solved with lengths in units of the layout's scale."""
     unit = np.array([layout.scale_m] * 3 + [1.0] * 3)

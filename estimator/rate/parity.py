@@ -160,6 +160,18 @@ def altered(f: Array, bias: Array, reference: Array, kind: int, i: int, j: int) 
 
 
 @njit(cache=True)
+def step(
+    x: Array, P: Array, block: Array, dt: float, used: Array, learned: Array,
+    constants: tuple[Array, Array, Array, Array, Array, Array], tuning: tuple[float, float, float],
+) -> tuple[Array, Array, float, float, Array, Array]:  # fmt: skip
+    """One block (N,) dt (s) after the last, as correct() says it; an axis that is not `learned` has no scale error."""
+    J, Q, bias, reference, white, offset = constants
+    R = variances(block, white, offset, tuning[2], np.where(learned, reference, block))
+    x, P = predict(x, P, dt, tuning[0], tuning[1])
+    return correct(x, P, block - bias, R, used, J, Q, -1)
+
+
+@njit(cache=True)
 def replay(
     x: Array,
     P: Array,

@@ -4,14 +4,13 @@ Each fills H P, C and y of the workspace and has the kernel absorb them, six or 
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from estimator.rate.compiling import fused
 from estimator.rate.observed import Sensor
 from estimator.rate.products_kernel import (
     B_F,
     COV,
-    FAST,
     INNOVATION,
     JACOBIAN,
     PIVOT,
@@ -27,20 +26,21 @@ from estimator.rate.products_kernel import (
     absorb_three,
 )
 from estimator.rate.products_model import FIRST, SECOND, STATES
+from estimator.rate.vectors import combine
 
 Array = NDArray[np.float64]
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def by_products(
     x: Array, P: Array, work: Array, y: Array, at: Three, s: Sensor, t: Tuning, out: Array
 ) -> tuple[float, float]:
     """Correct by the observed combinations y[3:9] of the products, linear about omega = at (E-33, E-34).
 
-    Returns NIS and log det. What a layout does not see are rows of zeros, which say nothing.
+    Returns NIS and 1 / sqrt(det C). What a layout does not see are rows of zeros, which say nothing.
     """
     if s.m == 0:
-        return 0.0, 0.0
+        return 0.0, 1.0
     w0, w1, w2 = at
     e = work[RESIDUAL : RESIDUAL + 6]
     z0, z1, z2 = w0 * x[0], w0 * x[1] + w1 * x[0] - w0 * w1, w0 * x[2] + w2 * x[0] - w0 * w2
@@ -62,11 +62,11 @@ def by_products(
     return absorb_six(x, P, work, t.products_gate)
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def products_rows(P: Array, work: Array, w: Three, s: Sensor, share: float) -> None:
     """H P and the lower triangle of H P H^T + share R_c, for the products about omega = w (E-33)."""
     n, w0, w1, w2 = STATES, w[0], w[1], w[2]
-    G, H, C = work[ROWS : ROWS + 6 * STRIDE], work[JACOBIAN : JACOBIAN + 18], work[COV : COV + 36]
+    G, H, C = work, work[JACOBIAN : JACOBIAN + 18], work[COV : COV + 36]
     for r in range(6):
         M = s.M[r]
         H[3 * r] = 2.0 * M[0] * w0 + M[1] * w1 + M[2] * w2
@@ -74,8 +74,7 @@ def products_rows(P: Array, work: Array, w: Three, s: Sensor, share: float) -> N
         H[3 * r + 2] = M[2] * w0 + M[4] * w1 + 2.0 * M[5] * w2
     for r in range(6):
         h0, h1, h2 = H[3 * r], H[3 * r + 1], H[3 * r + 2]
-        for j in range(n):
-            G[STRIDE * r + j] = h0 * P[j] + h1 * P[n + j] + h2 * P[2 * n + j] + P[n * (6 + r) + j]
+        combine(G, STRIDE * r, P, (n * (6 + r), 0, n, 2 * n), (1.0, h0, h1, h2))
     for k in range(6):
         g0, g1, g2 = G[STRIDE * k], G[STRIDE * k + 1], G[STRIDE * k + 2]
         for l in range(k + 1):
@@ -83,7 +82,7 @@ def products_rows(P: Array, work: Array, w: Three, s: Sensor, share: float) -> N
             C[6 * k + l] = value + G[STRIDE * k + 6 + l] + share * s.R_c[k, l]
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def _add_spread(P: Array, work: Array, s: Sensor) -> None:
     """C += second-order spread of the products (E-34)."""
     C, S = work[COV : COV + 36], work[SPREAD : SPREAD + 36]
@@ -106,11 +105,11 @@ def _add_spread(P: Array, work: Array, s: Sensor) -> None:
             C[6 * k + l] += value
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def by_force(
     x: Array, P: Array, work: Array, p: Three, alpha: Three, late: Three, turning: bool, s: Sensor, t: Tuning
 ) -> tuple[float, float]:
-    """Correct by gravity and the motion of the centre about its pivot (E-35); NIS and log det.
+    """Correct by gravity and the motion of the centre about its pivot (E-35); NIS and 1 / sqrt(det C).
 
     p: specific force of the centre, m/s^2; alpha: omega', rad/s^2, of this sample; late: its mean before. The Jacobian
     is that of `late`: alpha's noise in it would seem to say that the centre, which does not follow it, is on the axis.
@@ -131,7 +130,7 @@ def by_force(
     return absorb_three(x, P, work, t.force_gate)
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def force_rows(x: Array, P: Array, work: Array, p: Three, alpha: Three, s: Sensor, share: float) -> None:
     """H P, the lower triangle of H P H^T + share R_p, and the innovation of the specific force p (E-35)."""
     w0, w1, w2, r0, r1, r2 = x[0], x[1], x[2], x[18], x[19], x[20]
@@ -150,14 +149,11 @@ def force_rows(x: Array, P: Array, work: Array, p: Three, alpha: Three, s: Senso
         y0, h00, h01, h02 = _by_squares(s.SQ[3], w0, w1, w2, y0, h00, h01, h02)
         y1, h10, h11, h12 = _by_squares(s.SQ[4], w0, w1, w2, y1, h10, h11, h12)
         y2, h20, h21, h22 = _by_squares(s.SQ[5], w0, w1, w2, y2, h20, h21, h22)
-    n, G = STRIDE, work[ROWS : ROWS + 3 * STRIDE]
-    for j in range(STATES):
-        p0, p1, p2 = P[j], P[22 + j], P[44 + j]
-        q0, q1, q2 = P[PIVOT + j], P[PIVOT + 22 + j], P[PIVOT + 44 + j]
-        u0, u1, u2 = P[U + j] + P[B_F + j], P[U + 22 + j] + P[B_F + 22 + j], P[U + 44 + j] + P[B_F + 44 + j]
-        G[j] = u0 + h00 * p0 + h01 * p1 + h02 * p2 + k00 * q0 + k01 * q1 + k02 * q2
-        G[n + j] = u1 + h10 * p0 + h11 * p1 + h12 * p2 + k10 * q0 + k11 * q1 + k12 * q2
-        G[2 * n + j] = u2 + h20 * p0 + h21 * p1 + h22 * p2 + k20 * q0 + k21 * q1 + k22 * q2
+    n, G = STRIDE, work
+    a, b, c = PIVOT, PIVOT + 22, PIVOT + 44
+    combine(G, 0, P, (U, B_F, 0, 22, 44, a, b, c), (1.0, 1.0, h00, h01, h02, k00, k01, k02))
+    combine(G, n, P, (U + 22, B_F + 22, 0, 22, 44, a, b, c), (1.0, 1.0, h10, h11, h12, k10, k11, k12))
+    combine(G, 2 * n, P, (U + 44, B_F + 44, 0, 22, 44, a, b, c), (1.0, 1.0, h20, h21, h22, k20, k21, k22))
     h0, h1, h2 = (h00, h01, h02, k00, k01, k02), (h10, h11, h12, k10, k11, k12), (h20, h21, h22, k20, k21, k22)
     C, R = work[COV : COV + 36], s.R_p
     C[0], C[6] = _seen(G, 0, 0, h0) + share * R[0, 0], _seen(G, n, 0, h0) + share * R[1, 0]
@@ -166,7 +162,7 @@ def force_rows(x: Array, P: Array, work: Array, p: Three, alpha: Three, s: Senso
     work[RESIDUAL], work[RESIDUAL + 1], work[RESIDUAL + 2] = y0, y1, y2
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def _by_squares(q: Array, w0: float, w1: float, w2: float, y: float, h0: float, h1: float,
                 h2: float) -> tuple[float, float, float, float]:  # fmt: skip
     """y_k and its row of d p / d omega with what the products q . z add to p_k."""
@@ -176,14 +172,14 @@ def _by_squares(q: Array, w0: float, w1: float, w2: float, y: float, h0: float, 
     return y, h0, h1, h2 + q[2] * w0 + q[4] * w1 + 2.0 * q[5] * w2
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def _seen(G: Array, row: int, l: int, h: tuple[float, float, float, float, float, float]) -> float:
     """Element of H P H^T: row of H P times row l of H, whose parts for omega and the pivot are h."""
     value = G[row + 12 + l] + G[row + 15 + l] + h[0] * G[row] + h[1] * G[row + 1] + h[2] * G[row + 2]
     return value + h[3] * G[row + 18] + h[4] * G[row + 19] + h[5] * G[row + 20]
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def by_standstill(x: Array, P: Array, work: Array, alpha_m: Three, earth_b: Three, s: Sensor, t: Tuning) -> None:
     """omega is the Earth's and omega' is bias (E-38)."""
     standstill_rows(P, work, s, t.still_rate, 1.0)
@@ -192,13 +188,12 @@ def by_standstill(x: Array, P: Array, work: Array, alpha_m: Three, earth_b: Thre
     absorb_six(x, P, work, np.inf)
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def standstill_rows(P: Array, work: Array, s: Sensor, rate: float, share: float) -> None:
     """H P and the lower triangle of H P H^T + R of a standstill, R of `rate` and of share R_alpha."""
     C = work[COV : COV + 36]
     for i in range(6):
-        for j in range(STATES):
-            work[ROWS + STRIDE * i + j] = P[STATES * i + j]
+        combine(work, ROWS + STRIDE * i, P, (STATES * i,), (1.0,))
         for j in range(i + 1):
             C[6 * i + j] = P[22 * i + j]
     for i in range(3):

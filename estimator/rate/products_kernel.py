@@ -11,12 +11,13 @@ turns into vector instructions; small matrices are tuples, which it keeps in reg
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from estimator.rate.compiling import fused
 from estimator.rate.observed import MOST_AXES, Sensor
 from estimator.rate.products_model import STATES
 from estimator.rate.turns import turn_matrix
+from estimator.rate.vectors import add, combine, take_out
 
 Array = NDArray[np.float64]
 Three = tuple[float, float, float]
@@ -30,7 +31,7 @@ REST_BIAS, REST_VARIANCE, LEVEL, REST = PP + 17, PP + 29, PP + 41, PP + 53
 LATE = REST + MOST_AXES
 SIZE = LATE + 3
 # of the output of a step
-INNOVATION, SIGMA, NIS, USED, FORCE_NIS, FORCE_USED, LIKELIHOOD, OUT = 0, 6, 12, 13, 14, 15, 16, 17
+INNOVATION, SIGMA, NIS, USED, FORCE_NIS, FORCE_USED, MISFIT, DENSITY, OUT = 0, 6, 12, 13, 14, 15, 16, 17, 18
 EKF, UKF, FORGET, HORIZON = range(4)
 # rows of P in (484,): of omega, b_alpha, b_c, u, b_f, the pivot, the angle
 OMEGA, B_ALPHA, B_C, U, B_F, PIVOT, TURNED = 0, 66, 132, 264, 330, 396, 462
@@ -39,7 +40,8 @@ OMEGA, B_ALPHA, B_C, U, B_F, PIVOT, TURNED = 0, 66, 132, 264, 330, 396, 462
 STRIDE = 24
 ROWS, COV, JACOBIAN, SPREAD, RESIDUAL, BEFORE = 0, 168, 204, 222, 258, 264
 WORK = BEFORE + PP
-FAST = {"contract"}  # a product and a sum in one instruction; not-a-number stays one
+THREE, SIX = (0, 24, 48), (0, 24, 48, 72, 96, 120)  # rows of the workspace
+MOVING = (0, 22, 44, 66, 88, 110)  # rows of P of omega and b_alpha
 
 
 # Numbers of products_ekf.Config for compiled functions; variances.
@@ -75,7 +77,7 @@ TUNING = np.dtype(
 Tuning = np.record
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def factor(c00: float, c10: float, c11: float, c20: float, c21: float, c22: float) -> Six:
     """Cholesky factor of a symmetric matrix: 1 / l00, l10, 1 / l11, l20, l21, 1 / l22; not a number without one."""
     i0 = 1.0 / np.sqrt(c00)
@@ -85,7 +87,7 @@ def factor(c00: float, c10: float, c11: float, c20: float, c21: float, c22: floa
     return i0, l10, i1, l20, l21, 1.0 / np.sqrt(c22 - l20 * l20 - l21 * l21)
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def solve(f: Six, y0: float, y1: float, y2: float) -> Three:
     """L^-1 y."""
     i0, l10, i1, l20, l21, i2 = f
@@ -94,31 +96,35 @@ def solve(f: Six, y0: float, y1: float, y2: float) -> Three:
     return w0, w1, (y2 - l20 * w0 - l21 * w1) * i2
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
+def _substitute(G: Array, at: int, f: Six) -> None:
+    """L^-1 of the three rows of G that begin at `at`."""
+    i0, l10, i1, l20, l21, i2 = f
+    one, two = at + STRIDE, at + 2 * STRIDE
+    combine(G, at, G, (at,), (i0,))
+    combine(G, one, G, (one, at), (i1, -i1 * l10))
+    combine(G, two, G, (two, at, one), (i2, -i2 * l20, -i2 * l21))
+
+
+@fused
 def absorb_three(x: Array, P: Array, work: Array, gate: float) -> tuple[float, float]:
-    """Kalman correction in place by three innovations: NIS and log det C (E-39).
+    """Kalman correction in place by three innovations: NIS and 1 / sqrt(det C) (E-39).
 
     work holds H P, C and y. An innovation beyond the gate changes nothing else.
     """
     c, y = COV, RESIDUAL
     f = factor(work[c], work[c + 6], work[c + 7], work[c + 12], work[c + 13], work[c + 14])
     y0, y1, y2 = solve(f, work[y], work[y + 1], work[y + 2])
-    nis, logdet = y0 * y0 + y1 * y1 + y2 * y2, -2.0 * np.log(f[0] * f[2] * f[5])
+    nis, density = y0 * y0 + y1 * y1 + y2 * y2, f[0] * f[2] * f[5]
     if not nis <= gate:
-        return nis, logdet
-    n, G = STRIDE, work[ROWS : ROWS + 3 * STRIDE]
-    for j in range(STATES):
-        g0, g1, g2 = solve(f, G[j], G[n + j], G[2 * n + j])
-        G[j], G[n + j], G[2 * n + j] = g0, g1, g2
-        x[j] += g0 * y0 + g1 * y1 + g2 * y2
-    for r in range(STATES):
-        row, a0, a1, a2 = STATES * r, G[r], G[n + r], G[2 * n + r]
-        for j in range(STATES):
-            P[row + j] -= a0 * G[j] + a1 * G[n + j] + a2 * G[2 * n + j]
-    return nis, logdet
+        return nis, density
+    _substitute(work, 0, f)
+    add(x, 0, work, THREE, (y0, y1, y2))
+    take_out(P, work, THREE)
+    return nis, density
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def absorb_six(x: Array, P: Array, work: Array, gate: float) -> tuple[float, float]:
     """The same by six innovations, in two blocks of three. A row of zeros with C = 1 and y = 0 says nothing."""
     c, y = COV, RESIDUAL
@@ -142,30 +148,21 @@ def absorb_six(x: Array, P: Array, work: Array, gate: float) -> tuple[float, flo
         work[y + 5] - b20 * y0 - b21 * y1 - b22 * y2,
     )
     nis = y0 * y0 + y1 * y1 + y2 * y2 + y3 * y3 + y4 * y4 + y5 * y5
-    logdet = -2.0 * np.log(f[0] * f[2] * f[5] * h[0] * h[2] * h[5])
+    density = f[0] * f[2] * f[5] * h[0] * h[2] * h[5]
     if not nis <= gate:
-        return nis, logdet
-    n, G = STRIDE, work[ROWS : ROWS + 6 * STRIDE]
-    for j in range(STATES):
-        g0, g1, g2 = solve(f, G[j], G[n + j], G[2 * n + j])
-        g3, g4, g5 = solve(
-            h,
-            G[3 * n + j] - b00 * g0 - b01 * g1 - b02 * g2,
-            G[4 * n + j] - b10 * g0 - b11 * g1 - b12 * g2,
-            G[5 * n + j] - b20 * g0 - b21 * g1 - b22 * g2,
-        )
-        G[j], G[n + j], G[2 * n + j], G[3 * n + j], G[4 * n + j], G[5 * n + j] = g0, g1, g2, g3, g4, g5
-        x[j] += g0 * y0 + g1 * y1 + g2 * y2 + g3 * y3 + g4 * y4 + g5 * y5
-    for r in range(STATES):
-        row = STATES * r
-        a0, a1, a2, a3, a4, a5 = G[r], G[n + r], G[2 * n + r], G[3 * n + r], G[4 * n + r], G[5 * n + r]
-        for j in range(STATES):
-            g0, g1, g2, g3, g4, g5 = G[j], G[n + j], G[2 * n + j], G[3 * n + j], G[4 * n + j], G[5 * n + j]
-            P[row + j] -= a0 * g0 + a1 * g1 + a2 * g2 + a3 * g3 + a4 * g4 + a5 * g5
-    return nis, logdet
+        return nis, density
+    G, n = work, STRIDE
+    _substitute(G, 0, f)
+    add(G, 3 * n, G, THREE, (-b00, -b01, -b02))
+    add(G, 4 * n, G, THREE, (-b10, -b11, -b12))
+    add(G, 5 * n, G, THREE, (-b20, -b21, -b22))
+    _substitute(G, 3 * n, h)
+    add(x, 0, G, SIX, (y0, y1, y2, y3, y4, y5))
+    take_out(P, G, SIX)
+    return nis, density
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def along_axis(w0: float, w1: float, w2: float, fixed: bool, turning: bool) -> Six:
     """Projection N (symmetric: 00 01 02 11 12 22) of omega' that is integrated (E-45).
 
@@ -179,7 +176,7 @@ def along_axis(w0: float, w1: float, w2: float, fixed: bool, turning: bool) -> S
     return f * w0 * w0, f * w0 * w1, f * w0 * w2, f * w1 * w1, f * w1 * w2, f * w2 * w2
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def predict(
     x: Array, P: Array, work: Array, alpha_m: Three, N: Six, dt: float, turning: bool, s: Sensor, earth_b: Three
 ) -> None:
@@ -215,10 +212,10 @@ def predict(
     # dt [u x] with u between the samples: right to second order in the turn of one sample
     t = (0.5 * dt * (u0 + x[12]), 0.5 * dt * (u1 + x[13]), 0.5 * dt * (u2 + x[14]))
     A, D = (a00, a01, a02, a10, a11, a12, a20, a21, a22), (d00, d01, d02, d11, d12, d22)
-    _turn_covariance(P, work[ROWS : ROWS + 7 * STRIDE], A, D, C, t, dt, 0.5 * dt if turning else 0.0)
+    _turn_covariance(P, work, A, D, C, t, dt, 0.5 * dt if turning else 0.0)
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def _feedback(s: Sensor, i: int, w0: float, w1: float, w2: float, dt: float, e: float, a0: float, a1: float,
               a2: float) -> tuple[float, float, float, float]:  # fmt: skip
     """omega'_i and its row of A less what the products add to it."""
@@ -229,25 +226,21 @@ def _feedback(s: Sensor, i: int, w0: float, w1: float, w2: float, dt: float, e: 
     return e, a0, a1, a2 - dt * (q[2] * w0 + q[4] * w1 + 2.0 * q[5] * w2)
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def _turn_covariance(P: Array, G: Array, A: Nine, D: Six, C: Nine, t: Three, dt: float, back: float) -> None:
     """P = F P F^T in place. F differs from the identity in seven rows: of omega, u and the angle.
 
-    G (7 x 24) becomes those rows of F P, then of F P F^T; they go into P as rows and as columns.
+    G (rows every 24) becomes those rows of F P, then of F P F^T; they go into P as rows and as columns.
     """
     t0, t1, t2 = t
-    for j in range(STATES):
-        p0, p1, p2 = P[j], P[22 + j], P[44 + j]
-        p3, p4, p5 = P[66 + j], P[88 + j], P[110 + j]
-        u0, u1, u2 = P[264 + j], P[286 + j], P[308 + j]
-        q0, q1, q2 = p0 - back * p3, p1 - back * p4, p2 - back * p5
-        G[j] = A[0] * p0 + A[1] * p1 + A[2] * p2 - D[0] * p3 - D[1] * p4 - D[2] * p5
-        G[24 + j] = A[3] * p0 + A[4] * p1 + A[5] * p2 - D[1] * p3 - D[3] * p4 - D[4] * p5
-        G[48 + j] = A[6] * p0 + A[7] * p1 + A[8] * p2 - D[2] * p3 - D[4] * p4 - D[5] * p5
-        G[72 + j] = C[0] * u0 + C[1] * u1 + C[2] * u2 - t2 * q1 + t1 * q2
-        G[96 + j] = C[3] * u0 + C[4] * u1 + C[5] * u2 + t2 * q0 - t0 * q2
-        G[120 + j] = C[6] * u0 + C[7] * u1 + C[8] * u2 - t1 * q0 + t0 * q1
-        G[144 + j] = P[462 + j] + dt * q2
+    b0, b1, b2 = back * t0, back * t1, back * t2
+    combine(G, 0, P, MOVING, (A[0], A[1], A[2], -D[0], -D[1], -D[2]))
+    combine(G, 24, P, MOVING, (A[3], A[4], A[5], -D[1], -D[3], -D[4]))
+    combine(G, 48, P, MOVING, (A[6], A[7], A[8], -D[2], -D[4], -D[5]))
+    combine(G, 72, P, (U, U + 22, U + 44, 22, 44, 88, 110), (C[0], C[1], C[2], -t2, t1, b2, -b1))
+    combine(G, 96, P, (U, U + 22, U + 44, 0, 44, 66, 110), (C[3], C[4], C[5], t2, -t0, -b2, b0))
+    combine(G, 120, P, (U, U + 22, U + 44, 0, 22, 66, 88), (C[6], C[7], C[8], -t1, t0, b1, -b0))
+    combine(G, 144, P, (TURNED, 44, 110), (1.0, dt, -dt * back))
     for r in range(0, 168, 24):
         p0, p1, p2, p3, p4, p5 = G[r], G[r + 1], G[r + 2], G[r + 3], G[r + 4], G[r + 5]
         q0, q1, q2, u0, u1, u2 = p0 - back * p3, p1 - back * p4, p2 - back * p5, G[r + 12], G[r + 13], G[r + 14]
@@ -261,13 +254,12 @@ def _turn_covariance(P: Array, G: Array, A: Nine, D: Six, C: Nine, t: Three, dt:
     for i in range(7):  # the lower triangle of those seven rows last: it is the transpose of the upper one
         k = 6 - i
         row = k if k < 3 else 9 + k if k < 6 else 21
-        for j in range(STATES):
-            P[22 * row + j] = G[24 * k + j]
+        combine(P, 22 * row, G, (24 * k,), (1.0,))
         for j in range(STATES):
             P[22 * j + row] = G[24 * k + j]
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def add_noise(P: Array, N: Six, dt: float, turning: bool, s: Sensor, t: Tuning) -> None:
     """What one step adds to P but for the biases: omega' noise along N, omega's wander across it, the pivot's walk."""
     for i in range(18, 21):

@@ -11,11 +11,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from estimator.rate import still as stillness
+from estimator.rate.compiling import lean, making
 from estimator.rate.observed import Sensor
 from estimator.rate.products_kernel import (
+    DENSITY,
     FORCE_USED,
     HORIZON,
-    LIKELIHOOD,
+    MISFIT,
     OUT,
     P_N,
     PP,
@@ -59,6 +61,7 @@ MEMORY = np.dtype(
             ("other_out", "f8", (OUT,)),
             ("arrival", "f8", (ARRIVALS, SIZE)),  # of the moving horizon: states before samples of this turn
             ("arrival_at", "i8", (ARRIVALS,)),
+            ("end", "f8", (6,)),  # of the moving horizon: omega and b_alpha at the newest sample
             ("marks", "i8", (12,)),
             ("clock", "f8", (3,)),
             ("work", "f8", (WORK,)),  # of one step, of no meaning after it
@@ -78,16 +81,22 @@ def memory() -> Memory:
     return m
 
 
-@njit(cache=True, error_model="numpy")
+@lean
+def put(target: Array, source: Array) -> None:
+    """target becomes the first numbers of source; an assignment would ask whether they overlap, and copy."""
+    for k in range(len(target)):
+        target[k] = source[k]
+
+
+@lean
 def gap(m: Memory, w: Watch) -> None:
     """Samples are missing: the next step predicts across."""
     stillness.forget(w)
-    m.kept_at[:] = -1
-    m.arrival_at[:] = -1
+    m.kept_at[:] = m.arrival_at[:] = -1
     m.marks[FITTED] = 0
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def restart(m: Memory, w: Watch) -> None:
     """The rate is unknown: wait for a standstill, or start while turning."""
     gap(m, w)
@@ -96,7 +105,13 @@ def restart(m: Memory, w: Watch) -> None:
     m.core[Q_NB] = 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@making
+def _begin_still(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits) -> None:
+    begin(m.core, s, t, mean(w, c.window), s.theta_b)
+    m.marks[STARTED], m.marks[BRANCHES] = 1, 1
+
+
+@lean
 def _take_back(m: Memory, depth: int, now: int) -> int:
     """Core becomes the state before sample now - depth, or the nearest that is kept; returns that sample."""
     best = -1
@@ -108,17 +123,17 @@ def _take_back(m: Memory, depth: int, now: int) -> int:
             best = k
     first = now
     if best >= 0:
-        m.core[:] = m.kept[best]
+        put(m.core, m.kept[best])
         first = m.kept_at[best]
     m.marks[TAKEN_BACK] += now - first
     m.kept_at[:] = -1
     return first
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _two_signs(m: Memory, still: bool) -> None:
     """Keep the better one of two signs in core, and only that once it is sure."""
-    m.clock[BALANCE] += m.out[LIKELIHOOD] - m.other_out[LIKELIHOOD]
+    m.clock[BALANCE] += np.log(m.out[DENSITY] / m.other_out[DENSITY]) - 0.5 * (m.out[MISFIT] - m.other_out[MISFIT])
     if m.clock[BALANCE] < 0.0:
         for k in range(len(m.core)):
             m.core[k], m.other[k] = m.other[k], m.core[k]
@@ -129,17 +144,25 @@ def _two_signs(m: Memory, still: bool) -> None:
         m.marks[BRANCHES] = 1
 
 
-@njit(cache=True, error_model="numpy")
+@making
+def _fit(m: Memory, w: Watch, s: Sensor, t: Tuning) -> float:
+    """Both signs anew; how much likelier the first is. By few samples that is not known well: at most e^2."""
+    n = m.marks[FITTED]
+    ratio = begin_turning(m.core, m.other, m.kept[0], m.kept[1], w, s, t, n)
+    return ratio if n >= SURE_FROM else min(ratio, 2.0)
+
+
+@making
 def _fit_start(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, still: bool) -> None:
     """One more sample of a start while turning: fitted anew now and then, carried on between (E-46)."""
     m.marks[FITTED] += 1
     n = m.marks[FITTED]
     if still:  # it was no turn
-        begin(m.core, s, t, mean(w, c.window), s.theta_b)
-        m.marks[BRANCHES], m.marks[MOVED], m.marks[FITTED] = 1, 0, 0
+        _begin_still(m, w, s, t, c)
+        m.marks[MOVED] = m.marks[FITTED] = 0
     elif n in FITS:
-        m.clock[BALANCE] = begin_turning(m.core, m.other, m.kept[0], m.kept[1], w, s, t, n)
-        m.marks[BRANCHES] = 1 if m.clock[BALANCE] > DECIDED and n >= SURE_FROM else 2
+        m.clock[BALANCE] = _fit(m, w, s, t)
+        m.marks[BRANCHES] = 1 if m.clock[BALANCE] > DECIDED else 2
     else:
         k = (w.n[COUNT] - 1) % DEPTH
         carry(m.core, m.work, w.y[k], w.dt[k], s, t)
@@ -148,7 +171,7 @@ def _fit_start(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, still: bool
         m.marks[FITTED], m.marks[FREE] = 0, 200
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _diverged(m: Memory, w: Watch) -> bool:
     """Start anew when the rate is beyond all bounds or no number at all, or its covariance is none any more."""
     x, P = m.core[0:3], m.core[STATES:PP]
@@ -160,7 +183,7 @@ def _diverged(m: Memory, w: Watch) -> bool:
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _horizon(m: Memory, t: Tuning, still: bool, now: int) -> int:
     """First sample of the moving horizon's window when it is due and all of it was turning; else -1 (E-49)."""
     first = now + 1 - WINDOW
@@ -169,7 +192,7 @@ def _horizon(m: Memory, t: Tuning, still: bool, now: int) -> int:
     return first if m.arrival_at[(first // EVERY) % ARRIVALS] == first else -1
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _on_axis(m: Memory, w: Watch, s: Sensor, t: Tuning) -> bool:
     """Does omega keep its direction? Not while omega' across it, summed over 16 or 64 samples, is more than noise.
 
@@ -213,18 +236,18 @@ def advance(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, t_s: float, a:
     m.marks[STEPS] += 1
     stillness.take(w, s, a, dt)
     m.out[:] = 0.0
+    P = m.core[STATES:PP].reshape(STATES, STATES)
     if m.marks[STARTED] == 0:
-        still, _ = stillness.detect(w, s, c, np.zeros(3), UNKNOWN_RATE**2 * np.eye(3), dt)
+        P[0, 0] = P[1, 1] = P[2, 2] = UNKNOWN_RATE**2
+    still, depth = stillness.detect(w, s, c, m.core[0:3], P[0:3, 0:3], dt)
+    if m.marks[STARTED] == 0:
         m.marks[STILL] = 1 if still else 0
         if still:
-            begin(m.core, s, t, mean(w, c.window), s.theta_b)
-            m.marks[STARTED], m.marks[BRANCHES] = 1, 1
+            _begin_still(m, w, s, t, c)
         elif turning(w, s, t):
             m.marks[STARTED], m.marks[BRANCHES], m.marks[MOVED], m.marks[FITTED] = 1, 2, 1, FEWEST
-            m.clock[BALANCE] = begin_turning(m.core, m.other, m.kept[0], m.kept[1], w, s, t, FEWEST)
+            m.clock[BALANCE] = _fit(m, w, s, t)
         return
-    P = m.core[STATES:PP].reshape(STATES, STATES)
-    still, depth = stillness.detect(w, s, c, m.core[0:3], P[0:3, 0:3], dt)
     if m.marks[FITTED] > 0:
         m.marks[STILL] = 1 if still else 0
         _fit_start(m, w, s, t, c, still)
@@ -233,7 +256,7 @@ def advance(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, t_s: float, a:
     now = w.n[COUNT] - 1
     first = now
     if still and now % EVERY == 0:
-        m.kept[(now // EVERY) % KEPT] = m.core
+        put(m.kept[(now // EVERY) % KEPT], m.core)
         m.kept_at[(now // EVERY) % KEPT] = now
     elif not still and m.marks[STILL]:
         m.marks[MOVED] = 1
@@ -248,17 +271,16 @@ def advance(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, t_s: float, a:
             first = _horizon(m, t, still, now)
             if first < 0:
                 break
-            end = m.core[0:6].copy()
-            m.core[:] = m.arrival[(first // EVERY) % ARRIVALS]
+            put(m.end, m.core)
+            put(m.core, m.arrival[(first // EVERY) % ARRIVALS])
         for sample in range(first, now + 1):
             k = sample % DEPTH
             grow = EVERY * dt if sample % EVERY == 0 else 0.0
             if sample % EVERY == 0 and t.method == HORIZON and not still:
-                m.arrival[(sample // EVERY) % ARRIVALS] = m.core
+                put(m.arrival[(sample // EVERY) % ARRIVALS], m.core)
                 m.arrival_at[(sample // EVERY) % ARRIVALS] = sample
             if turn > 0:  # back from the end by what omega' was since
-                gained = w.total[now % (2 * DEPTH)] - w.total[sample % (2 * DEPTH)]
-                at = back(end, gained, now - sample, dt)
+                at = back(m.end, w.total[now % (2 * DEPTH)], w.total[sample % (2 * DEPTH)], now - sample, dt)
             for branch in range(m.marks[BRANCHES]):
                 core, out = (m.core, m.out) if branch == 0 else (m.other, m.other_out)
                 step(core, m.work, s, t, w.y[k], at, w.dt[k], not still, fixed, grow, out)
@@ -267,8 +289,7 @@ def advance(m: Memory, w: Watch, s: Sensor, t: Tuning, c: Limits, t_s: float, a:
     if _diverged(m, w):
         return
     if still and m.marks[MOVED] == 0:  # position counts from the end of the first standstill
-        m.core[V_N : V_N + 3] = 0.0
-        m.core[P_N : P_N + 3] = 0.0
+        m.core[V_N : P_N + 3] = 0.0
         m.core[TURNED] = 0.0
         P[TURNED, :] = 0.0
         P[:, TURNED] = 0.0

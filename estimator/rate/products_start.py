@@ -6,11 +6,11 @@ corrections are far from linear. So the most probable state of the first samples
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from estimator.rate import products_kernel as kernel
 from estimator.rate import turns
+from estimator.rate.compiling import lean, making
 from estimator.rate.observed import Sensor
 from estimator.rate.products_kernel import (
     ALPHA,
@@ -49,7 +49,7 @@ ANY_RATE = 5.0  # rad/s, sigma of omega about what the products say, in the fit:
 FREE = (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)  # all of omega' is integrated
 
 
-@njit(cache=True, error_model="numpy")
+@making
 def begin(core: Array, s: Sensor, t: Tuning, mean: Array, theta_b: Array) -> None:
     """First state from the mean y (12,) of a short standstill (E-36)."""
     core[:] = 0.0
@@ -74,7 +74,7 @@ def begin(core: Array, s: Sensor, t: Tuning, mean: Array, theta_b: Array) -> Non
         core[REST + i] = theta_b[i, 0] * core[12] + theta_b[i, 1] * core[13] + theta_b[i, 2] * core[14]
 
 
-@njit(cache=True, error_model="numpy")
+@making
 def level(up: Array) -> Array:
     """q_nb of a body at rest whose up is `up`; x_b points north, or z_b where x_b is vertical (E-11)."""
     ahead = np.array([1.0, 0.0, 0.0]) if abs(up[0]) < 0.999 else np.array([0.0, 0.0, 1.0])
@@ -94,7 +94,7 @@ def level(up: Array) -> Array:
     return q if q[0] >= 0.0 else -q
 
 
-@njit(cache=True, error_model="numpy")
+@making
 def mean(w: Watch, window: int) -> Array:
     """Mean y (12,) of the newest samples."""
     out = np.zeros(12)
@@ -103,7 +103,7 @@ def mean(w: Watch, window: int) -> Array:
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@making
 def _outer(y: Array) -> Array:
     Z = np.empty((3, 3))
     for k in range(6):
@@ -111,7 +111,7 @@ def _outer(y: Array) -> Array:
     return Z
 
 
-@njit(cache=True, error_model="numpy")
+@making
 def turning(w: Watch, s: Sensor, t: Tuning) -> bool:
     """Do the products of the newest samples say that the body turns, and not the axes' biases?"""
     if w.n[FILLED] < FEWEST or not s.plain:
@@ -121,7 +121,7 @@ def turning(w: Watch, s: Sensor, t: Tuning) -> bool:
     return size > 0.0 and size * size > t.start_turning * (t.bias * s.drift[3, 3] + s.R_c[0, 0] / n)
 
 
-@njit(cache=True, error_model="numpy")
+@making
 def begin_turning(
     core: Array, other: Array, first: Array, other_first: Array, w: Watch, s: Sensor, t: Tuning, n: int
 ) -> float:
@@ -149,7 +149,7 @@ def begin_turning(
     return abs(ratio) if np.isfinite(ratio) else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@making
 def _fit(core: Array, first: Array, w: Watch, s: Sensor, t: Tuning, n: int, y_mean: Array, size: float) -> float:
     """Most probable state after the newest n samples, from a guess `first` of that at their first: log evidence.
 
@@ -233,13 +233,13 @@ def _fit(core: Array, first: Array, w: Watch, s: Sensor, t: Tuning, n: int, y_me
     return evidence
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _turn(core: Array, v0: float, v1: float, v2: float) -> None:
     q = (core[Q_NB], core[Q_NB + 1], core[Q_NB + 2], core[Q_NB + 3])
     core[Q_NB], core[Q_NB + 1], core[Q_NB + 2], core[Q_NB + 3] = turns.product(q, turns.quaternion(v0, v1, v2))
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def carry(core: Array, work: Array, y: Array, dt: float, s: Sensor, t: Tuning) -> None:
     """State one sample y (12,), dt (s) later, by its omega' alone: between two fits."""
     x, P, before = core[:STATES], core[STATES:PP], (core[0], core[1], core[2])

@@ -1,17 +1,17 @@
 """One sample through a products filter: biases, prediction, corrections, navigation; all in place (E-30 to E-39)."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from estimator.rate import products_kernel as kernel
 from estimator.rate import turns, unscented
+from estimator.rate.compiling import fused
 from estimator.rate.observed import Sensor
 from estimator.rate.products_correct import by_force, by_products, by_standstill
 from estimator.rate.products_kernel import (
     ALPHA,
     BEFORE,
-    FAST,
+    DENSITY,
     FORCE,
     FORCE_NIS,
     FORCE_USED,
@@ -19,7 +19,7 @@ from estimator.rate.products_kernel import (
     GRAVITY,
     LATE,
     LEVEL,
-    LIKELIHOOD,
+    MISFIT,
     NIS,
     P_N,
     PP,
@@ -35,6 +35,7 @@ from estimator.rate.products_kernel import (
     Tuning,
 )
 from estimator.rate.products_model import BIASES, FIRST, SECOND, STATES
+from estimator.rate.vectors import combine, scale
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ SURE = 16.0  # of |omega|^2 over its variance: the sign is certain, products may
 LATELY = 1.0 / 16.0  # weight of one sample in the mean omega' that the pivot is told by
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def step(core: Array, work: Array, s: Sensor, t: Tuning, y: Array, at: Three, dt: float, turning: bool, fixed: bool,
          grow: float, out: Array) -> None:  # fmt: skip
     """core (flat state) takes one sample y = [alpha_m, c_m, p_m] (12,), dt (s) after the last.
@@ -54,26 +55,26 @@ def step(core: Array, work: Array, s: Sensor, t: Tuning, y: Array, at: Three, dt
     x, P = core[:STATES], core[STATES:PP]
     if grow > 0.0:
         _grow(core, P, work, s, t, grow, turning)
-    for k in range(PP):
-        work[BEFORE + k] = core[k]
+    for row in range(0, PP, STATES):
+        combine(work, BEFORE + row, core, (row,), (1.0,))
     earth_b = _earth(core, t)
-    nis, logdet, force_nis, force_logdet, used = 0.0, 0.0, 0.0, 0.0, False
+    force_nis, force_density = 0.0, 1.0
     w0, w1, w2 = x[0], x[1], x[2]
     fixed = fixed and w0 * w0 + w1 * w1 + w2 * w2 > t.axis_from
     alpha = (0.5 * (core[ALPHA] + y[0]), 0.5 * (core[ALPHA + 1] + y[1]), 0.5 * (core[ALPHA + 2] + y[2]))
     _predict(x, P, work, alpha, dt, turning, fixed, turning, s, t, earth_b)
     if t.method == UKF:
-        nis, logdet = unscented.by_products(x, P, work, y, s, t, out)
+        nis, density = unscented.by_products(x, P, work, y, s, t, out)
     else:
         if np.isnan(at[0]):
             at = (x[0], x[1], x[2])
-        nis, logdet = by_products(x, P, work, y, at, s, t, out)
+        nis, density = by_products(x, P, work, y, at, s, t, out)
     used = nis <= t.products_gate
     if not used:  # a damaged sample: its omega' must not be integrated either
         for k in range(PP):
             core[k] = work[BEFORE + k]
         alpha = (core[ALPHA], core[ALPHA + 1], core[ALPHA + 2])
-        _predict(x, P, work, alpha, dt, True, fixed, turning, s, t, earth_b)
+        _predict(x, P, work, alpha, dt, turning or not used, fixed, turning, s, t, earth_b)
         for i in range(3):
             P[23 * i] += t.unseen_alpha * dt * dt
     f_b = (x[12], x[13], x[14])
@@ -81,7 +82,7 @@ def step(core: Array, work: Array, s: Sensor, t: Tuning, y: Array, at: Three, dt
         if t.centre_sees:
             free = (alpha[0] - x[3], alpha[1] - x[4], alpha[2] - x[5])
             late = (core[LATE] - x[3], core[LATE + 1] - x[4], core[LATE + 2] - x[5])
-            force_nis, force_logdet = by_force(x, P, work, (y[9], y[10], y[11]), free, late, turning, s, t)
+            force_nis, force_density = by_force(x, P, work, (y[9], y[10], y[11]), free, late, turning, s, t)
         if not turning:
             by_standstill(x, P, work, (y[0], y[1], y[2]), earth_b, s, t)
         for i in range(3):
@@ -90,12 +91,13 @@ def step(core: Array, work: Array, s: Sensor, t: Tuning, y: Array, at: Three, dt
         f_b = (y[9] - x[15], y[10] - x[16], y[11] - x[17])
     out[NIS], out[USED], out[FORCE_NIS] = nis, 1.0 if used else 0.0, force_nis
     out[FORCE_USED] = 1.0 if force_nis <= t.force_gate else 0.0
-    out[LIKELIHOOD] = -0.5 * (min(nis, t.products_gate) + logdet + min(force_nis, t.force_gate) + force_logdet)
+    out[MISFIT] = min(nis, t.products_gate) + min(force_nis, t.force_gate)
+    out[DENSITY] = density * force_density
     _sign(core, P, s, dt, turning)
     _navigate(core, 0.5 * (w0 + x[0]), 0.5 * (w1 + x[1]), 0.5 * (w2 + x[2]), f_b, dt, earth_b)
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def _predict(x: Array, P: Array, work: Array, alpha: Three, dt: float, moving: bool, fixed: bool, turning: bool,
              s: Sensor, t: Tuning, earth_b: Three) -> None:  # fmt: skip
     """Prediction by the filter's method, with noise. moving: omega' is integrated; turning: the detector's word."""
@@ -110,7 +112,7 @@ def _predict(x: Array, P: Array, work: Array, alpha: Three, dt: float, moving: b
         kernel.add_noise(P, N, dt, moving, s, t)
 
 
-@njit(cache=True, error_model="numpy")
+@fused
 def _forget(P: Array, s: Sensor, t: Tuning, dt: float) -> None:
     """Exponential forgetting (E-47): P grows by its own size, up to what is known before any sample."""
     for i in range(12):
@@ -122,7 +124,7 @@ def _forget(P: Array, s: Sensor, t: Tuning, dt: float) -> None:
                 P[STATES * j + i] *= root
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def _earth(core: Array, t: Tuning) -> Three:
     """Earth's rate in b, rad/s; zero unless asked for."""
     north, down = t.earth_north, t.earth_down
@@ -132,7 +134,7 @@ def _earth(core: Array, t: Tuning) -> Three:
     return C[0] * north + C[6] * down, C[1] * north + C[7] * down, C[2] * north + C[8] * down
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def _grow(core: Array, P: Array, work: Array, s: Sensor, t: Tuning, seconds: float, turning: bool) -> None:
     """What the biases became in `seconds`: a walk, and scale errors (E-37).
 
@@ -169,15 +171,13 @@ def _grow(core: Array, P: Array, work: Array, s: Sensor, t: Tuning, seconds: flo
         follow[b] = np.sqrt(now / level[k])
         level[k] = now
         x[b] = bias[k] + follow[b] * (x[b] - bias[k])
-    for i in range(STATES):
-        for j in range(STATES):
-            P[STATES * i + j] *= follow[i] * follow[j]
+    scale(P, work, s.n)
     for k in range(12):
         for l in range(12):
             P[STATES * BIASES[k] + BIASES[l]] += s.drift[k, l] * t.drift * seconds
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def _sign(core: Array, P: Array, s: Sensor, dt: float, turning: bool) -> None:
     """Variance of omega along itself for the question of its sign: products narrow it only where the sign is certain.
 
@@ -194,7 +194,7 @@ def _sign(core: Array, P: Array, s: Sensor, dt: float, turning: bool) -> None:
         core[SIGN] += dt * dt * max(s.R_alpha[0, 0], s.R_alpha[1, 1], s.R_alpha[2, 2])
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@fused
 def _navigate(core: Array, w0: float, w1: float, w2: float, f_b: Three, dt: float, earth_b: Three) -> None:
     """Attitude by the mean rate w (rad/s), tilt by u; then velocity and position from f_b (E-12, E-13)."""
     turn = turns.quaternion(dt * (w0 - earth_b[0]), dt * (w1 - earth_b[1]), dt * (w2 - earth_b[2]))
@@ -209,8 +209,8 @@ def _navigate(core: Array, w0: float, w1: float, w2: float, f_b: Three, dt: floa
         core[V_N + i], core[FORCE + i] = v, force
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
-def back(end: Array, gained: Array, samples: int, dt: float) -> Three:
-    """omega that many samples before one with state `end`, by the sum `gained` of omega' measured since (E-49)."""
-    return (end[0] - dt * (gained[0] - samples * end[3]), end[1] - dt * (gained[1] - samples * end[4]),
-            end[2] - dt * (gained[2] - samples * end[5]))  # fmt: skip
+@fused
+def back(end: Array, now: Array, then: Array, samples: int, dt: float) -> Three:
+    """omega that many samples before one with state `end`, by the sums of omega' measured up to now and then (E-49)."""
+    return (end[0] - dt * (now[0] - then[0] - samples * end[3]), end[1] - dt * (now[1] - then[1] - samples * end[4]),
+            end[2] - dt * (now[2] - then[2] - samples * end[5]))  # fmt: skip

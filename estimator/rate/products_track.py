@@ -6,7 +6,6 @@ Every way to run a filter goes through `run`, one sample or an hour at a time, s
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from estimator.rate import bound_live, sight
@@ -14,6 +13,7 @@ from estimator.rate import products_kernel as kernel
 from estimator.rate import products_run as frame
 from estimator.rate import still as stillness
 from estimator.rate.bound_live import Followed
+from estimator.rate.compiling import lean
 from estimator.rate.observed import Sensor
 from estimator.rate.products_kernel import Tuning
 from estimator.rate.products_model import BIASES, STATES, TURNED
@@ -52,7 +52,7 @@ def of(rows: Array) -> Track:
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def run(
     m: frame.Memory, w: stillness.Watch, s: Sensor, t: Tuning, c: stillness.Limits, b: Followed, whole: Sensor,
     follows: bool, times: Array, samples: Array, rows: Array,
@@ -77,7 +77,7 @@ def run(
             sight.judge(core[0:3], variances, row[SIGN], two, s, m.clock[frame.DT], out)
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def write(m: frame.Memory, w: stillness.Watch, row: Array) -> None:
     """The filter's state as a row, without bound and sight."""
     core, y = m.core, w.y[(w.n[stillness.COUNT] - 1) % stillness.DEPTH]
@@ -102,7 +102,7 @@ def write(m: frame.Memory, w: stillness.Watch, row: Array) -> None:
         _between(m, row)
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _between(m: frame.Memory, row: Array) -> None:
     """omega and the angle become the mean over both signs by their probability, P the covariance about it (E-46)."""
     wrong = 1.0 / (1.0 + np.exp(m.clock[frame.BALANCE]))

@@ -1,5 +1,7 @@
 """Samples on their way into a rate estimator: checked once for a batch, as the compiled functions want them."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,7 +20,8 @@ class Samples:
     def take(self, layout: Layout, t_s: Array, f_axis: Array) -> tuple[Array, Array]:
         """Times (n,), s, and readings (n, N) as the compiled functions want them; ValueError names what is wrong."""
         t_s, f_axis = np.ascontiguousarray(t_s, dtype=np.float64), np.ascontiguousarray(f_axis, dtype=np.float64)
-        if f_axis.shape != (len(t_s), layout.axes) or not np.isfinite(f_axis).all():
+        finite = math.isfinite(np.vdot(f_axis, f_axis)) or np.isfinite(f_axis).all()  # the first costs a third
+        if f_axis.shape != (len(t_s), layout.axes) or not finite:
             for row in f_axis:
                 checked(layout, row)
             raise ValueError(f"readings {f_axis.shape}, want ({len(t_s)}, {layout.axes}) of {layout.name}")

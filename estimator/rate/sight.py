@@ -6,9 +6,9 @@ ambiguous  omega and -omega fit the products, and the integral through zero does
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from estimator.rate.compiling import lean
 from estimator.rate.observed import Sensor
 
 Array = NDArray[np.float64]
@@ -20,7 +20,7 @@ SURE = 9.0  # of omega^2 over the variance of its sign
 DEG = 180.0 / np.pi
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def information(w0: float, w1: float, w2: float, s: Sensor) -> tuple[float, float, float]:
     """Fisher information of one sample's products on each component of omega, (rad/s)^-2."""
     K = s.known
@@ -33,7 +33,7 @@ def information(w0: float, w1: float, w2: float, s: Sensor) -> tuple[float, floa
     return x, y, z
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def judge(
     omega: Array, variances: tuple[float, float, float], sign_variance: float, two: bool, s: Sensor, dt: float,
     out: Array,

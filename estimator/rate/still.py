@@ -21,9 +21,9 @@ caller who knows the rate well, and finds it zero, need not wait for it. Compile
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from estimator.rate.compiling import lean, making
 from estimator.rate.observed import MOST_AXES, Sensor
 
 Array = NDArray[np.float64]
@@ -105,14 +105,14 @@ def memory() -> Watch:
     return np.zeros(1, WATCH)[0]
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def forget(w: Watch) -> None:
     """After a gap: the window must fill anew; the reference of the last standstill stays."""
     w.n[FILLED] = w.n[STILL_FOR] = w.n[QUIET_FOR] = w.n[SLOW_FOR] = w.n[LEARNING] = 0
     w.gathered[:] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def take(w: Watch, s: Sensor, a: Array, dt: float) -> None:
     """Remember one sample."""
     k = w.n[COUNT] % DEPTH
@@ -120,21 +120,25 @@ def take(w: Watch, s: Sensor, a: Array, dt: float) -> None:
     now = w.n[COUNT] % (2 * DEPTH)
     w.dt[k] = dt
     y = w.y[k]
-    y[:] = 0.0
     for i in range(s.n):
         w.a[k, i] = a[i]
-        for r in range(3):
-            y[r] += s.S[r, i] * a[i]
-            y[9 + r] += s.S[3 + r, i] * a[i]
-        for r in range(s.m):
-            y[3 + r] += s.B[r, i] * a[i]
+    for r in range(3):
+        alpha, force, low, high = 0.0, 0.0, 0.0, 0.0  # rows of B beyond the m that are seen are zero
+        for i in range(s.n):
+            alpha += s.S[r, i] * a[i]
+            force += s.S[3 + r, i] * a[i]
+            low += s.B[r, i] * a[i]
+            high += s.B[3 + r, i] * a[i]
+        y[r], y[3 + r], y[6 + r], y[9 + r] = alpha, low, high, force
+    if w.n[FILLED] == 0:
+        w.total[before] = 0.0
     for r in range(12):
-        w.total[now, r] = y[r] + (w.total[before, r] if w.n[FILLED] > 0 else 0.0)
+        w.total[now, r] = y[r] + w.total[before, r]
     w.n[COUNT] += 1
     w.n[FILLED] += 1
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _scatter(w: Watch, s: Sensor, window: int) -> float:
     """Mean square of the axes about their means over the window, (m/s^2)^2; running sums, made anew now and then."""
     anew = w.n[FILLED] == window or w.n[COUNT] % DEPTH == 0
@@ -158,7 +162,7 @@ def _scatter(w: Watch, s: Sensor, window: int) -> float:
     return total / ((window - 1) * axes)
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _mean(w: Watch, window: int, r: int, ago: int = 0) -> float:
     """Mean of component r of y over the window that ended `ago` samples ago."""
     last = w.n[COUNT] - 1 - ago
@@ -166,7 +170,7 @@ def _mean(w: Watch, window: int, r: int, ago: int = 0) -> float:
     return (w.total[now, r] - (w.total[then, r] if w.n[FILLED] > window + ago else 0.0)) / window
 
 
-@njit(cache=True, error_model="numpy")
+@making
 def _moved(w: Watch, s: Sensor, window: int, drift: float) -> float:
     """Chi-square of the mean [omega', c] of the window against the reference (E-21)."""
     total = 0.0
@@ -182,7 +186,7 @@ def _moved(w: Watch, s: Sensor, window: int, drift: float) -> float:
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _turned(w: Watch, s: Sensor, length: int, drift: float) -> float:
     """Chi-square of the sum of omega' over the newest `length` samples against the bias of this standstill (E-23)."""
     now, then = (w.n[COUNT] - 1) % (2 * DEPTH), (w.n[COUNT] - 1 - length) % (2 * DEPTH)
@@ -194,7 +198,7 @@ def _turned(w: Watch, s: Sensor, length: int, drift: float) -> float:
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _tilted(w: Watch, s: Sensor, window: int, drift: float) -> float:
     """Chi-square of the mean p of the window against that of this standstill (E-24)."""
     total, share = 0.0, 1.0 / window + 1.0 / w.n[LEARNT]
@@ -203,7 +207,7 @@ def _tilted(w: Watch, s: Sensor, window: int, drift: float) -> float:
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _swung(w: Watch, s: Sensor, c: Limits, span: int) -> float:
     """Chi-square of the mean p of the window against that of `span` samples ago, which must be there (E-24)."""
     total = 0.0
@@ -213,7 +217,7 @@ def _swung(w: Watch, s: Sensor, c: Limits, span: int) -> float:
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _settled(w: Watch, s: Sensor, c: Limits, omega: Array, P: Array, told: float) -> bool:
     """Has gravity kept its direction for as long as the caller's rate leaves in doubt? told: chi-square of `rate`."""
     size = np.sqrt(omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2])
@@ -227,7 +231,7 @@ def _settled(w: Watch, s: Sensor, c: Limits, omega: Array, P: Array, told: float
     return swung <= c.steady_limit and (told >= c.rate_limit or told + swung < c.begin_limit)
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def rate_excludes_zero(omega: Array, P: Array, slack: float) -> float:
     """Chi-square of zero rate: omega^T (P + slack^2 I)^-1 omega (E-22)."""
     a, b, c = P[0, 0] + slack * slack, P[1, 1] + slack * slack, P[2, 2] + slack * slack
@@ -239,7 +243,7 @@ def rate_excludes_zero(omega: Array, P: Array, slack: float) -> float:
     return (o0 * o0 * x + o1 * o1 * u + o2 * o2 * q + 2.0 * (o0 * o1 * y + o0 * o2 * z + o1 * o2 * v)) / det
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def began(w: Watch, s: Sensor, c: Limits) -> int:
     """0 while a standing body stands on; else how many samples ago it began to move (E-23, E-24)."""
     worst, depth = 1.0, 0
@@ -255,7 +259,7 @@ def began(w: Watch, s: Sensor, c: Limits) -> int:
     return min(depth, DEPTH - 8)
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _learn(w: Watch, c: Limits) -> None:
     """One more sample of standstill; the one `guard` samples ago becomes part of the reference."""
     w.n[STILL_FOR] += 1
@@ -271,13 +275,13 @@ def _learn(w: Watch, c: Limits) -> None:
             w.reference[r] = w.gathered[r] / w.n[LEARNING]
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _end(w: Watch) -> None:
     w.n[STILL_FOR] = w.n[LEARNING] = 0
     w.gathered[:] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _stands(w: Watch, s: Sensor, c: Limits, omega: Array, P: Array, dt: float) -> bool:
     if w.n[HOLD] > 0:
         w.n[HOLD] -= 1
@@ -298,7 +302,7 @@ def _stands(w: Watch, s: Sensor, c: Limits, omega: Array, P: Array, dt: float) -
     return w.n[SLOW_FOR] * dt >= 2.0 * c.patience_s
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def detect(w: Watch, s: Sensor, c: Limits, omega: Array, P: Array, dt: float) -> tuple[bool, int]:
     """Is the sample taken last one of standstill, by the caller's omega (3,) and its covariance P (3, 3)?
 

@@ -6,10 +6,10 @@ carried linearly, which gives the same numbers as points of all 22 and a tenth o
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from estimator.attitude.rotation import from_rotation_vector, to_dcm
+from estimator.rate.compiling import making
 from estimator.rate.observed import Sensor
 from estimator.rate.products_kernel import (
     COV,
@@ -31,7 +31,7 @@ SPREAD = 3.0
 INSIDE = np.array([0, 1, 2, 12, 13, 14, 3, 4, 5, 21])  # omega, u, b_alpha, angle: what the transition takes
 
 
-@njit(cache=True, error_model="numpy")
+@making
 def root(A: Array) -> Array:
     """Lower triangular L with L L^T = A for a positive semidefinite A (n, n); columns of zero variance are zero."""
     n = len(A)
@@ -51,7 +51,7 @@ def root(A: Array) -> Array:
     return L
 
 
-@njit(cache=True, error_model="numpy")
+@making
 def predict(x: Array, flat: Array, alpha_m: Three, N: Six, dt: float, turning: bool, s: Sensor, earth_b: Three) -> None:
     """E-31 through sigma points of [omega, u, b_alpha], in place, without process noise; P flat (484,)."""
     n, m, P = len(INSIDE), len(x), flat.reshape(STATES, STATES)
@@ -90,7 +90,7 @@ def predict(x: Array, flat: Array, alpha_m: Three, N: Six, dt: float, turning: b
             P[INSIDE[i], INSIDE[j]] = 0.5 * (square[i, j] + square[j, i])
 
 
-@njit(cache=True, error_model="numpy")
+@making
 def _slope(cross: Array, L: Array) -> Array:
     """F with F L = cross: the statistical linearisation; a direction without variance keeps slope one."""
     n = len(L)
@@ -107,7 +107,7 @@ def _slope(cross: Array, L: Array) -> Array:
     return F
 
 
-@njit(cache=True, error_model="numpy")
+@making
 def _carry(P: Array, F: Array, m: int) -> None:
     """Cross covariance of what moves with what does not."""
     n = len(INSIDE)
@@ -126,7 +126,7 @@ def _carry(P: Array, F: Array, m: int) -> None:
             P[INSIDE[i], j] = P[j, INSIDE[i]] = value
 
 
-@njit(cache=True, error_model="numpy")
+@making
 def _move(p: Array, alpha_m: Three, N: Six, dt: float, turning: bool, s: Sensor, earth_b: Three) -> None:
     w = p[0:3].copy()
     if turning:
@@ -147,11 +147,11 @@ def _move(p: Array, alpha_m: Three, N: Six, dt: float, turning: bool, s: Sensor,
         p[3 + i] = C[i, 0] * u0 + C[i, 1] * u1 + C[i, 2] * u2
 
 
-@njit(cache=True, error_model="numpy")
+@making
 def by_products(x: Array, flat: Array, work: Array, y: Array, s: Sensor, t: Tuning, out: Array) -> tuple[float, float]:
-    """Correction by c_m = y[3:9] through sigma points of omega (three, so seven points); NIS and log det."""
+    """Correction by c_m = y[3:9] through sigma points of omega (three, so seven points); NIS and 1 / sqrt(det C)."""
     if s.m == 0:
-        return 0.0, 0.0
+        return 0.0, 1.0
     P = flat.reshape(STATES, STATES)
     L = root(P[0:3, 0:3].copy())
     z = np.empty((7, 6))
@@ -185,7 +185,7 @@ def by_products(x: Array, flat: Array, work: Array, y: Array, s: Sensor, t: Tuni
     return _absorb_products(x, flat, work, y[3:9], mean, z, H, s, t, out)
 
 
-@njit(cache=True, error_model="numpy")
+@making
 def _absorb_products(x: Array, flat: Array, work: Array, c_m: Array, mean: Array, z: Array, H: Array, s: Sensor,
                      t: Tuning, out: Array) -> tuple[float, float]:  # fmt: skip
     n, P = len(x), flat.reshape(STATES, STATES)

@@ -1,6 +1,6 @@
 """A dashboard opened late: how long until it shows the last ten minutes of every plot, in a real page.
 
-    python tests/bench/bench_late.py [minutes of history, default 10]
+    python tests/bench/bench_late.py [minutes of history, default 10] [page (default) or rings: without a browser]
 
 A cube at 100 samples/s with two estimators goes on in real time in a process of its own; before that its history has
 been written to the spools of gateway and estimator, dated back: 20 samples/s, and 100 in the last 70 s, of which a
@@ -100,7 +100,7 @@ def look(port: int, span_s: float) -> dict[str, float | None]:
     return found
 
 
-def main(minutes: float = 10.0) -> None:
+def main(minutes: float = 10.0, until: str = "page") -> None:
     """Run and print."""
     port, context = free_port(), multiprocessing.get_context("spawn")
     bus = BusSettings(router=f"tcp/127.0.0.1:{port}", listen=[f"tcp/127.0.0.1:{port}"])
@@ -113,6 +113,8 @@ def main(minutes: float = 10.0) -> None:
         handle = start(bus, SimpleNamespace(viser_port=0))
         try:
             line("late_history_in_dashboard", seconds(lambda: reaches(handle.store, span_s)), "s", target=2.0)
+            if until == "rings":
+                return
             try:
                 found = look(handle.port, span_s)
             except Error as error:
@@ -129,4 +131,4 @@ def main(minutes: float = 10.0) -> None:
 
 
 if __name__ == "__main__":
-    main(*(float(word) for word in sys.argv[1:2]))
+    main(*(float(word) for word in sys.argv[1:2]), *sys.argv[2:3])

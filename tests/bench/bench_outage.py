@@ -119,7 +119,7 @@ def account(folder: Path) -> dict:
             elif topic is RATE:
                 estimates[row.key].add(message.for_index)
     lost = max(have) - min(have) + 1 - len(have) - line_lost
-    missing = sum(len({i for i in have if min(n) <= i <= max(n)} - n) for n in estimates.values())
+    missing = sum(len((have & set(range(min(n), max(n) + 1))) - n) for n in estimates.values())
     return {"samples": len(have), "lost": lost, "line_lost": line_lost, "double": double,
             "estimates_missing": missing, "estimators": len(estimates)}  # fmt: skip
 

@@ -5,8 +5,10 @@
 Real gateway and recorder processes write a board's 1000 samples/s to an ext4 on a loop device. The device's backing
 file lies on an XFS, whose reflink copies it in one instant (FICLONE), while everything runs on: what was in no block
 of the device at that instant is not in the copy, as after a power cut with a disk that keeps what it was told. Each
-copy is attached as a device of its own and mounted, so that ext4 replays its journal; then its open sessions are
-recovered. Loss is counted up to the end of the copying. Wants root, loop devices, mkfs.ext4 and mkfs.xfs (xfsprogs).
+copy is attached as a device of its own and mounted, so that ext4 replays its journal. What stands in its files is read;
+then gateway and recorder are started on it, as after the power has come back, and what the sessions hold then is read:
+the recorder asks for what the published journal has and its own file had not. Loss is counted up to the end of the
+copying. Wants root, loop devices, mkfs.ext4 and mkfs.xfs (xfsprogs).
 """
 
 import fcntl
@@ -24,14 +26,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from kill_stack import line  # noqa: E402
 from stack import free_port  # noqa: E402
-from test_kill import Stack  # noqa: E402
+from test_kill import Stack, until  # noqa: E402
 
 from messages import gyrofree_pb2 as pb  # noqa: E402
 from messages.journal import Journal  # noqa: E402
 from messages.topics import ACCEL  # noqa: E402
 from sessions.catalogue import Catalogue  # noqa: E402
 from sessions.mcap_log import read  # noqa: E402
-from sessions.recover import recover_all  # noqa: E402
 
 FICLONE = 0x40049409  # linux/fs.h
 OUTER_BYTES, INNER_BYTES = 3 << 30, 1 << 30  # sparse
@@ -68,24 +69,33 @@ def snapshot(disk: Path, copy: Path) -> int:
         os.close(target)
 
 
+def newest_ns(sessions: Path, until_ns: int) -> int:
+    """End of the last sample before a moment, UTC ns, in all sessions of a folder, the open ones among them."""
+    newest = 0
+    for info in Catalogue(sessions).list():
+        for row in read(info.path):
+            if row.key.endswith(f"/{ACCEL.name}"):
+                batch = pb.AccelBatch.FromString(row.payload)
+                end_ns = batch.header.utc_ns + round(len(batch.counts) / batch.axes * batch.period_s * 1e9)
+                newest = max(newest, end_ns) if end_ns <= until_ns else newest
+    return newest
+
+
 def found_in(copy: Path, at: Path, end_ns: int, acknowledged: dict[str, int]) -> dict[str, float]:
-    """Seconds lost of recording, raw journal and published journal, and how many acknowledged messages are gone."""
-    newest, gone = 0, 0
+    """Seconds lost of both journals, of the recording and of the recording after a start; acknowledged ones gone."""
+    gone, lost = 0, {}
     with mounted(copy, at):
-        recover_all(at / "sessions")
-        for info in Catalogue(at / "sessions").list():
-            rows = [row for row in read(info.path)]
-            gone += max(0, acknowledged.get(info.id, 0) - len(rows))
-            batches = [pb.AccelBatch.FromString(row.payload) for row in rows if row.key.endswith(f"/{ACCEL.name}")]
-            newest = max(
-                [newest, *(b.header.utc_ns + round(len(b.counts) / b.axes * b.period_s * 1e9) for b in batches)]
-            )
-        kept = {}
         for name, folder in (("raw", "journal/cube"), ("published", "journal/cube/published")):
             journal = Journal(at / folder)  # cuts a torn tail, as the next start of a gateway does
-            kept[name] = journal.tail(1 << 20)[-1].utc_ns
+            lost[name] = (end_ns - journal.tail(1 << 20)[-1].utc_ns) / 1e9
             journal.close()
-    return {"recording": (end_ns - newest) / 1e9, **{n: (end_ns - t) / 1e9 for n, t in kept.items()}, "gone": gone}
+        lost["recording"] = (end_ns - newest_ns(at / "sessions", end_ns)) / 1e9
+        with Stack(at, free_port()) as again:  # another board by then, which speaks slowly
+            until(lambda: not again.status.repairing, "what was missed to be filled in")
+        lost["recording_after_the_next_start"] = (end_ns - newest_ns(at / "sessions", end_ns)) / 1e9
+        for info in Catalogue(at / "sessions").list():
+            gone += max(0, acknowledged.get(info.id, 0) - sum(1 for _ in read(info.path)))
+    return lost | {"gone": gone}
 
 
 def main(cuts: int = 10, seed: int = 1) -> None:
@@ -114,7 +124,7 @@ def main(cuts: int = 10, seed: int = 1) -> None:
                 copy = folder / "outer" / f"cut-{k}.img"
                 taken.append((copy, snapshot(disk, copy), said))
         results = [found_in(copy, folder / "copy", end_ns, said) for copy, end_ns, said in taken]
-    for what in ("recording", "raw", "published"):
+    for what in ("raw", "published", "recording", "recording_after_the_next_start"):
         values = [result[what] for result in results]
         more = {
             "least": round(min(values), 3),

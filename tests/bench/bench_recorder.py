@@ -31,13 +31,13 @@ RATE = 1000.0  # samples/s
 BATCH = 10  # samples per message, as a gateway sends them
 LIMIT = 2.0  # % of one core
 SERVE = """
-import signal, sys, threading
+import sys
 from pathlib import Path
+from gyrofree.process import stop_on_signals
 from messages.bus import BusSettings
 from sessions import recorder
 from sessions.settings import RecorderSettings
-stop = threading.Event()
-signal.signal(signal.SIGTERM, lambda *_: stop.set())
+stop = stop_on_signals()
 recorder.run(RecorderSettings(root=Path(sys.argv[1])), BusSettings(prefix="bench", router=sys.argv[2]), stop)
 """
 

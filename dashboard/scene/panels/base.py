@@ -26,7 +26,7 @@ class Snapshot:
     device: Device
     t0: float  # s on the device's axis
     t1: float
-    now: float  # time.monotonic(), s
+    now: float  # time.monotonic(), s; of a replay that is paused, when it was
     dark: bool
 
     def rows(self, topic: str, estimator: str = "") -> tuple[np.ndarray, np.ndarray]:

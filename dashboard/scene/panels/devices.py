@@ -1,6 +1,7 @@
 """The summary on the left: which device, where its data come from, is it well, and the numbers one looks for first."""
 
 import re
+import time
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from dashboard.scene.palette import (
     rows,
 )
 from dashboard.scene.panels.base import DEG, Panel, Snapshot
+from dashboard.scene.tilt import roll_pitch
 from messages import gyrofree_pb2 as pb
 
 _COUNTS = re.compile(r"fixes (\w+) (\d+)")
@@ -47,14 +49,25 @@ class Devices(Panel):
         text, colour = SOURCES[self._source(s)]
         data = "imu" if device.is_vehicle else "accel"
         newest = device.get(data) or max(device.latest.values(), key=lambda latest: latest.arrived)
-        old = newest.age(s.now)
-        state = '<span class="gf-live">● live</span>' if old < 1.0 else f'<b class="gf-bad">■ stale, {age(old)}</b>'
+        state = self._state(s, newest.age(s.now))
         head = (
             f'<div class="gf-head"><span class="gf-badge" style="background:{colour}">{text}</span>'
             f'<span class="gf-name">{escape(device.name)}</span>{state}</div>'
         )
-        body = self._vehicle(s) if device.is_vehicle else self._cube(s)
+        body = {"nav": self._vehicle, "attitude": self._board, "rate": self._cube}[device.body](s)
         return head + self._alerts(s) + self._advice(s) + body + rows(self._health(s), s.stale("link")) + self._logs(s)
+
+    @staticmethod
+    def _state(s: Snapshot, old: float) -> str:
+        """Live, stale, or what the replay does that these data are of."""
+        replay = s.store.replay.state(s.device.name, time.monotonic())
+        if replay == "ended":
+            return '<b class="gf-bad">■ replay ended</b>'
+        if replay == "paused":
+            return '<b class="gf-replay">❚❚ replay paused</b>'
+        if old >= 1.0:
+            return f'<b class="gf-bad">■ stale, {age(old)}</b>'
+        return '<b class="gf-replay">▶ replay</b>' if replay else '<span class="gf-live">● live</span>'
 
     @staticmethod
     def _source(s: Snapshot) -> int:
@@ -95,6 +108,14 @@ class Devices(Panel):
             quality = pb.GnssFix.Quality.Name(fix.message.quality).removeprefix("QUALITY_").replace("_", " ").lower()
             satellites = str(fix.message.satellites) if fix.message.satellites else "–"
             tiles.append(_raw_tile("GNSS", FIX, satellites, "satellites", quality, s.stale("gnss")))
+        return f'<div class="gf-tiles">{"".join(tiles)}</div>'
+
+    @staticmethod
+    def _board(s: Snapshot) -> str:
+        tiles = []
+        for name in s.device.estimators("attitude"):
+            roll, pitch = (number(angle * DEG, 1) for angle in roll_pitch(s.device.get("attitude", name).message.q_nb))
+            tiles.append(_tile(s, name, "attitude", f"{roll} / {pitch}", "°", "roll / pitch"))
         return f'<div class="gf-tiles">{"".join(tiles)}</div>'
 
     @staticmethod

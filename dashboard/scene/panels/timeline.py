@@ -17,7 +17,6 @@ SPEEDS = ("0.1×", "0.25×", "0.5×", "1×", "2×", "5×", "10×", "50×", "100�
 STALE_S = 2.0
 SHOWN_MARKS = 6
 HOLD_S = 1.0  # after a person's hand on the slider, the replay's position does not move it
-STEPS = 10_000  # of the slider
 
 
 class Timeline:
@@ -29,12 +28,13 @@ class Timeline:
         """`chosen` names the device that this browser shows, which a note is about."""
         self._client, self._feed, self._store, self._chosen = client, feed, store, chosen
         self._touched = 0.0
-        self._length_s = 0.0
         gui = client.gui
         panel = gui.add_panel()
         with panel.add_tab("Timeline", viser.Icon.PLAYER_PLAY):
             self._state = gui.add_html("")
-            self._slider = gui.add_slider("Position", 0, STEPS, 1, 0, visible=False, hint="Seconds of the recording")
+            self._slider = gui.add_slider(
+                "Position, s", 0.0, 1.0, 0.1, 0.0, visible=False, hint="Seconds since the recording began"
+            )
             self._slider.on_update(lambda event: self._slid(event))
             moves = ("start", "−10 s", "◂ step", "play / pause", "step ▸", "+10 s")
             self._buttons = gui.add_button_group("Replay", moves)
@@ -62,30 +62,37 @@ class Timeline:
     def update(self, now: float) -> None:
         """Show the newest state. Call under the store's lock."""
         replay = self._store.replay
-        running = replay is not None and replay.age(now) < STALE_S
+        running = replay.age(now) < STALE_S
         if self._showing != running:
             self._showing = running
             for handle in self._replay_inputs:
                 handle.visible = running
-        content = self._replay_html(replay.message) if running else self._live_html(now)
+        content = self._replay_html(replay.status) if running else self._live_html(now)
         content += self._marks_html()
         if self._state.content != content:
             self._state.content = content
         if running and now - self._touched > HOLD_S:
-            self._length_s = replay.message.length_s
-            value = round(STEPS * replay.message.position_s / max(self._length_s, 1e-3))
-            if self._slider.value != value:
-                self._slider.value = min(max(value, 0), STEPS)
+            self._slide(replay.status)
 
     # --- what is shown
+
+    def _slide(self, m: pb.ReplayStatus) -> None:
+        """Bring the slider to the replay's position; its length first, which bounds the values it takes."""
+        length = max(round(m.length_s, 1), 0.1)
+        if self._slider.max != length:
+            self._slider.max = length
+        value = min(max(round(m.position_s, 1), 0.0), length)
+        if self._slider.value != value:
+            self._slider.value = value
 
     @staticmethod
     def _replay_html(m: pb.ReplayStatus) -> str:
         loop = f" · loop {clock(m.loop_from_s)} to {clock(m.loop_until_s)}" if m.loop_until_s > m.loop_from_s else ""
         state = "❚❚ paused" if m.paused else f"▶ {m.speed:g}×"
+        position = clock(m.position_s, 3 if m.paused else 1)  # a step is one sample
         message = f" · <b>{escape(m.message)}</b>" if m.message else ""
         return (
-            f'<p class="gf-note"><b>Replay</b> {escape(m.session)} · {clock(m.position_s)} of {clock(m.length_s)} · '
+            f'<p class="gf-note"><b>Replay</b> {escape(m.session)} · {position} of {clock(m.length_s)} · '
             f"{state}{loop}{message}</p>"
         )
 
@@ -135,19 +142,19 @@ class Timeline:
         if event.client is None:
             return  # moved by the replay itself
         self._touched = time.monotonic()
-        self._order(pb.ReplayCommand.ACTION_SEEK, self._slider.value * self._length_s / STEPS)
+        self._order(pb.ReplayCommand.ACTION_SEEK, self._slider.value)
 
     def _set_speed(self, event: Any) -> None:
         if event.client is not None:
             self._order(pb.ReplayCommand.ACTION_SPEED, float(self._speed.value.rstrip("×")))
 
     def _press(self, what: str) -> None:
-        replay = self._store.replay
-        if replay is None:
+        replay, kind = self._store.replay, pb.ReplayCommand
+        if replay.status is None:
             return
-        at, kind = replay.message.position_s, pb.ReplayCommand
+        at = replay.status.position_s
         if what == "play / pause":
-            self._order(kind.ACTION_RESUME if replay.message.paused else kind.ACTION_PAUSE)
+            self._order(kind.ACTION_RESUME if replay.status.paused else kind.ACTION_PAUSE)
         elif what.endswith("step") or what.startswith("step"):
             self._order(kind.ACTION_STEP, 1.0 if what.startswith("step") else -1.0)
         else:
@@ -155,10 +162,9 @@ class Timeline:
             self._order(kind.ACTION_SEEK, max(0.0, at + jump))
 
     def _set_loop(self, what: str) -> None:
-        replay = self._store.replay
-        if replay is None:
+        m = self._store.replay.status
+        if m is None:
             return
-        m = replay.message
         if what == "off":
             self._order(pb.ReplayCommand.ACTION_LOOP)
         elif what == "from here":
@@ -182,9 +188,10 @@ class Timeline:
             self._client.add_notification("The note was not kept", str(error), color="red", auto_close_seconds=6.0)
 
 
-def clock(seconds: float) -> str:
+def clock(seconds: float, digits: int = 1) -> str:
     """Seconds as m:ss.s, with hours where there are any."""
     sign, seconds = ("−" if seconds < 0 else ""), abs(seconds)
-    hours, rest = divmod(seconds, 3600)
-    minutes, rest = divmod(rest, 60)
-    return f"{sign}{int(hours)}:{int(minutes):02d}:{rest:04.1f}" if hours else f"{sign}{int(minutes)}:{rest:04.1f}"
+    minutes, rest = divmod(round(seconds, digits), 60)
+    hours, minutes = divmod(int(minutes), 60)
+    tail = f"{rest:0{3 + digits}.{digits}f}"
+    return f"{sign}{hours}:{minutes:02d}:{tail}" if hours else f"{sign}{minutes}:{tail}"

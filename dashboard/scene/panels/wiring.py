@@ -69,7 +69,8 @@ def content(m: pb.WiringStatus, gone: bool, dark: bool) -> str:
         return f'<p class="gf-note">{text}</p>' + rows(used)
     first = head(STATES.get(m.state, ""), f"{len(m.turns)} turns · {_found(m)} of {len(m.inputs)} inputs known", gone)
     drawing = picture(m.pose, dark) if m.state in (STATUS.STATE_WAITING, STATUS.STATE_MOVING) else ""
-    todo = guidance(m.instruction, drawing, m.progress, m.message)
+    saved = m.state == STATUS.STATE_SAVED
+    todo = "" if saved else guidance(m.instruction, drawing, m.progress, m.message)
     return first + todo + _inputs(m, gone) + _turns(m) + rows(used)
 
 
