@@ -117,12 +117,14 @@ def run(options: Options, bus: BusSettings, stop: threading.Event) -> None:
     link = TcpLink(options.tcp) if options.tcp is not None else PtyLink(options.link)
     log.info("emulated board, image %s, profile %s, seed %d, on %s", options.image, options.profile, options.seed,
              options.link or link.path)  # fmt: skip
-    follower = TruthOfFrames(board, test, TruthPublisher(bus, options.device, stop, pb.SOURCE_EMULATED))
+    truths = TruthPublisher(bus, options.device, pb.SOURCE_EMULATED)
+    follower = TruthOfFrames(board, test, truths)
     try:
         while not link.connected and not stop.wait(0.02):
             pass  # power comes when somebody listens, so that the standstill at the start is seen
         _live(board, link, follower, options, stop)
     finally:
+        truths.close()
         link.close()
 
 

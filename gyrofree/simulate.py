@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import zenoh
 from pynmeagps import GET, NMEAMessage
 
 from estimator.simulation.arm import arm_test, centre
@@ -24,7 +25,7 @@ from estimator.simulation.table import BLOCK, TableTest, Truth
 from gateway.board_link import PtyLink, TcpLink
 from gateway.virtual_board import SIMULATED, BoardAccel, BoardBytes, BoardPulse, Item, VirtualBoard
 from messages import gyrofree_pb2 as pb
-from messages.bus import BusSettings, BusUnavailable, Publishers, open_client
+from messages.bus import BusSettings, LateSession, Publishers
 from messages.topics import TRUTH
 
 log = logging.getLogger(__name__)
@@ -57,18 +58,19 @@ class Options:
 class TruthPublisher:
     """Publishes the truth once the bus is there; until then truth has nobody to hear it."""
 
-    def __init__(self, bus: BusSettings, device: str, stop: threading.Event, source: int = pb.SOURCE_SIMULATED) -> None:
+    def __init__(self, bus: BusSettings, device: str, source: int = pb.SOURCE_SIMULATED) -> None:
         self._device, self._source = device, source
         self._epoch = 0
         self._publishers: Publishers | None = None
-        threading.Thread(target=self._connect, args=(bus, stop), name="truth", daemon=True).start()
+        self._session = LateSession(bus, lambda session: self._attach(session, bus.prefix))
 
-    def _connect(self, bus: BusSettings, stop: threading.Event) -> None:
-        try:
-            self._session = open_client(bus, stop)
-        except BusUnavailable:
-            return
-        self._publishers = Publishers(self._session, bus.prefix)
+    def _attach(self, session: zenoh.Session, prefix: str) -> None:
+        self._publishers = Publishers(session, prefix)
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._publishers = None
+        self._session.close()
 
     def begin(self, epoch: int) -> None:
         """A new boot of the board."""
@@ -184,7 +186,7 @@ def run(options: Options, bus: BusSettings, stop: threading.Event) -> None:
     """Be the board until `stop` is set; raises ValueError for an unknown profile, OSError for a path or port in use."""
     test = _test(options, 0)  # before the link: an unknown profile is said at once
     link, port = open_link(options)
-    truths = TruthPublisher(bus, options.device, stop)
+    truths = TruthPublisher(bus, options.device)
     log.info("simulated cube, profile %s, seed %d, on %s", test.profile.name, options.seed, port)
     first = int(time.time()) & 0xFF  # boot counters differ from those of the last process
     try:
@@ -194,6 +196,7 @@ def run(options: Options, bus: BusSettings, stop: threading.Event) -> None:
             if options.once or stop.is_set():
                 return
     finally:
+        truths.close()
         link.close()
 
 

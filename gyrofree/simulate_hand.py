@@ -17,7 +17,7 @@ from estimator.simulation.hand import RATE_HZ, AnalogueWiring, Hand
 from gateway.virtual_board import SIMULATED, BoardAdc, VirtualBoard
 from gyrofree.simulate import Options, TruthPublisher, open_link
 from messages import gyrofree_pb2 as pb
-from messages.bus import BusSettings, BusUnavailable, open_client, subscribe
+from messages.bus import BusSettings, LateSession, subscribe
 from messages.topics import WIRING
 
 log = logging.getLogger(__name__)
@@ -37,17 +37,13 @@ POSES = {
 class Guide:
     """What the page asks for, as heard on the bus; nothing while there is no bus or no detection."""
 
-    def __init__(self, bus: BusSettings, device: str, stop: threading.Event) -> None:
-        self._device = device
+    def __init__(self, bus: BusSettings, device: str) -> None:
         self._wanted, self._samples_left = pb.WiringStatus(), 0.0
-        threading.Thread(target=self._listen, args=(bus, stop), name="guide", daemon=True).start()
+        self._session = LateSession(bus, lambda session: subscribe(session, WIRING, bus.prefix, self._heard, device))
 
-    def _listen(self, bus: BusSettings, stop: threading.Event) -> None:
-        try:
-            session = open_client(bus, stop)
-        except BusUnavailable:
-            return
-        self._kept = session, subscribe(session, WIRING, bus.prefix, self._heard, self._device)
+    def close(self) -> None:
+        """Leave the bus."""
+        self._session.close()
 
     def _heard(self, _: object, status: pb.WiringStatus) -> None:
         self._wanted, self._samples_left = status, GONE_S * RATE_HZ
@@ -89,8 +85,8 @@ def run(options: Options, bus: BusSettings, stop: threading.Event) -> None:
     """Be the board until `stop` is set; raises OSError for a path or port in use."""
     link, port = open_link(options)
     wiring, hand = wiring_of(options.seed), Hand(options.seed)
-    guide = Guide(bus, options.device, stop)
-    truths = TruthPublisher(bus, options.device, stop)
+    guide = Guide(bus, options.device)
+    truths = TruthPublisher(bus, options.device)
     log.info("simulated tilt board, inputs %s, signs %s, on %s", wiring.inputs, wiring.signs, port)
     epoch = int(time.time()) & 0xFF
     truths.begin(epoch)
@@ -106,4 +102,6 @@ def run(options: Options, bus: BusSettings, stop: threading.Event) -> None:
         board = VirtualBoard(link, SIMULATED, epoch=epoch, firmware="simulated tilt board")
         board.run(items(), stop, wait_for_reader=True)
     finally:
+        guide.close()
+        truths.close()
         link.close()

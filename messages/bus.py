@@ -19,6 +19,8 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from messages.spool import Spool
 from messages.topics import NAME, REPLAY_SUFFIX, Topic
 
+CLOSING_S = 5.0
+
 log = logging.getLogger(__name__)
 
 M = TypeVar("M", bound=Message)
@@ -120,6 +122,32 @@ def wait_connected(session: zenoh.Session, timeout_s: float) -> bool:
             return False
         time.sleep(0.02)
     return True
+
+
+class LateSession:
+    """A client session that comes when the router does; until then what would be said has nobody to hear it."""
+
+    def __init__(self, settings: BusSettings, opened: Callable[[zenoh.Session], object]) -> None:
+        """`opened` gets the session, on a thread of its own; what it returns is kept as long as this is."""
+        self._settings, self._opened = settings, opened
+        self._session: zenoh.Session | None = None
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._open, name="late session", daemon=True)
+        self._thread.start()
+
+    def _open(self) -> None:
+        try:
+            self._session = open_client(self._settings, self._closing)
+        except BusUnavailable:
+            return
+        self._kept = self._opened(self._session)
+
+    def close(self) -> None:
+        """Leave the bus, before the process ends: no thread may be inside Zenoh when the interpreter goes."""
+        self._closing.set()
+        self._thread.join(CLOSING_S)
+        if self._session is not None:
+            self._session.close()
 
 
 class Publishers:

@@ -1,6 +1,5 @@
 """The simulated tilt board: its frames through gateway and pipeline, guided until its wiring is found and used."""
 
-import threading
 
 import numpy as np
 import pytest
@@ -27,9 +26,8 @@ class Bench:
     """Hand, board, line, gateway and pipeline, without a bus between them."""
 
     def __init__(self, folder):
-        stop = threading.Event()
-        stop.set()
-        self.guide = Guide(BusSettings(router="tcp/127.0.0.1:1"), "tilt-board", stop)
+        self.guide = Guide(BusSettings(router="tcp/127.0.0.1:1"), "tilt-board")
+        self.guide.close()
         self.hand, self.wiring = Hand(SEED), wiring_of(SEED)
         self.samples = motion(self.hand, self.guide, SEED)
         self.board = VirtualBoard(Wire(), SIMULATED, epoch=1, batch=5)
