@@ -8,7 +8,6 @@ import errno
 import gc
 import logging
 import os
-import queue
 import signal
 import sys
 import threading
@@ -39,20 +38,24 @@ def start_logging(verbose: bool = False) -> None:
 
 
 def stop_on_signals() -> threading.Event:
-    """An event that SIGTERM and Ctrl-C set.
+    """An event that SIGTERM and Ctrl-C set. To be called in the main thread.
 
-    Not in the handler itself: that runs in the main thread, which may be inside stop.wait() and hold the event's lock;
-    set() would then wait for it for good. A SimpleQueue may be put into anywhere.
+    Not set by a handler in Python: that runs in the main thread once it wakes, and not at all while it sleeps and the
+    signal met another one; and awake, it may be inside stop.wait() and hold the event's lock, for which set() would
+    then wait for good. What the interpreter writes into a pipe at once, in whichever thread, is read by one of ours.
     """
-    stop, told = threading.Event(), queue.SimpleQueue()
+    stop = threading.Event()
+    told, tell = os.pipe2(os.O_CLOEXEC)
+    os.set_blocking(tell, False)
 
     def listen() -> None:
-        told.get()
+        os.read(told, 1)
         stop.set()
 
     threading.Thread(target=listen, name="signals", daemon=True).start()
     for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda number, _: told.put(number))
+        signal.signal(number, lambda *_: None)
+    signal.set_wakeup_fd(tell, warn_on_full_buffer=False)
     return stop
 
 

@@ -1,6 +1,7 @@
 """The supervisor with real child processes."""
 
 import io
+import signal
 import subprocess
 import sys
 import time
@@ -95,3 +96,24 @@ def test_a_signal_may_come_at_any_moment():
     """Ctrl-C of a terminal and the supervisor's SIGTERM reach a service within a millisecond of each other."""
     done = subprocess.run([sys.executable, "-c", HELD], cwd=ROOT, capture_output=True, text=True, timeout=60)
     assert done.stdout == "ended\n", done.stderr
+
+
+ASLEEP = """
+from gyrofree.process import stop_on_signals
+stop = stop_on_signals()
+print("up", flush=True)
+stop.wait()
+"""
+
+
+def test_two_signals_at_once_end_a_service_that_sleeps():
+    for _ in range(4):
+        child = subprocess.Popen([sys.executable, "-c", ASLEEP], cwd=ROOT, stdout=subprocess.PIPE, text=True)
+        assert child.stdout.readline() == "up\n"
+        time.sleep(0.2)  # into its sleep
+        child.send_signal(signal.SIGINT)
+        child.send_signal(signal.SIGTERM)
+        try:
+            assert child.wait(30) == 0
+        finally:
+            child.kill()
