@@ -86,7 +86,7 @@ class Visitor:
     @property
     def scene(self):
         """The frame with the 3-D scene, once its main body is there."""
-        frame = self.page.frame(url=lambda url: "/scene/" in url)
+        frame = self.page.wait_for_selector("#scene").content_frame()  # it may not have its address yet
         frame.wait_for_function("() => window.__viserMutable?.nodeRefFromName?.['/world/estimate/products-ekf/body']")
         return frame
 
@@ -244,8 +244,8 @@ def test_a_replay_is_driven_by_keys_buttons_and_slider(anna):
     until(lambda: "cube-replay" in scene.locator(".gf-head").inner_text(), "the page does not show the replay")
 
     def position():
-        clock = scene.evaluate(REPLAY).split(" · ")[1].split(" of ")[0]
-        minutes, seconds = clock.split(":")
+        text = until(lambda: " of " in (said := scene.evaluate(REPLAY)) and said, "no position of a replay")
+        minutes, seconds = text.split(" · ")[1].split(" of ")[0].split(":")
         return 60 * int(minutes) + float(seconds)
 
     def key(name):
