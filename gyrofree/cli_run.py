@@ -121,10 +121,20 @@ def show(result: dict[str, Any], as_json: bool) -> None:
     show_table(table, 200)
     for key, value in result.items():
         if key == "axes" and isinstance(value, dict):
-            bad = {name: state for name, state in value.items() if state not in ("good", {"state": "good"})}
-            print(f"axes: {len(value) - len(bad)} good" + (f"; {json.dumps(bad)}" if bad else ""))
+            print(f"axes: {axes(value)}")
+        elif key == "notes":
+            print(*(f"note: {note}" for note in value), sep="\n")
+        elif key == "gaps" and isinstance(value, dict):
+            print(f"gaps: {value['count']}, missing samples: {value['missing_samples']}")
         elif key not in (kind, "default") and value not in (None, [], {}, ""):
             print(f"{key}: {json.dumps(value)}")
+
+
+def axes(found: dict[str, Any]) -> str:
+    """How many axes are good, and what is wrong with each of the others."""
+    states = {name: one["state"] if isinstance(one, dict) else one for name, one in found.items()}
+    bad = [f"{name} {state}" for name, state in states.items() if state != "good"]
+    return ", ".join([f"{len(states) - len(bad)} of {len(states)} good", *bad])
 
 
 def cell(value: Any) -> str:

@@ -147,3 +147,20 @@ def test_the_commands_print_json_and_one_line_of_what_is_wrong(tmp_path):
     assert bad.exit_code != 0 and "Traceback" not in bad.output
     bad = runner.invoke(app, ["simulate", "--csv", str(path), "--profile", "spin"])
     assert bad.exit_code != 0 and "want one of" in bad.output
+
+
+def test_a_log_that_begins_while_turning_is_resolved_and_named_so(tmp_path):
+    log = tmp_path / "turning.csv"
+    simulate_csv.write(log, "turning", 3, "cube", 0.05)
+    live = run_cube(log, estimators=["products-ekf"])["estimators"]["products-ekf"]
+    result = run_cube(log, estimators=["products-ekf"], resolve=True)
+    late = result["estimators"]["products-ekf+resolved"]
+    assert late["rate_rms_radps"][2] < 0.06 < live["rate_rms_radps"][2]
+    assert any("corrected backwards" in note for note in result["notes"])
+
+
+def test_a_rate_that_is_never_known_is_said(published, tmp_path):
+    short = tmp_path / "short.csv"
+    short.write_text("".join(published.open().readlines()[:102]))
+    notes = run_cube(short, estimators=["products-ekf"])["notes"]
+    assert any("its rate is not known in most of this log" in note for note in notes)

@@ -20,6 +20,7 @@ from estimator.rate import resolved
 from estimator.rate.beliefs import make
 from estimator.rate.bound import IN_USE, rate_bound
 from estimator.rate.estimators import ESTIMATORS, ProductsRate
+from estimator.rate.sight import ALL_BLIND
 from estimator.rate.tachometer import SUFFIX
 from estimator.settings import EstimatorSettings
 
@@ -48,6 +49,7 @@ class Track:
     still: NDArray[np.bool_]  # (n,)
     p_n: Array  # (n, 3) m
     us_per_sample: float
+    blind: str = ""  # why omega was not known in more than half of the samples; empty: it was
 
 
 def nothing(done: float, what: str) -> None:
@@ -90,6 +92,7 @@ def run_cube(
         notes.append(f"{', '.join(aided)}: aided by the tachometer")
     if late := [name for name in tracks if name.endswith(resolved.SUFFIX)]:
         notes.append(f"{', '.join(late)}: corrected backwards once the sign of the rate was known; live it is not")
+    notes += [f"{name}: its rate is not known in most of this log: {t.blind}" for name, t in tracks.items() if t.blind]
     progress(0.95, "bound")
     bound = _bound(data, used.layout(shape) if used is not None else shape, truth)
     plain = [name.partition("+")[0] for name in tracks]
@@ -172,7 +175,7 @@ def run_estimator(
     omega, P, q, angle = np.zeros((n, 3)), np.zeros((n, 3, 3)), np.zeros((n, 4)), np.zeros(n)
     alpha, force, still, p_n = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n, dtype=bool), np.zeros((n, 3))
     missing = np.diff(data.index, prepend=data.index[0] - 1) - 1
-    busy = 0
+    busy, blind, why = 0, 0, ""
     for k in range(n):
         started = time.thread_time_ns()
         if missing[k]:
@@ -182,6 +185,8 @@ def run_estimator(
             estimator.tacho(float(data.t_s[k]), reports[k], TACHO_SIGMA)
         busy += time.thread_time_ns() - started
         aided = aided or bool(s.aid)
+        if tuple(s.sight) == ALL_BLIND:
+            blind, why = blind + 1, s.sight_reason
         omega[k], P[k], q[k], angle[k], still[k] = s.omega_b, s.P, s.q_nb, s.angle_z, s.still
         alpha[k], force[k], p_n[k] = s.alpha_b, s.f_b, s.p_n
         if k % 200 == 0:
@@ -190,10 +195,12 @@ def run_estimator(
     fresh = make(ESTIMATORS[name], shape, card)
     if resolve and isinstance(fresh, ProductsRate):
         whole = int(np.argmax(missing[1:] > 0)) + 1 if (missing[1:] > 0).any() else n
-        if past := resolved.resolve(fresh.core, data.t_s[:whole], np.ascontiguousarray(f_axis[:whole])):
+        if past := resolved.resolve(fresh.core, data.t_s[:whole], f_axis[:whole]):
             called += resolved.SUFFIX
             past.into(omega, P, angle, q)
-    return Track(called, omega, P, q, angle, alpha, force, still, p_n, busy / n / 1000.0)
+            blind = 0
+    said = why if 2 * blind > n else ""
+    return Track(called, omega, P, q, angle, alpha, force, still, p_n, busy / n / 1000.0, said)
 
 
 def _reports(data: CubeLog) -> dict[int, float]:

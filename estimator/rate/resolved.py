@@ -51,6 +51,7 @@ def resolve(core: "ProductsFilter", t_s: Array, f_axis: Array) -> Resolved | Non
 
     None when it does not begin while turning, or its sign is never decided.
     """
+    t_s, f_axis = np.ascontiguousarray(t_s), np.ascontiguousarray(f_axis)  # a log's columns lie apart
     n, best, decided, rows = len(t_s), None, -1, np.zeros((0, track.WIDTH))
     for first in range(0, n, PART):
         part = core.rows(t_s[first : first + PART], f_axis[first : first + PART])

@@ -145,9 +145,10 @@ ALIASES = {"cw-ccw": "published"}  # clockwise, then counter-clockwise
 
 def named(name: str) -> Profile:
     """Profile of a name or of its other name; raises ValueError with the known ones."""
-    profile = PROFILES.get(ALIASES.get(name, name))
+    known = PROFILES | {TURNING.name: TURNING}
+    profile = known.get(ALIASES.get(name, name))
     if profile is None:
-        raise ValueError(f"no profile {name!r}; want one of {', '.join([*PROFILES, *ALIASES])}")
+        raise ValueError(f"no profile {name!r}; want one of {', '.join([*known, *ALIASES])}")
     return profile
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.layouts.layout import CUBE, Layout
-from estimator.simulation.profiles import DEGREE, PROFILES, Profile
+from estimator.simulation.profiles import DEGREE, Profile, named
 
 Array = NDArray[np.float64]
 
@@ -113,13 +113,11 @@ class TableTest:
         """half_side in m, tilt in rad, centre_b (m) from the table's axis to the body's centre. `run` draws other
         noise for the same sensors.
 
-        Raises ValueError for a profile that is not in PROFILES or a rate that is not positive.
+        Raises ValueError for a profile that there is not or a rate that is not positive.
         """
-        if isinstance(profile, str) and profile not in PROFILES:
-            raise ValueError(f"no profile {profile!r}; want one of {', '.join(PROFILES)}")
         if not rate_hz > 0.0:
             raise ValueError(f"sample rate {rate_hz} Hz, want more than 0")
-        self.profile = PROFILES[profile] if isinstance(profile, str) else profile
+        self.profile = named(profile) if isinstance(profile, str) else profile
         self.layout = layout if layout is not None else CUBE(half_side)
         self.period_s = 1.0 / rate_hz
         self.pulses_per_rev = pulses_per_rev
