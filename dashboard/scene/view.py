@@ -14,7 +14,7 @@ from messages import gyrofree_pb2 as pb
 
 WINDOWS = {"10 s": 10.0, "30 s": 30.0, "60 s": 60.0, "5 min": 300.0, "10 min": 600.0}
 TRACK_S = 0.2  # trajectories grow five times a second
-ASKED_FOR_S = 20.0  # a replay that begins this near to the opening of a page was asked for by the person at it
+ASKED_FOR_S = 60.0  # a replay that begins this near to the opening of a page was asked for by the person at it
 
 
 class View:
