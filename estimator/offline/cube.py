@@ -192,8 +192,8 @@ def run_estimator(
         if k % 200 == 0:
             progress(k / n)
     called = name + SUFFIX if aided else name
-    fresh = make(ESTIMATORS[name], shape, card)
-    if resolve and isinstance(fresh, ProductsRate):
+    if resolve and issubclass(ESTIMATORS[name], ProductsRate):
+        fresh = make(ESTIMATORS[name], shape, card)
         whole = int(np.argmax(missing[1:] > 0)) + 1 if (missing[1:] > 0).any() else n
         if past := resolved.resolve(fresh.core, data.t_s[:whole], f_axis[:whole]):
             called += resolved.SUFFIX

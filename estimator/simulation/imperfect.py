@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.layouts.layout import Layout
-from estimator.simulation.profiles import PROFILES, Profile, Ramp
+from estimator.simulation.profiles import Profile, Ramp, named
 from estimator.simulation.table import BLOCK, GRAVITY, SensorModel, TableTest
 
 Array = NDArray[np.float64]
@@ -127,7 +127,7 @@ def table_run(
     seconds: float | None = None,
 ) -> TableRun:
     """Run a profile, mounted as C_tb (3, 3) says; centre_b (m, in b): from the table's axis to the device's centre."""
-    profile = PROFILES[profile] if isinstance(profile, str) else profile
+    profile = named(profile) if isinstance(profile, str) else profile
     turned = replace(one.true, r_b=one.true.r_b @ mounting.T, theta_b=one.true.theta_b @ mounting.T)
     ideal = SensorModel(noise=0.0, bias=0.0, scale_error=0.0, count=0.0)
     centre = tuple(float(v) for v in mounting @ np.asarray(centre_b))
