@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from estimator.ins.fix import Fix, typical_sigma
 from estimator.ins.fuzzy import MEMBERSHIPS, memberships
 from estimator.ins.solution import HEADING, INNOVATIONS, Correction, HorizonChoice, Mode, Solution
+from estimator.rate.samples import finite
 from estimator.stream import Stream
 from messages import gyrofree_pb2 as pb
 
@@ -43,7 +44,7 @@ def _rows(what: str, header: pb.Header, values: Iterable[float], columns: int, p
     problem = ""
     if columns < 1 or flat.size == 0 or flat.size % columns:
         problem = f"{flat.size} values do not fill rows of {columns}"
-    elif not math.isfinite(flat.dot(flat)) and not np.isfinite(flat).all():
+    elif not finite(flat):
         problem = "not all values are finite"
     elif not 0.0 < period_s < 10.0:
         problem = f"period {period_s} s, want 0 to 10 s"
@@ -119,9 +120,13 @@ def sample_header(first: pb.Header, offset_s: float) -> pb.Header:
     header = pb.Header()
     header.CopyFrom(first)
     header.sequence, header.late = 0, False
-    header.device_us = max(0, first.device_us + round(offset_s * 1e6))
-    header.utc_ns = first.utc_ns + round(offset_s * 1e9)
+    header.device_us, header.utc_ns = moment(first.device_us, first.utc_ns, offset_s)
     return header
+
+
+def moment(device_us: int, utc_ns: int, offset_s: float) -> tuple[int, int]:
+    """device_us and utc_ns offset_s after those."""
+    return max(0, device_us + round(offset_s * 1e6)), utc_ns + round(offset_s * 1e9)
 
 
 def tacho_report(message: pb.TachoRate) -> tuple[float, float, float, bool]:

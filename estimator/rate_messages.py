@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 
+from estimator.convert import moment
 from estimator.packed import Doubles, RowFields
 from estimator.rate import products_track as track
 from estimator.rate.track_state import TrackState
@@ -61,9 +62,8 @@ class RateMessages:
             shared = self._shared[key] = self._share(name, state)
         message = pb.RateEstimate()
         message.MergeFromString(shared + self._numbers(state))
-        header, offset = message.header, row * self._period_s
-        header.device_us = max(0, self._device_us + round(offset * 1e6))
-        header.utc_ns = self._utc_ns + round(offset * 1e9)
+        header = message.header
+        header.device_us, header.utc_ns = moment(self._device_us, self._utc_ns, row * self._period_s)
         message.for_sequence, message.for_index = self._sequence, index
         if state.sight_reason:
             message.sight_reason = state.sight_reason

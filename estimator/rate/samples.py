@@ -11,6 +11,11 @@ from estimator.rate.field import checked
 Array = NDArray[np.float64]
 
 
+def finite(values: Array) -> bool:
+    """Are all numbers finite? The sum of their squares says so at a third of the cost, unless it overflows."""
+    return math.isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())
+
+
 class Samples:
     """Checks samples before they reach a filter: their number, finite, time that grows."""
 
@@ -20,8 +25,7 @@ class Samples:
     def take(self, layout: Layout, t_s: Array, f_axis: Array) -> tuple[Array, Array]:
         """Times (n,), s, and readings (n, N) as the compiled functions want them; ValueError names what is wrong."""
         t_s, f_axis = np.ascontiguousarray(t_s, dtype=np.float64), np.ascontiguousarray(f_axis, dtype=np.float64)
-        finite = math.isfinite(np.vdot(f_axis, f_axis)) or np.isfinite(f_axis).all()  # the first costs a third
-        if f_axis.shape != (len(t_s), layout.axes) or not finite:
+        if f_axis.shape != (len(t_s), layout.axes) or not finite(f_axis):
             for row in f_axis:
                 checked(layout, row)
             raise ValueError(f"readings {f_axis.shape}, want ({len(t_s)}, {layout.axes}) of {layout.name}")
