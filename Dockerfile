@@ -10,7 +10,9 @@ COPY pyproject.toml README.md LICENSE NOTICE ./
 COPY firmware_protocol firmware_protocol
 COPY messages messages
 COPY gateway gateway
+COPY inertial inertial
 COPY estimator estimator
+COPY logs logs
 COPY sessions sessions
 COPY dashboard dashboard
 COPY emulator emulator

@@ -34,7 +34,7 @@ setup: .make/warm
 	$(PIP) install --quiet --no-deps --no-build-isolation --editable .
 	@touch $@
 
-.make/warm: .make/runtime $(wildcard estimator/*.py estimator/*/*.py)
+.make/warm: .make/runtime $(wildcard inertial/*.py inertial/*/*.py estimator/*.py)
 	@echo "Compiling the filters once, for the cache ..."
 	@$(BIN)/python -m estimator.warm
 	@touch $@
@@ -49,7 +49,7 @@ dev: .make/dev
 	@touch $@
 
 system-packages:
-	@sh tests/system_packages.sh
+	@sh tests/support/system_packages.sh
 
 # The browser draws in software and wants the machine for itself, so it comes after the others.
 test: setup dev system-packages
@@ -71,10 +71,10 @@ fuzz: setup dev system-packages
 
 docs: setup
 	$(BIN)/python -m firmware_protocol.document > docs/protocol.md
-	$(BIN)/python -m messages.document > docs/topics.md
+	$(BIN)/python -m messages.contract.document > docs/topics.md
 
 messages: dev
-	$(BIN)/python -m grpc_tools.protoc -Imessages --python_out=messages --pyi_out=messages messages/gyrofree.proto
+	$(BIN)/python -m grpc_tools.protoc -Imessages/contract --python_out=messages/contract --pyi_out=messages/contract messages/contract/gyrofree.proto
 
 compose-test:
 	bash deploy/compose-test.sh

@@ -11,15 +11,15 @@ from typing import Any
 
 import uvicorn
 
-from dashboard.app import create_app
-from dashboard.auth import Gate
-from dashboard.control import BusWatch, RecorderControl, Replay
-from dashboard.front import Front
-from dashboard.jobs import Jobs
 from dashboard.settings import DashboardSettings
-from dashboard.users import UserStore, load_users
-from messages.bus import BusSettings, open_client
-from sessions.catalogue import Catalogue
+from dashboard.web.app import create_app
+from dashboard.web.auth import Gate
+from dashboard.web.control import BusWatch, RecorderControl, Replay
+from dashboard.web.front import Front
+from dashboard.web.jobs import Jobs
+from dashboard.web.users import UserStore, load_users
+from messages.bus.session import BusSettings, open_client
+from sessions.library.catalogue import Catalogue
 
 log = logging.getLogger(__name__)
 
@@ -43,7 +43,9 @@ class _Server(uvicorn.Server):
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """The bound socket of the dashboard; raises PortTaken, or OSError for an address this machine does not have."""
+    """The bound socket of the dashboard; raises PortTaken, or OSError for an address this machine
+    does not have.
+    """
     try:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         bound = socket.socket(family, socket.SOCK_STREAM)
@@ -56,7 +58,10 @@ def listen(host: str, port: int) -> socket.socket:
     except OSError as error:
         bound.close()
         if error.errno == errno.EADDRINUSE:
-            text = f"[dashboard] port {port} of {host} is taken: end what uses it (`ss -ltnp`), or set another port"
+            text = (
+                f"[dashboard] port {port} of {host} is taken: end what uses it (`ss -ltnp`), or set"
+                " another port"
+            )
             raise PortTaken(error.errno, text) from None
         raise OSError(error.errno, f"[dashboard] {host}:{port}: {error.strerror}") from None
     return bound
@@ -102,18 +107,26 @@ def run(
 ) -> None:
     """The dashboard until `stop` is set.
 
-    `replay` starts replays for the sessions page (control.ProcessReplay); without it the page has no such button.
-    `jobs` makes reports and exports in the background.
-    Raises PortTaken when the port or viser's is in use, UsersError for a damaged users file, BusUnavailable when it is
+    `replay` starts replays for the sessions page (control.ProcessReplay); without it the page has
+    no such button. `jobs` makes reports and exports in the background. Raises PortTaken when the
+    port or viser's is in use, UsersError for a damaged users file, BusUnavailable when it is
     stopped before a router answers.
     """
-    from dashboard.scene import service as scene  # here: viser takes a second to import, a taken port should not wait
+    from dashboard.scene import (
+        service as scene,
+    )  # here: viser takes a second to import, a taken port should not wait
 
     with listen(settings.host, settings.port) as bound:
         if not load_users(settings.users):
-            log.warning("%s has no users: nobody can sign in; add one with `gyrofree users add`", settings.users)
+            log.warning(
+                "%s has no users: nobody can sign in; add one with `gyrofree users add`",
+                settings.users,
+            )
         if not settings.secure_cookies and settings.host not in ("127.0.0.1", "::1", "localhost"):
-            log.warning("serving %s without TLS: passwords cross the network readable; see docs", settings.url)
+            log.warning(
+                "serving %s without TLS: passwords cross the network readable; see docs",
+                settings.url,
+            )
         session = open_client(bus, stop)
         try:
             try:

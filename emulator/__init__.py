@@ -1,1 +1,3 @@
-"""The LPC1768 board in software: the exact image in the Unicorn CPU emulator, with models of what surrounds it."""
+"""The LPC1768 board in software: the exact image in the Unicorn CPU emulator, with models of what
+surrounds it.
+"""

@@ -1,7 +1,9 @@
-"""An ADXL345 as seen through SPI: registers, its own sampling clock, 32-level FIFO, self-test; and broken ones.
+"""An ADXL345 as seen through SPI: registers, its own sampling clock, 32-level FIFO, self-test; and
+broken ones.
 
-Data sheet rev. G. What a driver may trip over is here: the FIFO pops when a read leaves the data registers and needs
-5 us before the next one; OVERRUN and DATA_READY fall with a read; at 1600 and 3200 Hz the lowest bit is 0.
+Data sheet rev. G. What a driver may trip over is here: the FIFO pops when a read leaves the data
+registers and needs 5 us before the next one; OVERRUN and DATA_READY fall with a read; at 1600 and
+3200 Hz the lowest bit is 0.
 """
 
 from collections import deque
@@ -22,14 +24,22 @@ TOP_RATE = 3200.0  # Hz, rate code 15
 LOOK_AHEAD = 256  # samples asked of the world at once
 READ_ONLY = {DEVID, INT_SOURCE, FIFO_STATUS, *range(DATAX0, DATAZ1 + 1)}
 
-Counts = Callable[[NDArray[np.float64]], NDArray[np.float64]]  # times (n,) s -> (n, 3), counts of 3.9 mg, not rounded
+Counts = Callable[
+    [NDArray[np.float64]], NDArray[np.float64]
+]  # times (n,) s -> (n, 3), counts of 3.9 mg, not rounded
 
 
 class Adxl345:
-    """One sensor. `state` is 'good', 'dead' (drives nothing), 'stuck' (new data never differ) or 'wrong-id'."""
+    """One sensor. `state` is 'good', 'dead' (drives nothing), 'stuck' (new data never differ) or
+    'wrong-id'.
+    """
 
-    def __init__(self, counts: Counts, clocks_per_s: float, odr_error: float = 0.0, phase: float = 0.0) -> None:
-        """odr_error: relative error of its sampling clock; phase: 0 to 1 of a period, of its first sample."""
+    def __init__(
+        self, counts: Counts, clocks_per_s: float, odr_error: float = 0.0, phase: float = 0.0
+    ) -> None:
+        """odr_error: relative error of its sampling clock; phase: 0 to 1 of a period, of its first
+        sample.
+        """
         self.state = "good"
         self.selected = False
         self.overruns = 0  # samples that nobody read
@@ -70,7 +80,11 @@ class Adxl345:
         if self.state == "dead":
             return 0xFF
         if self._address < 0:
-            self._reading, self._multiple, self._address = bool(byte & 0x80), bool(byte & 0x40), byte & 0x3F
+            self._reading, self._multiple, self._address = (
+                bool(byte & 0x80),
+                bool(byte & 0x40),
+                byte & 0x3F,
+            )
             return 0x00
         address = self._address
         if self._multiple:
@@ -115,7 +129,11 @@ class Adxl345:
     def _interrupts(self) -> int:
         ready = bool(self._fifo) if self._fifo_mode else self._ready
         mark = self._fifo_mode and len(self._fifo) >= max(1, self._registers[FIFO_CTL] & 31)
-        return (DATA_READY if ready else 0) | (WATERMARK if mark else 0) | (OVERRUN if self._overrun else 0)
+        return (
+            (DATA_READY if ready else 0)
+            | (WATERMARK if mark else 0)
+            | (OVERRUN if self._overrun else 0)
+        )
 
     def _end_of_read(self, clock: int) -> None:
         if self._touched and self._fifo and clock >= self._moved_at:

@@ -13,12 +13,22 @@ from emulator.engine import EmulationError
 from emulator.nvic import BASE as PPB
 from emulator.nvic import SIZE as PPB_SIZE
 from emulator.ssp import Ssp
-from emulator.system import BROWN_OUT, EXTERNAL, WATCHDOG, BackupRegisters, BootRom, Registers, SystemControl, Watchdog
+from emulator.system import (
+    BROWN_OUT,
+    EXTERNAL,
+    WATCHDOG,
+    BackupRegisters,
+    BootRom,
+    Registers,
+    SystemControl,
+    Watchdog,
+)
 from emulator.timer import Adc, Gpio, Timer
 from emulator.uart import Uart
 from emulator.world import SENSOR_FAULTS, Fault, World
 
-CCLK = 96_000_000  # Hz, what the image sets; the short start on the internal oscillator is counted as if at this clock
+# Hz, what the image sets; the short start on the internal oscillator is counted as if at this clock
+CCLK = 96_000_000
 RAM, RAM_SIZE = 0x10000000, 0x8000
 AHB_RAM, AHB_RAM_SIZE = 0x2007C000, 0x8000
 BOOT_ROM, BOOT_ROM_SIZE = 0x1FFF0000, 0x2000
@@ -35,16 +45,23 @@ PAINT = 0xC5C5C5C5  # what the image fills its stack with
 class Board:
     """Powered from the start; `run(seconds)` lets it live. `sink` gets what the host's UART sends.
 
-    Deterministic: the same image, world, faults and fed bytes at the same times give the same bytes at the same times.
+    Deterministic: the same image, world, faults and fed bytes at the same times give the same bytes
+    at the same times.
     """
 
-    def __init__(self, image: bytes | Path, world: World | None = None, faults: list[Fault] | None = None) -> None:
-        """image: the flash from address 0, or the path of its .bin. Raises EmulationError and EmulatorMissing."""
+    def __init__(
+        self, image: bytes | Path, world: World | None = None, faults: list[Fault] | None = None
+    ) -> None:
+        """image: the flash from address 0, or the path of its .bin. Raises EmulationError and
+        EmulatorMissing.
+        """
         data = image.read_bytes() if isinstance(image, Path) else image
         self.world = world or World()
         self.core = core = Core()
         if not 512 <= len(data) <= len(core.engine.flash):
-            raise EmulationError(f"image of {len(data)} bytes, want 512 to {len(core.engine.flash)}: is it the .bin?")
+            raise EmulationError(
+                f"image of {len(data)} bytes, want 512 to {len(core.engine.flash)}: is it the .bin?"
+            )
         core.engine.flash[: len(data)] = memoryview(data)
         self.clocks_per_s = CCLK * (1.0 + self.world.clock_error)
         self.resets: list[tuple[float, str]] = []
@@ -69,19 +86,32 @@ class Board:
         self.ssp = (Ssp(core, system, "ssp0", 14), Ssp(core, system, "ssp1", 15))
         self.timer2 = Timer(core, system, "timer2", 3)
         self.adc = Adc(core, system, 22)
-        self.adc.level = lambda channel, clock: int(self.world.analog(channel, clock / self.clocks_per_s) / VREF * 4096)
+        self.adc.level = lambda channel, clock: int(
+            self.world.analog(channel, clock / self.clocks_per_s) / VREF * 4096
+        )
         self.gpio = Gpio()
         self.gpio.inputs[2] &= ~(EMULATED_STRAP | DIRECTION_STRAP)
         self.gpio.changed = self._pins
         self.backup = BackupRegisters()
         self._at = {
-            0x40000000: self.watchdog, 0x400FC000: system, 0x4000C000: self.uart0, 0x40098000: self.uart2,
-            0x40088000: self.ssp[0], 0x40030000: self.ssp[1], 0x40034000: self.adc, GPIO_BASE: self.gpio,
-            0x40004000: Timer(core, system, "timer0", 1), 0x40008000: Timer(core, system, "timer1", 2),
-            0x40090000: self.timer2, 0x40094000: Timer(core, system, "timer3", 4),
-            0x40010000: Uart(core, system, "uart1", 6), 0x4009C000: Uart(core, system, "uart3", 8),
-            0x40024000: self.backup, 0x4002C000: Registers(), 0x40028000: Registers(),
-        }  # fmt: skip
+            0x40000000: self.watchdog,
+            0x400FC000: system,
+            0x4000C000: self.uart0,
+            0x40098000: self.uart2,
+            0x40088000: self.ssp[0],
+            0x40030000: self.ssp[1],
+            0x40034000: self.adc,
+            GPIO_BASE: self.gpio,
+            0x40004000: Timer(core, system, "timer0", 1),
+            0x40008000: Timer(core, system, "timer1", 2),
+            0x40090000: self.timer2,
+            0x40094000: Timer(core, system, "timer3", 4),
+            0x40010000: Uart(core, system, "uart1", 6),
+            0x4009C000: Uart(core, system, "uart3", 8),
+            0x40024000: self.backup,
+            0x4002C000: Registers(),
+            0x40028000: Registers(),
+        }
 
     def _memory(self) -> None:
         engine = self.core.engine
@@ -98,7 +128,12 @@ class Board:
     def _sensors(self) -> None:
         world = self.world
         self.sensors = [
-            Adxl345(lambda t, k=k: world.counts(k, t), self.clocks_per_s, world.odr_error[k], world.phase[k])
+            Adxl345(
+                lambda t, k=k: world.counts(k, t),
+                self.clocks_per_s,
+                world.odr_error[k],
+                world.phase[k],
+            )
             for k in range(4)
         ]
         for sensor, bus in zip(self.sensors, SENSOR_BUS, strict=True):
@@ -110,7 +145,9 @@ class Board:
         return self.core.now / self.clocks_per_s
 
     def run(self, until_s: float) -> bytes:
-        """Live until this time; what the host's UART has sent since the last call, handed to `sink` too."""
+        """Live until this time; what the host's UART has sent since the last call, handed to `sink`
+        too.
+        """
         self.core.run_until(int(until_s * self.clocks_per_s))
         self.uart0.flush()
         data = bytes(self._sent)
@@ -140,7 +177,9 @@ class Board:
         """Bytes of stack ever touched, by the paint that the image puts there."""
         words = struct.unpack(f"<{STACK_TOP // 4}I", self.core.engine.read(RAM, STACK_TOP))
         longest = end = run = 0
-        for i, word in enumerate(words):  # locals that were never written leave paint inside the used part
+        for i, word in enumerate(
+            words
+        ):  # locals that were never written leave paint inside the used part
             run = run + 1 if word == PAINT else 0
             if run > longest:
                 longest, end = run, i + 1
@@ -169,7 +208,9 @@ class Board:
         self._follow(world.gnss(), lambda item: item[0], lambda item: self.uart2.feed(item[1]))
 
     def _follow(self, items: Iterator, time_of: Callable, action: Callable) -> None:
-        """Let the items of an iterator happen one after the other, each scheduled when the one before has happened."""
+        """Let the items of an iterator happen one after the other, each scheduled when the one
+        before has happened.
+        """
 
         def happen(item: object) -> None:
             action(item)

@@ -1,8 +1,10 @@
-"""The processor's shell: time, events, exceptions. Time is the count of clocks, so two runs are the same run.
+"""The processor's shell: time, events, exceptions. Time is the count of clocks, so two runs are the
+same run.
 
-Unicorn executes instructions but, for M-profile processors, neither interrupts nor their return; both are done here
-as ARM v7-M B1.5.6 to B1.5.8 say: eight words on the stack, EXC_RETURN in lr, and back. There is one stack (MSP), no
-SVC and no MPU: the image uses none of them, and an attempt ends the run with a clear error.
+Unicorn executes instructions but, for M-profile processors, neither interrupts nor their return;
+both are done here as ARM v7-M B1.5.6 to B1.5.8 say: eight words on the stack, EXC_RETURN in lr, and
+back. There is one stack (MSP), no SVC and no MPU: the image uses none of them, and an attempt ends
+the run with a clear error.
 """
 
 import heapq
@@ -86,7 +88,10 @@ class Core:
         """Take stack and start from the vectors."""
         sp, start = struct.unpack("<II", self.engine.read(0, 8))
         if not start & 1:
-            raise EmulationError(f"image: the reset vector {start:#010x} is no Thumb address; is this an image at all?")
+            raise EmulationError(
+                f"image: the reset vector {start:#010x} is no Thumb address; is this an image at"
+                " all?"
+            )
         self.engine.set_frame([0, 0, 0, 0, 0, 0xFFFFFFFF, start & ~1, THUMB, sp])
         self.engine.set("PRIMASK", 0)
         self.engine.set("BASEPRI", 0)
@@ -131,8 +136,9 @@ class Core:
         else:
             frame = self.engine.frame()
             raise EmulationError(
-                f"image: fault (Unicorn error {code}) at pc {self._pc:#010x}, lr {frame[5]:#010x}, sp {frame[8]:#010x}"
-                f", exception {frame[7] & 0x1FF}, clock {self.now}: look the addresses up in the map file"
+                f"image: fault (Unicorn error {code}) at pc {self._pc:#010x}, lr {frame[5]:#010x},"
+                f" sp {frame[8]:#010x}, exception {frame[7] & 0x1FF}, clock {self.now}: look the"
+                " addresses up in the map file"
             )
 
     def _masked(self, number: int) -> bool:

@@ -1,10 +1,11 @@
 """What an instruction costs, and the compiled hook that counts it before each block of code runs.
 
-Costs are those of the Cortex-M3 Technical Reference Manual (r2p0, table 18-1), taken high where it gives a span:
-loads and stores 2, load and store multiple 1 + N, a taken branch 1 + 2 for the refilled pipeline, divisions 8 (2 to
-12), 64-bit products 5 (3 to 7), anything else 1. Flash: at 96 MHz a line of 16 bytes takes 5 clocks; lines that follow
-each other are fetched ahead, so straight code does not wait, and a taken branch out of the current line waits
-FLASH_WAIT clocks. The real accelerator also remembers branch targets, so this is on the safe side.
+Costs are those of the Cortex-M3 Technical Reference Manual (r2p0, table 18-1), taken high where it
+gives a span: loads and stores 2, load and store multiple 1 + N, a taken branch 1 + 2 for the
+refilled pipeline, divisions 8 (2 to 12), 64-bit products 5 (3 to 7), anything else 1. Flash: at 96
+MHz a line of 16 bytes takes 5 clocks; lines that follow each other are fetched ahead, so straight
+code does not wait, and a taken branch out of the current line waits FLASH_WAIT clocks. The real
+accelerator also remembers branch targets, so this is on the safe side.
 """
 
 import numpy as np
@@ -21,7 +22,9 @@ LINE = 0xFFFFFFF0  # flash is read in lines of 16 bytes
 
 @intrinsic
 def _call(typing_context, function, argument):
-    """function(argument) for the address of a C function that takes and returns one pointer-sized integer."""
+    """function(argument) for the address of a C function that takes and returns one pointer-sized
+    integer.
+    """
 
     def generate(context, builder, signature, arguments):
         word = ir.IntType(64)

@@ -1,6 +1,8 @@
-"""The few calls of the Unicorn engine that are made thousands of times in a second, without the binding's own cost.
+"""The few calls of the Unicorn engine that are made thousands of times in a second, without the
+binding's own cost.
 
-Unicorn's GPL engine is an extra for tests and demonstrations; nothing else in the project imports it.
+Unicorn's GPL engine is an extra for tests and demonstrations; nothing else in the project imports
+it.
 """
 
 import ctypes
@@ -23,8 +25,12 @@ _FRAME = struct.Struct("<8I")
 Read = Callable[[int, int], int]  # offset, size -> value
 Write = Callable[[int, int, int], None]  # offset, size, value
 
-_READ = ctypes.CFUNCTYPE(ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint, ctypes.c_void_p)
-_WRITE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint, ctypes.c_uint64, ctypes.c_void_p)
+_READ = ctypes.CFUNCTYPE(
+    ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint, ctypes.c_void_p
+)
+_WRITE = ctypes.CFUNCTYPE(
+    None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint, ctypes.c_uint64, ctypes.c_void_p
+)
 
 
 class EmulatorMissing(ImportError):
@@ -46,10 +52,12 @@ class Engine:
             from unicorn.unicorn_py3.unicorn import uclib
         except ImportError as error:
             raise EmulatorMissing(
-                f"the emulated board needs the package unicorn ({error}): pip install --require-hashes -r "
-                "requirements/board.txt"
+                f"the emulated board needs the package unicorn ({error}): pip install"
+                " --require-hashes -r requirements/board.txt"
             ) from None
-        self._unicorn = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
+        self._unicorn = unicorn.Uc(
+            unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS
+        )
         self._unicorn.ctl_set_cpu_model(arm.UC_CPU_ARM_CORTEX_M3)
         self._library, self._handle = uclib, self._unicorn._uch
         self._start, self._read_many, self._write_many = (
@@ -66,29 +74,47 @@ class Engine:
         self._hook()
         frame = ("R0", "R1", "R2", "R3", "R12", "LR", "PC", "XPSR", "SP")
         self._frame = _Registers([getattr(arm, f"UC_ARM_REG_{name}") for name in frame])
-        self._one = {name: _Registers([getattr(arm, f"UC_ARM_REG_{name}")]) for name in (*frame, "PRIMASK", "BASEPRI")}
+        self._one = {
+            name: _Registers([getattr(arm, f"UC_ARM_REG_{name}")])
+            for name in (*frame, "PRIMASK", "BASEPRI")
+        }
 
     def _map_flash(self) -> None:
         state = self.state
         self._check(
-            self._library.uc_mem_map_ptr(self._handle, 0, FLASH_SIZE, 5, ctypes.c_void_p(self.flash.ctypes.data))
+            self._library.uc_mem_map_ptr(
+                self._handle, 0, FLASH_SIZE, 5, ctypes.c_void_p(self.flash.ctypes.data)
+            )
         )
-        state[cy.CODE], state[cy.CODE_SIZE], state[cy.FLASH_WAIT_AT] = self.flash.ctypes.data, FLASH_SIZE, cy.FLASH_WAIT
+        state[cy.CODE], state[cy.CODE_SIZE], state[cy.FLASH_WAIT_AT] = (
+            self.flash.ctypes.data,
+            FLASH_SIZE,
+            cy.FLASH_WAIT,
+        )
         state[cy.STOP] = ctypes.cast(self._library.uc_emu_stop, ctypes.c_void_p).value
 
     def _hook(self) -> None:
         hook = ctypes.c_size_t()
-        self._check(self._library.uc_hook_add(
-            self._handle, ctypes.byref(hook), HOOK_BLOCK, ctypes.c_void_p(cy.on_block.address),
-            ctypes.cast(self.state, ctypes.c_void_p), ctypes.c_uint64(1), ctypes.c_uint64(0),
-        ))  # fmt: skip
+        self._check(
+            self._library.uc_hook_add(
+                self._handle,
+                ctypes.byref(hook),
+                HOOK_BLOCK,
+                ctypes.c_void_p(cy.on_block.address),
+                ctypes.cast(self.state, ctypes.c_void_p),
+                ctypes.c_uint64(1),
+                ctypes.c_uint64(0),
+            )
+        )
 
     def map_ram(self, address: int, size: int) -> None:
         """Memory that can be written and executed."""
         self._unicorn.mem_map(address, size)
 
     def map_device(self, address: int, size: int, read: Read, write: Write) -> None:
-        """Registers: read(offset, size) and write(offset, size, value) are called for every access."""
+        """Registers: read(offset, size) and write(offset, size, value) are called for every
+        access.
+        """
 
         def on_read(_engine: int, offset: int, width: int, _data: int) -> int:
             return read(offset, width) & 0xFFFFFFFF
@@ -98,13 +124,22 @@ class Engine:
 
         calls = (_READ(on_read), _WRITE(on_write))
         self._kept.append(calls)
-        self._check(self._library.uc_mmio_map(
-            self._handle, ctypes.c_uint64(address), ctypes.c_uint64(size),
-            ctypes.cast(calls[0], ctypes.c_void_p), None, ctypes.cast(calls[1], ctypes.c_void_p), None,
-        ))  # fmt: skip
+        self._check(
+            self._library.uc_mmio_map(
+                self._handle,
+                ctypes.c_uint64(address),
+                ctypes.c_uint64(size),
+                ctypes.cast(calls[0], ctypes.c_void_p),
+                None,
+                ctypes.cast(calls[1], ctypes.c_void_p),
+                None,
+            )
+        )
 
     def run(self, pc: int, deadline: int) -> int:
-        """Execute from pc until the clock reaches the deadline, WFI, or a jump to EXC_RETURN; the code of Unicorn."""
+        """Execute from pc until the clock reaches the deadline, WFI, or a jump to EXC_RETURN; the
+        code of Unicorn.
+        """
         state = self.state
         state[cy.DEADLINE], state[cy.STOPPED] = deadline, 0
         return self._start(self._handle, pc | 1, NOWHERE, 0, 0)
@@ -151,20 +186,32 @@ class Engine:
         return int.from_bytes(self._flash_view[address : address + 4], "little")
 
     def read_frame(self, address: int) -> tuple[int, ...]:
-        """Eight words of a stacked exception frame; raises EmulationError when the stack is not in memory."""
-        self._check_stack(self._library.uc_mem_read(self._handle, ctypes.c_uint64(address), self._buffer,
-                                                    ctypes.c_uint64(32)), address)  # fmt: skip
+        """Eight words of a stacked exception frame; raises EmulationError when the stack is not in
+        memory.
+        """
+        self._check_stack(
+            self._library.uc_mem_read(
+                self._handle, ctypes.c_uint64(address), self._buffer, ctypes.c_uint64(32)
+            ),
+            address,
+        )
         return _FRAME.unpack_from(self._buffer)
 
     def write_frame(self, address: int, words: list[int]) -> None:
         """Stack an exception frame; raises EmulationError when the stack is not in memory."""
-        self._check_stack(self._library.uc_mem_write(self._handle, ctypes.c_uint64(address), _FRAME.pack(*words),
-                                                     ctypes.c_uint64(32)), address)  # fmt: skip
+        self._check_stack(
+            self._library.uc_mem_write(
+                self._handle, ctypes.c_uint64(address), _FRAME.pack(*words), ctypes.c_uint64(32)
+            ),
+            address,
+        )
 
     @staticmethod
     def _check_stack(code: int, address: int) -> None:
         if code:
-            raise EmulationError(f"image: stack pointer {address:#010x} is outside of the memory: stack overflow?")
+            raise EmulationError(
+                f"image: stack pointer {address:#010x} is outside of the memory: stack overflow?"
+            )
 
     @staticmethod
     def _check(code: int) -> None:
@@ -179,4 +226,6 @@ class _Registers:
         n = len(ids)
         self.ids = (ctypes.c_int * n)(*ids)
         self.values = (ctypes.c_uint32 * n)()
-        self.pointers = (ctypes.c_void_p * n)(*[ctypes.addressof(self.values) + 4 * i for i in range(n)])
+        self.pointers = (ctypes.c_void_p * n)(
+            *[ctypes.addressof(self.values) + 4 * i for i in range(n)]
+        )

@@ -1,7 +1,9 @@
-"""Interrupt controller, system control block, SysTick and cycle counter: the page at 0xE000E000 and the DWT's.
+"""Interrupt controller, system control block, SysTick and cycle counter: the page at 0xE000E000 and
+the DWT's.
 
-Masks are Python integers, bit n is exception n (16 + interrupt number). A line of a peripheral pends its interrupt as
-long as it is high, also again after the handler's return, as the LPC1768's level lines do.
+Masks are Python integers, bit n is exception n (16 + interrupt number). A line of a peripheral
+pends its interrupt as long as it is high, also again after the handler's return, as the LPC1768's
+level lines do.
 """
 
 from typing import TYPE_CHECKING

@@ -1,7 +1,7 @@
 """SSP: 8-deep FIFOs, every frame takes its time, one of several devices on the bus answers.
 
-A read of SR while a transfer runs is the body of a busy wait; the clock goes on to the moment the answer changes (or to
-the next interrupt), which is what the loop would have waited for.
+A read of SR while a transfer runs is the body of a busy wait; the clock goes on to the moment the
+answer changes (or to the next interrupt), which is what the loop would have waited for.
 """
 
 from collections import deque
@@ -37,7 +37,9 @@ class Ssp:
     def reset(self) -> None:
         """Registers after reset."""
         self._cr0 = self._cr1 = self._cpsr = self._imsc = 0
-        self._done: deque[tuple[int, int]] = deque()  # (clock, value) of frames on the wire or received
+        self._done: deque[tuple[int, int]] = (
+            deque()
+        )  # (clock, value) of frames on the wire or received
         self._overrun = False
         self._settle()
 
@@ -85,7 +87,13 @@ class Ssp:
             return done.popleft()[1] if done and done[0][0] <= self._core.now else 0
         if offset == SR:
             return self._status()
-        values = {CR0: self._cr0, CR1: self._cr1, CPSR: self._cpsr, IMSC: self._imsc, RIS: int(self._overrun) | 8}
+        values = {
+            CR0: self._cr0,
+            CR1: self._cr1,
+            CPSR: self._cpsr,
+            IMSC: self._imsc,
+            RIS: int(self._overrun) | 8,
+        }
         return values.get(offset, 0)
 
     def _status(self) -> int:

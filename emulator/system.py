@@ -1,4 +1,6 @@
-"""System control: PLL, clock dividers, reset cause, watchdog, boot ROM, and registers that only read back."""
+"""System control: PLL, clock dividers, reset cause, watchdog, boot ROM, and registers that only
+read back.
+"""
 
 import struct
 from typing import TYPE_CHECKING
@@ -9,11 +11,22 @@ if TYPE_CHECKING:
 CRYSTAL = 12_000_000  # Hz
 INTERNAL_RC = 4_000_000  # Hz
 POWER_ON, EXTERNAL, WATCHDOG, BROWN_OUT = 1, 2, 4, 8  # RSID
-# Bit positions of the peripheral clock selections, PCLKSEL0 then PCLKSEL1 (UM10360, tables 40 and 41).
+# Bit positions of the peripheral clock selections, PCLKSEL0 then PCLKSEL1 (UM10360, tables 40 and
+# 41).
 PCLK_BITS = {
-    "wdt": 0, "timer0": 2, "timer1": 4, "uart0": 6, "uart1": 8, "ssp1": 20, "adc": 24,
-    "ssp0": 42, "timer2": 44, "timer3": 46, "uart2": 48, "uart3": 50,
-}  # fmt: skip
+    "wdt": 0,
+    "timer0": 2,
+    "timer1": 4,
+    "uart0": 6,
+    "uart1": 8,
+    "ssp1": 20,
+    "adc": 24,
+    "ssp0": 42,
+    "timer2": 44,
+    "timer3": 46,
+    "uart2": 48,
+    "uart3": 50,
+}
 DIVIDERS = (4, 1, 2, 8)
 
 PLL0CON, PLL0CFG, PLL0STAT, PLL0FEED = 0x080, 0x084, 0x088, 0x08C
@@ -42,7 +55,9 @@ class SystemControl:
         control, configuration = self._pll
         source = CRYSTAL if self._registers.get(CLKSRCSEL, 0) & 3 == 1 else INTERNAL_RC
         if control & 3 == 3:
-            source = 2 * source * ((configuration & 0x7FFF) + 1) // ((configuration >> 16 & 0xFF) + 1)
+            source = (
+                2 * source * ((configuration & 0x7FFF) + 1) // ((configuration >> 16 & 0xFF) + 1)
+            )
         return source // (self._registers.get(CCLKCFG, 0) + 1)
 
     def divider(self, peripheral: str) -> int:
@@ -76,7 +91,9 @@ class SystemControl:
 
 
 class Watchdog:
-    """0x40000000. It resets when it is not fed; it runs on the internal RC oscillator or the peripheral clock."""
+    """0x40000000. It resets when it is not fed; it runs on the internal RC oscillator or the
+    peripheral clock.
+    """
 
     def __init__(self, core: "Core", system: SystemControl) -> None:
         self._core, self._system = core, system
@@ -155,14 +172,18 @@ class BackupRegisters(Registers):
 
 
 class BootRom:
-    """IAP of the boot ROM: the part number and serial number commands; all others answer INVALID_COMMAND.
+    """IAP of the boot ROM: the part number and serial number commands; all others answer
+    INVALID_COMMAND.
 
-    `code` is what stands at the entry: it hands r0 and r1 to two registers of this model and returns.
+    `code` is what stands at the entry: it hands r0 and r1 to two registers of this model and
+    returns.
     """
 
     ENTRY = 0x1FFF1FF0
     MAILBOX = 0xF0000000
-    code = bytes.fromhex("4ff07042106051607047")  # mov.w r2,#0xF0000000; str r0,[r2]; str r1,[r2,#4]; bx lr
+    code = bytes.fromhex(
+        "4ff07042106051607047"
+    )  # mov.w r2,#0xF0000000; str r0,[r2]; str r1,[r2,#4]; bx lr
 
     def __init__(self, core: "Core", uid: bytes) -> None:
         self._core, self._uid, self._command = core, uid.ljust(16, b"\0")[:16], 0

@@ -12,7 +12,9 @@ IR, TCR, TC, PR, PC, MCR, MR0, CCR, CR0 = 0x00, 0x04, 0x08, 0x0C, 0x10, 0x14, 0x
 
 
 class Timer:
-    """32 bits; the count is computed from the clock, and only a match that does something is an event."""
+    """32 bits; the count is computed from the clock, and only a match that does something is an
+    event.
+    """
 
     def __init__(self, core: "Core", system: "SystemControl", name: str, irq: int) -> None:
         self._core, self._system, self._name, self._irq = core, system, name, irq
@@ -86,7 +88,9 @@ class Timer:
             return self._match[(offset - MR0) // 4]
         if CR0 <= offset < CR0 + 16:
             return self._capture[(offset - CR0) // 4]
-        return {IR: self._ir, TCR: self._tcr, PR: self._pr, MCR: self._mcr, CCR: self._ccr}.get(offset, 0)
+        return {IR: self._ir, TCR: self._tcr, PR: self._pr, MCR: self._mcr, CCR: self._ccr}.get(
+            offset, 0
+        )
 
     def write(self, offset: int, size: int, value: int) -> None:
         """A register."""
@@ -116,7 +120,9 @@ class Timer:
 
 
 class Gpio:
-    """Five ports. Outputs call `changed(port, old, new)`; inputs are what `inputs[port]` says, pulled up by default."""
+    """Five ports. Outputs call `changed(port, old, new)`; inputs are what `inputs[port]` says,
+    pulled up by default.
+    """
 
     FIODIR, FIOMASK, FIOPIN, FIOSET, FIOCLR = 0x00, 0x10, 0x14, 0x18, 0x1C
 
@@ -212,7 +218,9 @@ class Adc:
         if chosen and self._cr & 1 << 21 and (self._cr & 1 << 16 or self._cr >> 24 & 7 == 1):
             later = [k for k in chosen if k >= self._next]
             channel = (later or chosen)[0]
-            self._event = self._core.schedule(self._core.now + self._clocks(), lambda: self._converted(channel))
+            self._event = self._core.schedule(
+                self._core.now + self._clocks(), lambda: self._converted(channel)
+            )
 
     def _converted(self, channel: int) -> None:
         self._event = None

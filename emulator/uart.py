@@ -1,7 +1,8 @@
-"""A 16550 as in the LPC1768: 16-byte FIFOs, time per byte from the divisor, four kinds of interrupt.
+"""A 16550 as in the LPC1768: 16-byte FIFOs, time per byte from the divisor, four kinds of
+interrupt.
 
-Enabling the transmit interrupt while the FIFO is empty does not raise it (UM10360 14.4.4: it follows a byte that has
-left), so a driver must write the first bytes itself.
+Enabling the transmit interrupt while the FIFO is empty does not raise it (UM10360 14.4.4: it
+follows a byte that has left), so a driver must write the first bytes itself.
 """
 
 from collections import deque
@@ -38,7 +39,9 @@ class Uart:
         self._ier = self._fcr = self._lcr = 0
         self._dll, self._dlm, self._fdr = 1, 0, 0x10
         self._step_of, self._step = -1, 0  # byte_clocks as computed for this version of the clocks
-        self._leaving: deque[tuple[int, int]] = deque()  # (clock at which its stop bit has left, byte)
+        self._leaving: deque[tuple[int, int]] = (
+            deque()
+        )  # (clock at which its stop bit has left, byte)
         for event in (self._empty_event, self._timeout_event):
             if event is not None:
                 event.cancelled = True
@@ -68,7 +71,9 @@ class Uart:
     def baud(self) -> float:
         """Bits per second now."""
         return (
-            self._system.cclk * (7 + (self._lcr & 3) + (self._lcr >> 2 & 1) + (self._lcr >> 3 & 1)) / self.byte_clocks
+            self._system.cclk
+            * (7 + (self._lcr & 3) + (self._lcr >> 2 & 1) + (self._lcr >> 3 & 1))
+            / self.byte_clocks
         )
 
     def hold(self, clocks: int) -> None:
@@ -97,7 +102,9 @@ class Uart:
     def _arrive(self) -> None:
         byte = self._to_come.popleft()
         now = self._core.now
-        self._arrival = self._core.schedule(now + self.byte_clocks, self._arrive) if self._to_come else None
+        self._arrival = (
+            self._core.schedule(now + self.byte_clocks, self._arrive) if self._to_come else None
+        )
         if len(self._received) >= (DEPTH if self._fcr & 1 else 1):
             self._overrun = True
             self.overruns += 1
@@ -131,7 +138,8 @@ class Uart:
         step = self.byte_clocks
         begin = max(now, self._held_until, self._leaving[-1][0] if self._leaving else 0)
         self._leaving.append((begin + step, byte))
-        # The FIFO is empty when its last byte enters the shift register, a byte's time before that one has left.
+        # The FIFO is empty when its last byte enters the shift register, a byte's time before that
+        # one has left.
         self._empty_at = max(begin, now + 1)
         if self._empty_event is None:
             self._empty_event = self._core.schedule(self._empty_at, self._empty)

@@ -1,1 +1,1 @@
-"""Samples become motion: pure maths modules, one per subject, and one service shell."""
+"""The service: samples from the bus become motion on the bus. The mathematics is in inertial/."""

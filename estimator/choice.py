@@ -1,12 +1,14 @@
-"""Names and files of the settings become estimators, layouts and calibration cards; a wrong one is refused by name."""
+"""Names and files of the settings become estimators, layouts and calibration cards; a wrong one is
+refused by name.
+"""
 
 import math
 from pathlib import Path
 from typing import Any
 
-from estimator.calibration.card import Card, CardError, read_card
-from estimator.rate.beliefs import Beliefs
 from estimator.settings import EstimatorSettings, LayoutSettings
+from inertial.calibration.card import Card, CardError, read_card
+from inertial.rate.beliefs import Beliefs
 
 
 class UnknownEstimator(ValueError):
@@ -15,7 +17,9 @@ class UnknownEstimator(ValueError):
 
 def rate_estimators() -> dict[str, Any]:
     """The table of rate estimators."""
-    from estimator.rate.estimators import VARIANTS  # here: the tables of names need not load with the settings
+    from inertial.rate.estimators import (
+        VARIANTS,
+    )  # here: the tables of names need not load with the settings
 
     return VARIANTS
 
@@ -24,7 +28,9 @@ def check_names(key: str, names: list[str], known: dict[str, Any]) -> None:
     """Raises UnknownEstimator with the known names."""
     for name in names:
         if name not in known:
-            raise UnknownEstimator(f"[estimator] {key}: no estimator {name!r}; want some of {', '.join(known)}")
+            raise UnknownEstimator(
+                f"[estimator] {key}: no estimator {name!r}; want some of {', '.join(known)}"
+            )
 
 
 def beliefs(settings: EstimatorSettings) -> Beliefs:
@@ -43,7 +49,7 @@ def load_card(path: Path) -> Card:
 
 def make_layout(settings: LayoutSettings) -> Any:
     """Accelerometer layout from its settings; raises UnknownEstimator for a file that is none."""
-    from estimator.layouts import catalogue, layout
+    from inertial.layouts import catalogue, layout
 
     try:
         return catalogue.find(settings.file or settings.kind, settings.half_side_m)

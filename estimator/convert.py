@@ -1,4 +1,6 @@
-"""Bus messages to arrays and states to bus messages. With service.py the only file here that knows messages."""
+"""Bus messages to arrays and states to bus messages. With service.py the only file here that knows
+messages.
+"""
 
 import math
 from collections.abc import Iterable
@@ -9,12 +11,19 @@ import numpy as np
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from numpy.typing import NDArray
 
-from estimator.ins.fix import Fix, typical_sigma
-from estimator.ins.fuzzy import MEMBERSHIPS, memberships
-from estimator.ins.solution import HEADING, INNOVATIONS, Correction, HorizonChoice, Mode, Solution
-from estimator.rate.samples import finite
 from estimator.stream import Stream
-from messages import gyrofree_pb2 as pb
+from inertial.navigation.fix import Fix, typical_sigma
+from inertial.navigation.fuzzy import MEMBERSHIPS, memberships
+from inertial.navigation.solution import (
+    HEADING,
+    INNOVATIONS,
+    Correction,
+    HorizonChoice,
+    Mode,
+    Solution,
+)
+from inertial.rate.samples import finite
+from messages.contract import gyrofree_pb2 as pb
 
 Array = NDArray[np.float64]
 
@@ -39,7 +48,9 @@ class Samples:
     values: Array  # (n, columns)
 
 
-def _rows(what: str, header: pb.Header, values: Iterable[float], columns: int, period_s: float) -> Samples:
+def _rows(
+    what: str, header: pb.Header, values: Iterable[float], columns: int, period_s: float
+) -> Samples:
     flat = np.array(values, dtype=np.float64)
     problem = ""
     if columns < 1 or flat.size == 0 or flat.size % columns:
@@ -65,8 +76,8 @@ def imu_samples(batch: pb.ImuBatch) -> tuple[Samples, Array]:
     rate = _rows("imu rate", batch.header, batch.omega_ib_b_radps, 3, batch.period_s)
     if len(force.values) != len(rate.values):
         raise BadMessage(
-            f"imu {batch.header.sequence} of {batch.header.device}: {len(force.values)} rows of specific force, "
-            f"{len(rate.values)} of rate"
+            f"imu {batch.header.sequence} of {batch.header.device}: {len(force.values)} rows of"
+            f" specific force, {len(rate.values)} of rate"
         )
     return force, rate.values
 
@@ -78,15 +89,25 @@ def adc_samples(batch: pb.AdcBatch) -> Samples:
 
 
 def fix_of(message: pb.GnssFix, every: int, clock_offset_s: float) -> Fix:
-    """A fix on the board's clock; all but each every-th, by header.sequence, are withheld. Raises BadMessage.
+    """A fix on the board's clock; all but each every-th, by header.sequence, are withheld. Raises
+    BadMessage.
 
-    Its time is device_time_s where the board measured it, else its arrival. A receiver on a port of its own has no
-    device time at all: then UTC minus clock_offset_s (UTC - board's clock, s) stands for it.
+    Its time is device_time_s where the board measured it, else its arrival. A receiver on a port of
+    its own has no device time at all: then UTC minus clock_offset_s (UTC - board's clock, s) stands
+    for it.
     """
     header = message.header
-    arrival = header.device_us * MICRO if header.device_us else header.utc_ns * 1e-9 - clock_offset_s
+    arrival = (
+        header.device_us * MICRO if header.device_us else header.utc_ns * 1e-9 - clock_offset_s
+    )
     position, velocity = typical_sigma(message.quality)
-    numbers = (message.latitude_deg, message.longitude_deg, message.height_m, arrival, message.device_time_s)
+    numbers = (
+        message.latitude_deg,
+        message.longitude_deg,
+        message.height_m,
+        arrival,
+        message.device_time_s,
+    )
     if not all(map(math.isfinite, numbers)) or abs(message.latitude_deg) >= 90.0:
         raise BadMessage(f"gnss {header.sequence} of {header.device}: not a position: {numbers}")
     v_n = np.array(message.v_n_mps) if len(message.v_n_mps) == 3 else None
@@ -130,14 +151,20 @@ def moment(device_us: int, utc_ns: int, offset_s: float) -> tuple[int, int]:
 
 
 def tacho_report(message: pb.TachoRate) -> tuple[float, float, float, bool]:
-    """Time (s, board's clock), rate, sigma (rad/s), and whether the sign is known; raises BadMessage."""
+    """Time (s, board's clock), rate, sigma (rad/s), and whether the sign is known; raises
+    BadMessage.
+    """
     t_s, rate, sigma = message.header.device_us * 1e-6, message.omega_radps, message.sigma_radps
     if not (math.isfinite(rate) and math.isfinite(sigma) and sigma > 0.0):
-        raise BadMessage(f"tacho of {message.header.device}: {rate} rad/s with sigma {sigma} rad/s: want numbers")
+        raise BadMessage(
+            f"tacho of {message.header.device}: {rate} rad/s with sigma {sigma} rad/s: want numbers"
+        )
     return t_s, rate, sigma, message.direction_known
 
 
-def attitude_message(header: pb.Header, batch: pb.ImuBatch, index: int, name: str, state: Any) -> pb.AttitudeEstimate:
+def attitude_message(
+    header: pb.Header, batch: pb.ImuBatch, index: int, name: str, state: Any
+) -> pb.AttitudeEstimate:
     """AttitudeState as published; no filter of that kind knows north."""
     return pb.AttitudeEstimate(
         header=header,
@@ -152,7 +179,9 @@ def attitude_message(header: pb.Header, batch: pb.ImuBatch, index: int, name: st
     )
 
 
-def status_message(header: pb.Header, stream: Stream, name: str, us: float, version: str) -> pb.EstimatorStatus:
+def status_message(
+    header: pb.Header, stream: Stream, name: str, us: float, version: str
+) -> pb.EstimatorStatus:
     """Health of one estimator, without its state; us: measured time per sample."""
     return pb.EstimatorStatus(
         header=header,
@@ -168,7 +197,9 @@ def status_message(header: pb.Header, stream: Stream, name: str, us: float, vers
 def navigator_state(status: pb.EstimatorStatus, navigator: Any) -> pb.EstimatorStatus:
     """The status with what a navigator does and has counted."""
     status.state = STATES[navigator.mode]
-    status.message = ", ".join(f"fixes {what} {count}" for what, count in navigator.counts.items() if count)
+    status.message = ", ".join(
+        f"fixes {what} {count}" for what, count in navigator.counts.items() if count
+    )
     return status
 
 
@@ -182,9 +213,13 @@ def rate_state(status: pb.EstimatorStatus, state: Any) -> pb.EstimatorStatus:
     return status
 
 
-def pose_message(header: pb.Header, name: str, p_n_m: Iterable[float], q_nb: Iterable[float]) -> FrameTransform:
+def pose_message(
+    header: pb.Header, name: str, p_n_m: Iterable[float], q_nb: Iterable[float]
+) -> FrameTransform:
     """Body against n as any viewer draws it: parent <device>/n, child <device>/<estimator>."""
-    message = FrameTransform(parent_frame_id=f"{header.device}/n", child_frame_id=f"{header.device}/{name}")
+    message = FrameTransform(
+        parent_frame_id=f"{header.device}/n", child_frame_id=f"{header.device}/{name}"
+    )
     message.timestamp.seconds, message.timestamp.nanos = divmod(header.utc_ns, 10**9)
     t, q = message.translation, message.rotation
     t.x, t.y, t.z = map(float, p_n_m)
@@ -193,7 +228,12 @@ def pose_message(header: pb.Header, name: str, p_n_m: Iterable[float], q_nb: Ite
 
 
 def nav_message(
-    header: pb.Header, batch: pb.ImuBatch | pb.AccelBatch, index: int, name: str, s: Solution, muted: bool = False
+    header: pb.Header,
+    batch: pb.ImuBatch | pb.AccelBatch,
+    index: int,
+    name: str,
+    s: Solution,
+    muted: bool = False,
 ) -> pb.NavSolution:
     """Solution as published."""
     return pb.NavSolution(

@@ -1,9 +1,12 @@
-"""The pipeline on the bus: every sample in its order, also those that the bus lost, and on after a crash as before it.
+"""The pipeline on the bus: every sample in its order, also those that the bus lost, and on after a
+crash as before it.
 
-Gaps of a device's inputs are filled from what its gateway kept (messages/mending.py) before the pipeline sees what
-came after them. With a journal folder, what is published is kept too, and the pipeline's whole state is saved every
-SAVE_S: after a crash it goes on from there, the gateway gives again what came since, and, because the pipeline is
-deterministic, what had been published already comes out again under the same numbers and is not published twice.
+Gaps of a device's inputs are filled from what its gateway kept (messages/history/mending.py) before
+the pipeline sees what came after them. With a journal folder, what is published is kept too, and
+the pipeline's whole state is saved every
+SAVE_S: after a crash it goes on from there, the gateway gives again what came since, and, because
+the pipeline is deterministic, what had been published already comes out again under the same
+numbers and is not published twice.
 """
 
 import hashlib
@@ -20,22 +23,24 @@ from typing import Any
 
 from google.protobuf.message import DecodeError
 
+import inertial
 from estimator import convert
 from estimator.service import Output, Pipeline
 from estimator.settings import EstimatorSettings
 from estimator.stream import worth_a_line
 from estimator.warm import warm
-from messages import gyrofree_pb2 as pb
-from messages.bus import BusSettings, BusUnavailable, Publishers, decode, open_client
-from messages.history import Asker, declare
-from messages.journal import JournalBusy
-from messages.mending import Arrival, Mender, Question
-from messages.spool import Spool
-from messages.topics import ESTIMATES, PIPELINE_INPUTS, REPLAY_SUFFIX, TopicError, parse
+from messages.bus.session import BusSettings, BusUnavailable, Publishers, decode, open_client
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import ESTIMATES, PIPELINE_INPUTS, REPLAY_SUFFIX, TopicError, parse
+from messages.history.answers import Asker, declare
+from messages.history.journal import JournalBusy
+from messages.history.mending import Arrival, Mender, Question
+from messages.history.spool import Spool
 
 log = logging.getLogger(__name__)
 
-BACKLOG = 20_000  # messages; more than a minute of a full-rate board, then the newest are dropped and asked for again
+# messages; more than a minute of a full-rate board, then the newest are dropped and asked for again
+BACKLOG = 20_000
 SAVE_S = 2.0
 RESUME_S = 600.0  # an older state is of another measurement
 END_S = 3.0  # for what is queued when the service is to end
@@ -61,9 +66,13 @@ class Worker:
         ask: Callable[[Question], None] | None = None,
         save: Callable[["Worker"], None] | None = None,
     ) -> None:
-        """`ask` puts a question to a gateway, its answer comes through `answered`; `save` keeps the state."""
+        """`ask` puts a question to a gateway, its answer comes through `answered`; `save` keeps the
+        state.
+        """
         self.pipeline = pipeline
-        self.mender = Mender(ask or (lambda question: self.answered(question, None)), topics=PIPELINE_INPUTS)
+        self.mender = Mender(
+            ask or (lambda question: self.answered(question, None)), topics=PIPELINE_INPUTS
+        )
         self._put, self._save = put, save
         self._queue: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._bad = self._dropped = 0
@@ -75,7 +84,9 @@ class Worker:
         if self._queue.qsize() >= BACKLOG:
             self._dropped += 1
             if worth_a_line(self._dropped):
-                log.error("%d messages waiting: too slow, %d dropped so far", BACKLOG, self._dropped)
+                log.error(
+                    "%d messages waiting: too slow, %d dropped so far", BACKLOG, self._dropped
+                )
             return
         self._queue.put(arrival)
 
@@ -92,17 +103,25 @@ class Worker:
         self._queue.put(None)
 
     def work(self, stop: threading.Event) -> None:
-        """The worker: until finish(). An unexpected error sets `stop`: run() raises it, the supervisor starts anew."""
+        """The worker: until finish(). An unexpected error sets `stop`: run() raises it, the
+        supervisor starts anew.
+        """
         try:
             while (item := self._queue.get()) is not None:
                 if isinstance(item, Order):
                     reply, outputs = self.pipeline.order(item.command)
                     for output in outputs:
                         self._put(output)
-                    self._keep(at_once=True)  # before the answer: what was answered survives a crash
+                    self._keep(
+                        at_once=True
+                    )  # before the answer: what was answered survives a crash
                     item.answer(reply)
                     continue
-                ready = self.mender.take(item) if isinstance(item, Arrival) else self.mender.answer(*item)
+                ready = (
+                    self.mender.take(item)
+                    if isinstance(item, Arrival)
+                    else self.mender.answer(*item)
+                )
                 for arrival in ready:
                     self._handle(arrival)
                 self._keep()
@@ -111,7 +130,9 @@ class Worker:
             stop.set()
 
     def _keep(self, at_once: bool = False) -> None:
-        """Save the state when it is time; while a gap is being filled that waits. An order stands in no input."""
+        """Save the state when it is time; while a gap is being filled that waits. An order stands
+        in no input.
+        """
         if at_once:
             self._save_at = 0.0
         if self._save is not None and time.monotonic() >= self._save_at and not self.mender.asking:
@@ -134,25 +155,37 @@ class Worker:
 
 
 class SavedState:
-    """The pipeline between two inputs, with what it had taken and published by then, as one file."""
+    """The pipeline between two inputs, with what it had taken and published by then, as one
+    file.
+    """
 
     def __init__(self, folder: Path, settings: EstimatorSettings, version: str) -> None:
         self._path = folder / STATE
-        self._mark = hashlib.sha256(f"{version} {settings!r}".encode()).hexdigest()  # of another setup it is of no use
+        self._mark = hashlib.sha256(
+            f"{version} {settings!r}".encode()
+        ).hexdigest()  # of another setup it is of no use
         self._broken = False
 
     def save(self, worker: Worker, publishers: Publishers) -> None:
-        """Replace the file; a state that cannot be saved is said once, and costs the resumption only."""
+        """Replace the file; a state that cannot be saved is said once, and costs the resumption
+        only.
+        """
         if self._broken or worker.mender.asking:
             return
         try:
-            data = pickle.dumps((self._mark, worker.pipeline, worker.mender.taken(), publishers.sequences()))
+            data = pickle.dumps(
+                (self._mark, worker.pipeline, worker.mender.taken(), publishers.sequences())
+            )
             new = self._path.with_suffix(".new")
             new.write_bytes(data)
             os.replace(new, self._path)
         except Exception as error:  # whatever stands in an estimator's state: estimating goes on
             self._broken = True
-            log.warning("%s: the state cannot be saved (%s): after a crash estimates begin anew", self._path, error)
+            log.warning(
+                "%s: the state cannot be saved (%s): after a crash estimates begin anew",
+                self._path,
+                error,
+            )
 
     def load(self) -> tuple[Pipeline, dict, dict] | None:
         """What was saved last; None when there is nothing that can be gone on with."""
@@ -190,25 +223,37 @@ def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) ->
         worker = _worker(pipeline, publishers, asker, saved)
         thread = threading.Thread(target=worker.work, args=(stop,), name="estimator", daemon=True)
         thread.start()
-        answering = [declare(session, bus.prefix, "*", ESTIMATES, spool)] if spool is not None else []
-        # One subscriber for all topics: each has a thread of its own, and a fix must not overtake its samples.
+        answering = (
+            [declare(session, bus.prefix, "*", ESTIMATES, spool)] if spool is not None else []
+        )
+        # One subscriber for all topics: each has a thread of its own, and a fix must not overtake
+        # its samples.
         subscriber = session.declare_subscriber(f"{bus.prefix}/*/*", _on(worker))
         key = f"{bus.prefix}/*/{CONTROL}"
         orders = session.declare_queryable(key, lambda query: take_order(query, worker))
-        log.info("estimating: rate %s; navigation %s", ", ".join(settings.rate), ", ".join(settings.navigators))
+        log.info(
+            "estimating: rate %s; navigation %s",
+            ", ".join(settings.rate),
+            ", ".join(settings.navigators),
+        )
         stop.wait()
         subscriber.undeclare()
         orders.undeclare()
         worker.finish()
         thread.join(timeout=END_S)
-        behind = thread.is_alive()  # the next start goes on from the saved state, and this one's words go nowhere
+        behind = (
+            thread.is_alive()
+        )  # the next start goes on from the saved state, and this one's words go nowhere
         for queryable in answering:
             queryable.undeclare()
         asker.close()
     if spool is not None:
         spool.close()
     if behind:
-        log.warning("ended while samples waited%s", ": the next start takes them up" if saved is not None else "")
+        log.warning(
+            "ended while samples waited%s",
+            ": the next start takes them up" if saved is not None else "",
+        )
         return
     if worker.failure is not None:
         raise worker.failure
@@ -216,7 +261,9 @@ def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) ->
         saved.forget()
 
 
-def _worker(pipeline: Pipeline, publishers: Publishers, asker: Asker, saved: SavedState | None) -> Worker:
+def _worker(
+    pipeline: Pipeline, publishers: Publishers, asker: Asker, saved: SavedState | None
+) -> Worker:
     """A worker that goes on from the saved state when there is one."""
     found = saved.load() if saved is not None else None
     publishers.resume()
@@ -251,15 +298,20 @@ def _open_spool(settings: EstimatorSettings) -> Spool | None:
 
 
 def _version() -> str:
-    """Of everything a saved state depends on: the package's sources, so that a changed one begins anew."""
+    """Of everything a saved state depends on: the package's sources, so that a changed one begins
+    anew.
+    """
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
+    rooms = (Path(__file__).parent, Path(inertial.__file__).parent)
+    for path in sorted(p for room in rooms for p in room.rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
 def take_order(query: Any, worker: Worker) -> None:
-    """An EstimatorCommand on <prefix>/<device>/estimator-control; the Reply follows when it has been done."""
+    """An EstimatorCommand on <prefix>/<device>/estimator-control; the Reply follows when it has
+    been done.
+    """
     command, key = pb.EstimatorCommand(), str(query.key_expr)
     try:
         command.ParseFromString(query.payload.to_bytes() if query.payload else b"")
@@ -282,6 +334,8 @@ def _on(worker: Worker) -> Callable[[Any], None]:
         # a replay makes its own estimates
         if address.topic in PIPELINE_INPUTS and not address.device.endswith(REPLAY_SUFFIX):
             payload = sample.payload.to_bytes()
-            worker.offer(Arrival(address.topic, address.device, address.estimator, payload, time.time_ns()))
+            worker.offer(
+                Arrival(address.topic, address.device, address.estimator, payload, time.time_ns())
+            )
 
     return on_sample

@@ -1,7 +1,8 @@
 """Arrays into the repeated double fields of a protobuf message, all at once.
 
-A list for each field costs more than the filter that filled the arrays. In wire format such a field is its tag, its
-length and the numbers as they stand in memory, so that bytes are put together and parsed.
+A list for each field costs more than the filter that filled the arrays. In wire format such a field
+is its tag, its length and the numbers as they stand in memory, so that bytes are put together and
+parsed.
 """
 
 import sys
@@ -11,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from estimator.rate.direct import Direct
+from inertial.rate.direct import Direct
 
 Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
@@ -45,7 +46,9 @@ class Doubles:
     """Repeated double fields of one kind of message, filled from arrays of float64."""
 
     def __init__(self, kind: Any, *fields: str) -> None:
-        """kind: the message class. Raises KeyError for a field it does not have, TypeError for one of another type."""
+        """kind: the message class. Raises KeyError for a field it does not have, TypeError for one
+        of another type.
+        """
         self._heads = []
         for name in fields:
             field = kind.DESCRIPTOR.fields_by_name[name]
@@ -54,7 +57,9 @@ class Doubles:
             self._heads.append(_Head(field.number))
 
     def wire(self, *arrays: Array) -> bytes:
-        """Bytes that a message parses (MergeFromString), an array for each field, row-major; empty ones left out."""
+        """Bytes that a message parses (MergeFromString), an array for each field, row-major; empty
+        ones left out.
+        """
         parts = []
         for head, array in zip(self._heads, arrays, strict=True):
             data = array.tobytes()
@@ -64,7 +69,9 @@ class Doubles:
 
 
 class RowFields:
-    """Double fields of one kind of message, copied from rows of float64 that hold them side by side."""
+    """Double fields of one kind of message, copied from rows of float64 that hold them side by
+    side.
+    """
 
     def __init__(self, kind: Any, **columns: tuple[int, int]) -> None:
         """By field: its first column and how many it takes. Raises as Doubles does."""
@@ -81,7 +88,9 @@ class RowFields:
         self._template, self._moves = np.frombuffer(bytes(template), np.uint8), np.array(moves)
 
     def wire(self, rows: Array) -> bytes:
-        """Rows (n, columns) as n pieces of `size` bytes, each of which a message parses (MergeFromString)."""
+        """Rows (n, columns) as n pieces of `size` bytes, each of which a message parses
+        (MergeFromString).
+        """
         out = np.empty((len(rows), self.size), np.uint8)
         _fill(rows.view(np.uint8), self._moves, self._template, out)
         return out.tobytes()
@@ -100,4 +109,6 @@ def _copy(rows: Bytes, moves: NDArray[np.int64], template: Bytes, out: Bytes) ->
 _fill = Direct(_copy)
 
 if sys.byteorder != "little":
-    raise ImportError("estimator.packed copies numbers as they stand in memory, which must be little-endian")
+    raise ImportError(
+        "estimator.packed copies numbers as they stand in memory, which must be little-endian"
+    )

@@ -1,8 +1,8 @@
 """The estimator process: samples in, motion out. A shell; the thinking is in the modules beside it.
 
-Pipeline is the whole service without the bus: what it returns is a function of the messages given to it, in their
-order, and of nothing else, so that a recording sent through it again gives the same bytes. Only EstimatorStatus
-carries a measured duration and is left out of such a comparison.
+Pipeline is the whole service without the bus: what it returns is a function of the messages given
+to it, in their order, and of nothing else, so that a recording sent through it again gives the same
+bytes. Only EstimatorStatus carries a measured duration and is left out of such a comparison.
 """
 
 import logging
@@ -15,25 +15,33 @@ from typing import Any, NamedTuple
 import numpy as np
 from google.protobuf.message import Message
 
-from estimator import convert, wiring_orders
-from estimator.attitude.axis_map import MapError
-from estimator.attitude.board import AttitudeBoard
-from estimator.attitude.filters import ATTITUDES
-from estimator.calibration.card import CardError
-from estimator.choice import UnknownEstimator, beliefs, check_names, load_card, make_layout, rate_estimators
+from estimator import convert
+from estimator.choice import (
+    UnknownEstimator,
+    beliefs,
+    check_names,
+    load_card,
+    make_layout,
+    rate_estimators,
+)
 from estimator.cost import Cost
-from estimator.ins.board import NavBoard, NavOutput
-from estimator.ins.gyro_free import GyroFreeNavigation
-from estimator.ins.navigation import NAVIGATORS, Correction, NavigatorConfig
-from estimator.mute_orders import MuteDesk
-from estimator.orders import CalibrationDesk
-from estimator.rate.board import RateBoard, RateOutput, WrongAxes
+from estimator.devices.attitude import AttitudeBoard
+from estimator.devices.gyro_free import GyroFreeNavigation
+from estimator.devices.navigation import NavBoard, NavOutput
+from estimator.devices.rate import RateBoard, RateOutput, WrongAxes
+from estimator.orders import wiring as wiring_orders
+from estimator.orders.calibration import CalibrationDesk
+from estimator.orders.mute import MuteDesk
 from estimator.rate_messages import BoardMessages, RateMessages
 from estimator.settings import EstimatorSettings
 from estimator.stream import Stream, every
-from messages import gyrofree_pb2 as pb
-from messages.bus import BusSettings
-from messages.topics import (
+from inertial.attitude.axis_map import MapError
+from inertial.attitude.filters import ATTITUDES
+from inertial.calibration.card import CardError
+from inertial.navigation.navigation import NAVIGATORS, Correction, NavigatorConfig
+from messages.bus.session import BusSettings
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import (
     ATTITUDE,
     AXES,
     CALIBRATION,
@@ -70,7 +78,9 @@ class Output(NamedTuple):
 class Pipeline:
     """All estimators of all devices."""
 
-    def __init__(self, settings: EstimatorSettings, clock: Callable[[], int] = time.perf_counter_ns) -> None:
+    def __init__(
+        self, settings: EstimatorSettings, clock: Callable[[], int] = time.perf_counter_ns
+    ) -> None:
         """`clock` (ns) measures the cost per sample for EstimatorStatus and touches nothing else.
 
         Raises UnknownEstimator for settings that name one that does not exist.
@@ -102,11 +112,17 @@ class Pipeline:
 
     def on(self, topic: Topic, message: Message) -> list[Output]:
         """Take one message of any topic; raises convert.BadMessage for one that cannot be used."""
-        handler = getattr(self, f"on_{topic.name}") if topic in PIPELINE_INPUTS or topic in PIPELINE_ORDERS else None
+        handler = (
+            getattr(self, f"on_{topic.name}")
+            if topic in PIPELINE_INPUTS or topic in PIPELINE_ORDERS
+            else None
+        )
         return handler(message) if handler else []
 
     def order(self, command: pb.EstimatorCommand) -> tuple[pb.Reply, list[Output]]:
-        """Do what a person asked the estimator of a device for; never raises for an order that cannot be followed."""
+        """Do what a person asked the estimator of a device for; never raises for an order that
+        cannot be followed.
+        """
         if command.action == pb.EstimatorCommand.ACTION_MUTE_GNSS:
             offset = self._clock_offset.get(command.device, 0.0)
             reply, mute = self._mutes.order(command, self._navigating(command.device), offset)
@@ -115,7 +131,10 @@ class Pipeline:
             return self._wire(command)
         device, before = command.device, self._desk.used.get(command.device)
         reply, status = self._desk.order(command, make_layout(self._settings.layout_of(device)))
-        if self._desk.used.get(device) is not before or command.action == pb.EstimatorCommand.ACTION_USE_CARD:
+        if (
+            self._desk.used.get(device) is not before
+            or command.action == pb.EstimatorCommand.ACTION_USE_CARD
+        ):
             self._boards.pop(device, None)  # the estimators begin anew with the other card
         return reply, [] if status is None else [Output(CALIBRATION, device, "", status)]
 
@@ -135,7 +154,10 @@ class Pipeline:
     def on_tacho(self, message: pb.TachoRate) -> list[Output]:
         """A report of the tachometer: table runs of a guided calibration need it."""
         self._desk.tacho(message)
-        if self._settings.tacho_aid and (board := self._boards.get(message.header.device)) is not None:
+        if (
+            self._settings.tacho_aid
+            and (board := self._boards.get(message.header.device)) is not None
+        ):
             board.tacho(*convert.tacho_report(message))
         return []
 
@@ -150,18 +172,28 @@ class Pipeline:
         started = self._clock()
         try:
             states = board.feed(
-                batch.header.epoch, batch.first_index, batch.period_s, samples.t_s, samples.values, batch.stale_mask
+                batch.header.epoch,
+                batch.first_index,
+                batch.period_s,
+                samples.t_s,
+                samples.values,
+                batch.stale_mask,
             )
         except WrongAxes as error:
             raise convert.BadMessage(str(error)) from None
         self._cost.add(device, self._clock() - started, len(samples.t_s))
         out = self._estimates(batch, board, states)
         last_s = float(samples.t_s[-1])
-        axes_due, due = self._new_second(device, "axes", AXES.rate * last_s), self._new_second(device, "accel", last_s)
+        axes_due, due = (
+            self._new_second(device, "axes", AXES.rate * last_s),
+            self._new_second(device, "accel", last_s),
+        )
         if axes_due or due:
             header = convert.sample_header(batch.header, (len(samples.t_s) - 1) * batch.period_s)
         if axes_due:
-            out.append(Output(AXES, device, "", self._messages[device].axes(header, board.health, last_s)))
+            out.append(
+                Output(AXES, device, "", self._messages[device].axes(header, board.health, last_s))
+            )
         if due:
             for name in self._settings.rate:
                 out.append(Output(ESTIMATOR, device, name, self._rate_status(header, board, name)))
@@ -175,7 +207,9 @@ class Pipeline:
             out += self._navigated(batch, samples, navigation.board, said, navigation.names)
         return out
 
-    def _estimates(self, batch: pb.AccelBatch, board: RateBoard, states: list[RateOutput]) -> list[Output]:
+    def _estimates(
+        self, batch: pb.AccelBatch, board: RateBoard, states: list[RateOutput]
+    ) -> list[Output]:
         """States as messages, and poses now and then."""
         device, step, out = board.device, every(batch.period_s, POSE_HZ), []
         shared = self._messages[device]
@@ -188,7 +222,9 @@ class Pipeline:
         return out
 
     def _board(self, device: str) -> RateBoard:
-        """Rate estimators of a device, with its calibration card; raises convert.BadMessage for another layout's."""
+        """Rate estimators of a device, with its calibration card; raises convert.BadMessage for
+        another layout's.
+        """
         s, path = self._settings, self._settings.card_of(device)
         card = self._desk.used.get(device, load_card(path) if path is not None else None)
         layout = make_layout(s.layout_of(device))
@@ -198,7 +234,9 @@ class Pipeline:
             raise convert.BadMessage(f"{device}: {error}") from None
 
     def on_imu(self, batch: pb.ImuBatch) -> list[Output]:
-        """What the filters make of a batch, by the axis map in use; a map of the converter's inputs leaves it out."""
+        """What the filters make of a batch, by the axis map in use; a map of the converter's inputs
+        leaves it out.
+        """
         samples, rates = convert.imu_samples(batch)
         device = batch.header.device
         if device not in self._axes.used and not self._axes.wants(device, "imu"):
@@ -210,7 +248,9 @@ class Pipeline:
         return out + self._inertial(batch, samples, rates)
 
     def on_adc(self, batch: pb.AdcBatch) -> list[Output]:
-        """Counts of an analogue board: for a guided detection, and for the filters where a map of inputs is used."""
+        """Counts of an analogue board: for a guided detection, and for the filters where a map of
+        inputs is used.
+        """
         if not self._axes.wants(batch.header.device, "adc"):
             return []
         samples = convert.adc_samples(batch)
@@ -232,7 +272,9 @@ class Pipeline:
         return self._inertial(batch, convert.Samples(t_s, force), rates)
 
     def _inertial(self, batch: Batch, samples: convert.Samples, rates: Any) -> list[Output]:
-        """Solutions, poses, corrections that became due and, once per second of data, the health of each filter."""
+        """Solutions, poses, corrections that became due and, once per second of data, the health of
+        each filter.
+        """
         device = batch.header.device
         board = self._vehicles.get(device)
         if board is None:
@@ -241,13 +283,25 @@ class Pipeline:
             self._vehicles[device] = self._mutes.attend(device, board)
         self._clock_offset[device] = batch.header.utc_ns * 1e-9 - batch.header.device_us * 1e-6
         started = self._clock()
-        said = board.feed(batch.header.epoch, batch.first_index, batch.period_s, samples.t_s, samples.values, rates)
+        said = board.feed(
+            batch.header.epoch,
+            batch.first_index,
+            batch.period_s,
+            samples.t_s,
+            samples.values,
+            rates,
+        )
         self._cost.add(device, self._clock() - started, len(samples.t_s))
         out = self._navigated(batch, samples, board, said, self._settings.navigators)
         return out + self._tilt(batch, samples.values, rates)
 
     def _navigated(
-        self, batch: Batch, samples: convert.Samples, board: NavBoard, said: list[NavOutput], names: list[str]
+        self,
+        batch: Batch,
+        samples: convert.Samples,
+        board: NavBoard,
+        said: list[NavOutput],
+        names: list[str],
     ) -> list[Output]:
         """What navigation filters said, as messages; once per second of data their health."""
         device, out = batch.header.device, []
@@ -255,11 +309,18 @@ class Pipeline:
             if isinstance(o.what, Correction):
                 header = convert.sample_header(batch.header, o.what.fix.t - samples.t_s[0])
                 out.append(
-                    Output(INNOVATION, device, o.estimator, convert.innovation_message(header, o.estimator, o.what))
+                    Output(
+                        INNOVATION,
+                        device,
+                        o.estimator,
+                        convert.innovation_message(header, o.estimator, o.what),
+                    )
                 )
                 continue
             header = convert.sample_header(batch.header, o.row * batch.period_s)
-            nav = convert.nav_message(header, batch, o.index, o.estimator, o.what, board.muted(o.what.t))
+            nav = convert.nav_message(
+                header, batch, o.index, o.estimator, o.what, board.muted(o.what.t)
+            )
             out.append(Output(NAV, device, o.estimator, nav))
             pose = convert.pose_message(header, o.estimator, o.what.p_ned, o.what.q_nb)
             out.append(Output(POSE, device, o.estimator, pose))
@@ -273,18 +334,28 @@ class Pipeline:
         """Attitude of every tilt filter."""
         header, device = batch.header, batch.header.device
         if device not in self._attitudes:
-            self._attitudes[device] = AttitudeBoard(device, self._settings.attitudes, self._settings.attitude_limit_hz)
+            self._attitudes[device] = AttitudeBoard(
+                device, self._settings.attitudes, self._settings.attitude_limit_hz
+            )
         out = []
-        for o in self._attitudes[device].feed(header.epoch, batch.first_index, batch.period_s, f_b, omega_b):
+        for o in self._attitudes[device].feed(
+            header.epoch, batch.first_index, batch.period_s, f_b, omega_b
+        ):
             then = convert.sample_header(header, o.row * batch.period_s)
             message = convert.attitude_message(then, batch, o.index, o.estimator, o.state)
             out.append(Output(ATTITUDE, device, o.estimator, message))
         return out
 
     def on_gnss(self, message: pb.GnssFix) -> list[Output]:
-        """Keep the fix; its corrections come out of on_imu, when samples have passed its arrival."""
+        """Keep the fix; its corrections come out of on_imu, when samples have passed its
+        arrival.
+        """
         device = message.header.device
-        if device in self._boards and device not in self._gyro_free and self._settings.gyro_free_navigation:
+        if (
+            device in self._boards
+            and device not in self._gyro_free
+            and self._settings.gyro_free_navigation
+        ):
             self._gyro_free[device] = self._gyro_free_navigation(device)
             self._mutes.attend(device, self._gyro_free[device].board)
         board = self._navigating(device)
@@ -294,7 +365,9 @@ class Pipeline:
         return []
 
     def _navigating(self, device: str) -> NavBoard | None:
-        """Where fixes of a device go: its inertial unit, else its accelerometers where that is asked for."""
+        """Where fixes of a device go: its inertial unit, else its accelerometers where that is
+        asked for.
+        """
         gyro_free = self._gyro_free.get(device)
         return self._vehicles.get(device, gyro_free.board if gyro_free else None)
 
@@ -302,10 +375,14 @@ class Pipeline:
         s = self._settings
         config = NavigatorConfig(lever_arm_b=s.vehicle_of(device).lever_arm_b_m)
         names = s.gyro_free_navigation
-        return GyroFreeNavigation(device, config, names, s.nav_limit_hz, s.believed_rate, s.rate_limit_hz)
+        return GyroFreeNavigation(
+            device, config, names, s.nav_limit_hz, s.believed_rate, s.rate_limit_hz
+        )
 
     def _nav_status(self, header: pb.Header, board: NavBoard, name: str) -> pb.EstimatorStatus:
-        return convert.navigator_state(self._status(header, board.stream, name), board.navigators[name])
+        return convert.navigator_state(
+            self._status(header, board.stream, name), board.navigators[name]
+        )
 
     def _new_second(self, device: str, what: str, t_s: float) -> bool:
         second = int(t_s)
@@ -319,7 +396,9 @@ class Pipeline:
         return status
 
     def _status(self, header: pb.Header, stream: Stream, name: str) -> pb.EstimatorStatus:
-        return convert.status_message(header, stream, name, self._cost.take(header.device, name), VERSION)
+        return convert.status_message(
+            header, stream, name, self._cost.take(header.device, name), VERSION
+        )
 
 
 def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) -> None:

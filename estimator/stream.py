@@ -50,9 +50,13 @@ def every(period_s: float, limit_hz: float) -> int:
     """k such that each k-th sample of a stream of this period gives at most limit_hz outputs."""
     if not period_s > 0.0:
         return 1
-    return max(1, math.ceil(1.0 / (period_s * limit_hz) - 1e-6))  # 100 Hz in 10 ms steps: 1, not 2 by rounding
+    return max(
+        1, math.ceil(1.0 / (period_s * limit_hz) - 1e-6)
+    )  # 100 Hz in 10 ms steps: 1, not 2 by rounding
 
 
 def worth_a_line(count: int) -> bool:
-    """True for the 1st, 2nd, 4th, 8th ... event of a kind: a flood of them stays readable in the log."""
+    """True for the 1st, 2nd, 4th, 8th ... event of a kind: a flood of them stays readable in the
+    log.
+    """
     return count > 0 and count & (count - 1) == 0

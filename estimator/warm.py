@@ -1,7 +1,8 @@
-"""Fill the compile cache: `python -m estimator.warm`. The first sample of a live stream must not wait for a compiler.
+"""Fill the compile cache: `python -m estimator.warm`. The first sample of a live stream must not
+wait for a compiler.
 
-numba notices a change of the file a compiled function is in, not of a file that one calls into. So a cache older than
-any source of this folder is thrown away first.
+numba notices a change of the file a compiled function is in, not of a file that one calls into. So
+a cache older than any source of this folder is thrown away first.
 """
 
 import itertools
@@ -11,26 +12,33 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator.attitude.filters import ATTITUDES
-from estimator.ins.alignment_motion import MotionSettings, MotionWindow
-from estimator.ins.batch import run_filters
-from estimator.ins.fix import RTK_FIXED, Fix
-from estimator.ins.navigation import NAVIGATORS, Mode
-from estimator.ins.smoother import smooth_drive
-from estimator.rate.estimators import ESTIMATORS
-from estimator.rate.health import HealthMonitor
-from estimator.simulation.faults import AxisFault, Faults
-from estimator.simulation.table import TableTest
+import inertial
+from inertial.attitude.filters import ATTITUDES
+from inertial.navigation.alignment_motion import MotionSettings, MotionWindow
+from inertial.navigation.batch import run_filters
+from inertial.navigation.fix import RTK_FIXED, Fix
+from inertial.navigation.navigation import NAVIGATORS, Mode
+from inertial.navigation.smoother import smooth_drive
+from inertial.rate.estimators import ESTIMATORS
+from inertial.rate.health import HealthMonitor
+from inertial.simulation.faults import AxisFault, Faults
+from inertial.simulation.table import TableTest
 
 log = logging.getLogger(__name__)
 
-RATE_SAMPLES = 800  # at 100 Hz: the standstill of the published test and the start of the first turn
-HERE = Path(__file__).resolve().parent
+RATE_SAMPLES = (
+    800  # at 100 Hz: the standstill of the published test and the start of the first turn
+)
+HERE = Path(inertial.__file__).resolve().parent
 
 
 def drop_stale(folder: Path = HERE) -> int:
-    """Remove compiled functions that are older than a source of the folder; returns how many files went."""
-    newest = max(s.stat().st_mtime for s in folder.rglob("*.py") if _compiles(s.read_text(encoding="utf-8")))
+    """Remove compiled functions that are older than a source of the folder; returns how many files
+    went.
+    """
+    newest = max(
+        s.stat().st_mtime for s in folder.rglob("*.py") if _compiles(s.read_text(encoding="utf-8"))
+    )
     everything = list(folder.rglob("__pycache__/*.nb[ic]"))
     if all(f.stat().st_mtime >= newest for f in everything):
         return 0
@@ -44,7 +52,9 @@ def _compiles(source: str) -> bool:
 
 
 def warm() -> None:
-    """Compile, or load from the cache, every function of the live path by running it on made-up motion."""
+    """Compile, or load from the cache, every function of the live path by running it on made-up
+    motion.
+    """
     logging.disable(logging.INFO)  # the made-up motion is no news
     try:
         _warm_navigators()
@@ -71,7 +81,9 @@ def _warm_alignment() -> None:
         if k % 100 == 50:
             window.fix(0.01 * k, np.array([10.0, 0.0, 0.0]), np.full(3, 0.1))
     if window.solve() is None:
-        raise RuntimeError("the made-up start in motion was not solved: warm.py does not fit alignment_motion.py")
+        raise RuntimeError(
+            "the made-up start in motion was not solved: warm.py does not fit alignment_motion.py"
+        )
 
 
 def _warm_attitudes() -> None:
@@ -89,11 +101,18 @@ def _warm_health() -> None:
     for t, readings in zip(spoilt.t_s, spoilt.readings, strict=True):
         monitor.step(float(t), readings)
     if not monitor.mask:
-        raise RuntimeError("the made-up fault was not found: warm.py does not fit health.py any more")
+        raise RuntimeError(
+            "the made-up fault was not found: warm.py does not fit health.py any more"
+        )
 
 
 def _warm_navigators() -> None:
-    for name in ("kf", "huber-nhc", "fpe-fuzzy", "mhe-robust"):  # the compiled code is the same for all others
+    for name in (
+        "kf",
+        "huber-nhc",
+        "fpe-fuzzy",
+        "mhe-robust",
+    ):  # the compiled code is the same for all others
         navigator = NAVIGATORS[name]()
         f, w = np.array([0.0, 0.0, -9.8]), np.zeros(3)
         for k in range(1200):
@@ -103,22 +122,33 @@ def _warm_navigators() -> None:
             navigator.imu(t, f, w)
             navigator.solution()
         if navigator.mode != Mode.NAVIGATING:
-            raise RuntimeError("the made-up drive did not reach navigation: warm.py does not fit alignment.py any more")
+            raise RuntimeError(
+                "the made-up drive did not reach navigation: warm.py does not fit alignment.py any"
+                " more"
+            )
 
 
 def _warm_offline() -> None:
-    """The runs over whole drives: not needed live, so only this module's command makes them ready."""
+    """The runs over whole drives: not needed live, so only this module's command makes them
+    ready.
+    """
     n = 1200
-    imu = np.column_stack([0.01 * np.arange(n), np.tile([0.0, 0.0, -9.8], (n, 1)), np.zeros((n, 3))])
+    imu = np.column_stack(
+        [0.01 * np.arange(n), np.tile([0.0, 0.0, -9.8], (n, 1)), np.zeros((n, 3))]
+    )
     fixes = [_fix(t) for t in (11.05, 11.45, 11.85)]
     run = run_filters(imu, fixes, ["kf"])["kf"]
     if not len(run.t) or smooth_drive(imu, fixes) is None:
-        raise RuntimeError("the made-up drive did not reach navigation: warm.py does not fit alignment.py any more")
+        raise RuntimeError(
+            "the made-up drive did not reach navigation: warm.py does not fit alignment.py any more"
+        )
 
 
 def _fix(t: float) -> Fix:
     sigma = np.full(3, 0.02)
-    return Fix(t, t, 0.7, 0.1, 100.0 + t, RTK_FIXED, sigma, np.array([5.0, 0.0, 0.0]), np.full(3, 0.05))
+    return Fix(
+        t, t, 0.7, 0.1, 100.0 + t, RTK_FIXED, sigma, np.array([5.0, 0.0, 0.0]), np.full(3, 0.05)
+    )
 
 
 def main() -> None:
@@ -128,7 +158,10 @@ def main() -> None:
     started = time.perf_counter()
     warm()
     _warm_offline()
-    print(f"compile cache ready in {time.perf_counter() - started:.1f} s ({dropped} stale files dropped)")
+    print(
+        f"compile cache ready in {time.perf_counter() - started:.1f} s ({dropped} stale files"
+        " dropped)"
+    )
 
 
 if __name__ == "__main__":

@@ -1,10 +1,11 @@
 """Bytes in, events out: the deframer, and the encoder it undoes.  No port, no clock, no thread.
 
-    00  COBS( header 16 | payload 0..488 | crc32 )  00        at most 512 bytes, little-endian, spec.toml
+    00  COBS( header 16 | payload 0..488 | crc32 )  00        at most 512 bytes, little-endian,
+    spec.toml
 
-Every byte fed becomes part of exactly one event or is pending: an event carries the delimiter that closed it and
-the one that opened it, so sizes of events plus `Deframer.pending` are the bytes in.  How the stream is cut into
-reads changes nothing.
+Every byte fed becomes part of exactly one event or is pending: an event carries the delimiter that
+closed it and the one that opened it, so sizes of events plus `Deframer.pending` are the bytes in.
+How the stream is cut into reads changes nothing.
 """
 
 import struct
@@ -18,8 +19,19 @@ from firmware_protocol.frames import Payload
 from firmware_protocol.payloads import FrameError, length_rules, pack, shortage, unpack
 from firmware_protocol.spec import SPEC
 
-__all__ = ["FLAG_CONFIG", "FLAG_DROPPED", "FLAG_PPS", "FLAG_SIMULATED", "REASONS", "Damaged", "Deframer", "Event",
-           "Frame", "FrameError", "encode"]
+__all__ = [
+    "FLAG_CONFIG",
+    "FLAG_DROPPED",
+    "FLAG_PPS",
+    "FLAG_SIMULATED",
+    "REASONS",
+    "Damaged",
+    "Deframer",
+    "Event",
+    "Frame",
+    "FrameError",
+    "encode",
+]
 
 FLAG_DROPPED = SPEC.flags["dropped"]
 FLAG_PPS = SPEC.flags["pps"]
@@ -50,9 +62,11 @@ class _Header(NamedTuple):
 
 
 class Frame(_Header):
-    """A whole frame: type, epoch, flags, seq, t_us (device microseconds), raw payload bytes, bytes on the wire.
+    """A whole frame: type, epoch, flags, seq, t_us (device microseconds), raw payload bytes, bytes
+    on the wire.
 
-    A tuple and not a dataclass because 300,000 of them are made in a second; `payload` is decoded on first use.
+    A tuple and not a dataclass because 300,000 of them are made in a second; `payload` is decoded
+    on first use.
     """
 
     @cached_property
@@ -82,15 +96,17 @@ Event = Frame | Damaged
 def encode(payload_obj: Payload, *, epoch: int, seq: int, t_us: int, flags: int = 0) -> bytes:
     """Wire bytes of one frame, both delimiters included.
 
-    epoch and seq wrap at 2^8 and 2^32 as on the device; t_us in device microseconds.  Raises FrameError when a value
-    does not fit its field or the payload exceeds 488 bytes.
+    epoch and seq wrap at 2^8 and 2^32 as on the device; t_us in device microseconds.  Raises
+    FrameError when a value does not fit its field or the payload exceeds 488 bytes.
     """
     payload = pack(payload_obj)
     try:
         header = HEADER.pack(PROTO, payload_obj.TYPE, epoch & 0xFF, flags, seq & 0xFFFFFFFF, t_us)
     except struct.error as error:
-        raise FrameError(f"header of {type(payload_obj).__name__} does not fit ({error}): type {payload_obj.TYPE}, "
-                         f"flags {flags}, t_us {t_us}") from error
+        raise FrameError(
+            f"header of {type(payload_obj).__name__} does not fit ({error}): type"
+            f" {payload_obj.TYPE}, flags {flags}, t_us {t_us}"
+        ) from error
     body = header + payload
     return b"\0" + cobs.encode(body + crc32(body).to_bytes(CRC_SIZE, "little")) + b"\0"
 
@@ -128,7 +144,11 @@ class Deframer:
         """End of the stream: what is pending becomes one event, so that every byte has one."""
         data = b"\0" * self._zeros + self._body
         self.__init__()
-        return [Damaged(data, "unfinished", f"{len(data)} bytes at the end of the stream")] if data else []
+        return (
+            [Damaged(data, "unfinished", f"{len(data)} bytes at the end of the stream")]
+            if data
+            else []
+        )
 
     def _delimiter(self, events: list[Event]) -> None:
         """A delimiter behind a delimiter opens a frame; more of them are idle line."""
@@ -187,7 +207,8 @@ def _decode(chunk: bytes, zeros: int) -> Event:
         least, count_at, width, width_of = rule
         size -= MIN_FRAME
         if size < least or (
-            count_at and size < least + payload[count_at] * (width_of(payload) if width_of else width)
+            count_at
+            and size < least + payload[count_at] * (width_of(payload) if width_of else width)
         ):
             return _damaged(chunk, zeros, "payload", shortage(type_, payload))
     return _make(Frame, (type_, epoch, flags, seq, t_us, payload, len(chunk) + 1 + zeros))
@@ -197,13 +218,22 @@ def _refused(chunk: bytes, zeros: int, body: bytes) -> Damaged:
     """Why an unstuffed body is no frame of ours, in the order of spec.toml."""
     size = len(body) - MIN_FRAME
     if size > SPEC.max_payload:
-        return _damaged(chunk, zeros, "long", f"payload of {size} bytes, at most {SPEC.max_payload}")
+        return _damaged(
+            chunk, zeros, "long", f"payload of {size} bytes, at most {SPEC.max_payload}"
+        )
     if size < 0:
         return _damaged(chunk, zeros, "short", f"{len(body)} bytes, header and CRC are {MIN_FRAME}")
     if crc32(body) != RESIDUE:
         received, computed = int.from_bytes(body[-CRC_SIZE:], "little"), crc32(body[:-CRC_SIZE])
-        return _damaged(chunk, zeros, "crc", f"0x{received:08x} received, 0x{computed:08x} computed")
-    return _damaged(chunk, zeros, "version", f"proto 0x{body[_PROTO_AT]:02x}, this receiver speaks 0x{PROTO:02x}")
+        return _damaged(
+            chunk, zeros, "crc", f"0x{received:08x} received, 0x{computed:08x} computed"
+        )
+    return _damaged(
+        chunk,
+        zeros,
+        "version",
+        f"proto 0x{body[_PROTO_AT]:02x}, this receiver speaks 0x{PROTO:02x}",
+    )
 
 
 def _damaged(chunk: bytes, zeros: int, reason: str, detail: str) -> Damaged:

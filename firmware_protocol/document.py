@@ -25,41 +25,57 @@ def header() -> str:
 
 def _table(head: tuple[str, ...], rows: Iterator[tuple]) -> list[str]:
     lines = [head, ("---",) * len(head), *rows]
-    return ["| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines] + [""]
+    return [
+        "| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines
+    ] + [""]
 
 
 def _page_lines() -> Iterator[str]:
     protocol = SPEC.raw["protocol"]
     yield "# The wire between board and gateway"
     yield ""
-    yield "Made from firmware_protocol/spec.toml by `python -m firmware_protocol.document > docs/protocol.md`."
+    yield (
+        "Made from firmware_protocol/spec.toml by `python -m firmware_protocol.document >"
+        " docs/protocol.md`."
+    )
     yield ""
     yield f"    00  COBS( header {_size(SPEC.header)} | payload 0..{SPEC.max_payload} | crc32 )  00"
     yield ""
-    yield (f"Little-endian, natural alignment, at most {SPEC.max_wire} bytes with both delimiters. {protocol['crc']}: "
-           f"{protocol['crc_text'][0].lower()}{protocol['crc_text'][1:]}. Minor version described here: {SPEC.minor}.")
+    yield (
+        f"Little-endian, natural alignment, at most {SPEC.max_wire} bytes with both delimiters."
+        f" {protocol['crc']}: {protocol['crc_text'][0].lower()}{protocol['crc_text'][1:]}. Minor"
+        f" version described here: {SPEC.minor}."
+    )
     yield ""
     yield protocol["minor_text"]
     yield ""
     yield "## Header"
     yield ""
     yield from _fields(SPEC.header)
-    yield from _table(("bit of flags", "name", "meaning"),
-                      ((entry["bit"], entry["name"], entry["text"]) for entry in SPEC.raw["flag"]))
+    yield from _table(
+        ("bit of flags", "name", "meaning"),
+        ((entry["bit"], entry["name"], entry["text"]) for entry in SPEC.raw["flag"]),
+    )
     yield "## Frames"
     yield ""
-    yield from _table(("type", "name", "since minor", "bytes", "purpose"),
-                      ((f"0x{x.type:02x}", x.name, x.since, _bytes(x), x.text) for x in SPEC.layouts.values()))
+    yield from _table(
+        ("type", "name", "since minor", "bytes", "purpose"),
+        ((f"0x{x.type:02x}", x.name, x.since, _bytes(x), x.text) for x in SPEC.layouts.values()),
+    )
     for layout in SPEC.layouts.values():
         yield from _layout(layout)
     for entry in SPEC.raw["struct"]:
         yield f"### {entry['name']} (inside other frames)"
         yield ""
-        yield from _table(("type", "field", "unit", "meaning"),
-                          ((x["type"], x["name"], x.get("unit", ""), x["text"]) for x in entry["field"]))
+        yield from _table(
+            ("type", "field", "unit", "meaning"),
+            ((x["type"], x["name"], x.get("unit", ""), x["text"]) for x in entry["field"]),
+        )
     yield "## Boards"
     yield ""
-    yield from _table(("board_id", "board"), ((entry["id"], entry["text"]) for entry in SPEC.raw["board"]))
+    yield from _table(
+        ("board_id", "board"), ((entry["id"], entry["text"]) for entry in SPEC.raw["board"])
+    )
     yield from _commands()
     yield from _proofs()
 
@@ -70,31 +86,53 @@ def _commands() -> Iterator[str]:
     yield ""
     yield "CMD with no arguments, unless the text says otherwise:"
     yield ""
-    yield from _table(("command", "name", "meaning"),
-                      ((f"0x{x['id']:04x}", x["name"], x["text"]) for x in raw["command"]))
-    yield "Settings: no arguments to ask, one u32 to set; the ACK echoes the u32 in force. They live until the next"
+    yield from _table(
+        ("command", "name", "meaning"),
+        ((f"0x{x['id']:04x}", x["name"], x["text"]) for x in raw["command"]),
+    )
+    yield (
+        "Settings: no arguments to ask, one u32 to set; the ACK echoes the u32 in force. They live"
+        " until the next"
+    )
     yield "boot."
     yield ""
-    settings = ((f"0x{x['id']:04x}", x["name"], x.get("unit", ""), x["default"], x["text"]) for x in raw["setting"])
+    settings = (
+        (f"0x{x['id']:04x}", x["name"], x.get("unit", ""), x["default"], x["text"])
+        for x in raw["setting"]
+    )
     yield from _table(("command", "name", "unit", "default", "meaning"), settings)
-    yield from _table(("status of ACK", "name", "meaning"), ((x["id"], x["name"], x["text"]) for x in raw["result"]))
+    yield from _table(
+        ("status of ACK", "name", "meaning"),
+        ((x["id"], x["name"], x["text"]) for x in raw["result"]),
+    )
 
 
 def _proofs() -> Iterator[str]:
     yield "## Damage"
     yield ""
-    yield "Bytes that are no frame become one event with one of these words, in the order of the checks:"
+    yield (
+        "Bytes that are no frame become one event with one of these words, in the order of the"
+        " checks:"
+    )
     yield ""
-    yield from _table(("reason", "meaning"), ((entry["word"], entry["text"]) for entry in SPEC.raw["reason"]))
+    yield from _table(
+        ("reason", "meaning"), ((entry["word"], entry["text"]) for entry in SPEC.raw["reason"])
+    )
     yield "What a receiver can prove, and `ledger.py` counts:"
     yield ""
     yield "1. Bytes in = bytes of good frames + bytes of bad chunks + bytes pending."
     yield "2. Lost frames = the sum of the gaps in seq. Bad chunks are not losses."
     yield "3. No frame is accepted that differs from what was sent."
-    yield "4. Lost minus the device's own `dropped` = lost on the link. Gaps in first_index = lost samples."
+    yield (
+        "4. Lost minus the device's own `dropped` = lost on the link. Gaps in first_index = lost"
+        " samples."
+    )
     yield "5. Any cutting of the stream into reads gives the same events."
     yield ""
-    yield "Not provable: loss before the first frame, loss behind the last frame (STATUS bounds it to 1 s), damage"
+    yield (
+        "Not provable: loss before the first frame, loss behind the last frame (STATUS bounds it to"
+        " 1 s), damage"
+    )
     yield "before the CRC was made."
 
 
@@ -150,16 +188,25 @@ def _header_lines() -> Iterator[str]:
     yield ""
     yield from _enum(f"GF_TYPE_{x.name} = 0x{x.type:02X}" for x in SPEC.layouts.values())
     yield from _enum(f"GF_FLAG_{name.upper()} = {bit}" for name, bit in SPEC.flags.items())
-    yield from _enum((f"GF_REASON_{word.upper()} = {i}" for i, word in enumerate(SPEC.reasons, 1)), "gf_reason_t")
+    yield from _enum(
+        (f"GF_REASON_{word.upper()} = {i}" for i, word in enumerate(SPEC.reasons, 1)), "gf_reason_t"
+    )
     raw = SPEC.raw
     yield from _enum(f"GF_DO_{x['name'].upper()} = 0x{x['id']:04X}" for x in raw["command"])
     yield from _enum(f"GF_SET_{x['name'].upper()} = 0x{x['id']:04X}" for x in raw["setting"])
     yield from _enum(f"GF_DEFAULT_{x['name'].upper()} = {x['default']}" for x in raw["setting"])
-    yield from _enum((f"GF_RESULT_{x['name'].upper()} = {x['id']}" for x in raw["result"]), "gf_result_t")
-    yield "/* Offsets in bytes; GF_..._SIZE is the smallest payload and where the rows or raw bytes begin. */"
+    yield from _enum(
+        (f"GF_RESULT_{x['name'].upper()} = {x['id']}" for x in raw["result"]), "gf_result_t"
+    )
+    yield (
+        "/* Offsets in bytes; GF_..._SIZE is the smallest payload and where the rows or raw bytes"
+        " begin. */"
+    )
     yield from _enum(_offsets("HEADER", SPEC.header))
     for layout in SPEC.layouts.values():
-        yield from _enum([*_offsets(layout.name, layout.fields), f"GF_{layout.name}_SIZE = {layout.size}"])
+        yield from _enum(
+            [*_offsets(layout.name, layout.fields), f"GF_{layout.name}_SIZE = {layout.size}"]
+        )
     yield from _rules()
     yield ""
     yield "#endif"
@@ -180,8 +227,14 @@ def _offsets(prefix: str, fields: tuple[Field, ...]) -> list[str]:
 
 
 def _rules() -> Iterator[str]:
-    yield "/* What a payload must hold: GF_FIXED(type, size), GF_ROWS(type, size, offset of the row count,"
-    yield " * bytes per row), GF_MASKED(type, size, offset of the row count, bytes per value, offset of the mask)."
+    yield (
+        "/* What a payload must hold: GF_FIXED(type, size), GF_ROWS(type, size, offset of the row"
+        " count,"
+    )
+    yield (
+        " * bytes per row), GF_MASKED(type, size, offset of the row count, bytes per value, offset"
+        " of the mask)."
+    )
     yield " * A type without a line demands nothing. */"
     lines = ["#define GF_LENGTH_RULES"]
     for layout in SPEC.layouts.values():
@@ -193,7 +246,9 @@ def _rules() -> Iterator[str]:
             continue
         width, count = struct.calcsize(FORMATS[tail.type]), f"GF_{name}_{tail.count.upper()}"
         if isinstance(tail.columns, int):
-            lines.append(f"  GF_ROWS(GF_TYPE_{name}, GF_{name}_SIZE, {count}, {width * tail.columns}u)")
+            lines.append(
+                f"  GF_ROWS(GF_TYPE_{name}, GF_{name}_SIZE, {count}, {width * tail.columns}u)"
+            )
         else:
             mask = f"GF_{name}_{tail.columns.upper()}"
             lines.append(f"  GF_MASKED(GF_TYPE_{name}, GF_{name}_SIZE, {count}, {width}u, {mask})")

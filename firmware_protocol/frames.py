@@ -1,7 +1,8 @@
 """What travels between board and gateway: one frozen type per frame of spec.toml.
 
-Values are raw: counts, device ticks, masks.  Scales and units stand in spec.toml; conversion to SI is the gateway's.
-Sequence numbers, epoch, flags and time are in the frame's header, see `codec.Frame`.
+Values are raw: counts, device ticks, masks.  Scales and units stand in spec.toml; conversion to SI
+is the gateway's. Sequence numbers, epoch, flags and time are in the frame's header, see
+`codec.Frame`.
 """
 
 from dataclasses import dataclass, fields
@@ -57,7 +58,11 @@ class Hello:
     def firmware_text(self) -> str:
         """The firmware's name if it is ASCII, else its commit in hex."""
         stem = bytes(self.firmware).rstrip(b"\0")
-        return stem.decode("ascii") if stem.isascii() and stem.decode("ascii").isprintable() else self.firmware.hex()
+        return (
+            stem.decode("ascii")
+            if stem.isascii() and stem.decode("ascii").isprintable()
+            else self.firmware.hex()
+        )
 
 
 def _commit_bytes(firmware: bytes | str) -> bytes:
@@ -73,7 +78,9 @@ def _commit_bytes(firmware: bytes | str) -> bytes:
 
 def _padded(value: bytes, length: int, name: str) -> bytes:
     if len(value) > length:
-        raise ValueError(f"HELLO {name} has {len(value)} bytes, the wire carries {length}: shorten it")
+        raise ValueError(
+            f"HELLO {name} has {len(value)} bytes, the wire carries {length}: shorten it"
+        )
     return bytes(value).ljust(length, b"\0")
 
 

@@ -5,8 +5,8 @@
     link loss = lost - dropped by the device itself, from one STATUS to the next
     lost samples = gaps in first_index
 
-Not provable: what was lost before the first frame, before the first frame after a reboot, and behind the last
-frame (STATUS bounds that to 1 s); damage before the CRC was made.
+Not provable: what was lost before the first frame, before the first frame after a reboot, and
+behind the last frame (STATUS bounds that to 1 s); damage before the CRC was made.
 """
 
 import logging
@@ -22,15 +22,22 @@ log = logging.getLogger(__name__)
 
 WRAP = 1 << 32
 _FIRST = struct.Struct("<I")
-_INDEXED = {type_: layout.offsets["n"] for type_, layout in SPEC.layouts.items()
-            if layout.fields and layout.fields[0].name in ("first_index", "first_pulse")}
-"""Types whose payload starts with an index that counts on, and where their number of samples stands."""
+_INDEXED = {
+    type_: layout.offsets["n"]
+    for type_, layout in SPEC.layouts.items()
+    if layout.fields and layout.fields[0].name in ("first_index", "first_pulse")
+}
+"""Types whose payload starts with an index that counts on, and where their number of samples
+stands.
+"""
 _PULSES = frozenset(t for t in _INDEXED if SPEC.layouts[t].fields[0].name == "first_pulse")
 
 
 @dataclass
 class Ledger:
-    """Counters of one link.  `received` for every read, `count` for every event; the rest is read only."""
+    """Counters of one link.  `received` for every read, `count` for every event; the rest is read
+    only.
+    """
 
     bytes_in: int = 0
     good_frames: int = 0
@@ -81,8 +88,11 @@ class Ledger:
         self.damage[event.reason] += 1
         if event.reason == "version" and not self._warned_version:
             self._warned_version = True
-            log.warning("frames of another protocol version (%s) are counted and skipped: install the gyrofree that "
-                        "matches the board's firmware; said once", event.detail)
+            log.warning(
+                "frames of another protocol version (%s) are counted and skipped: install the"
+                " gyrofree that matches the board's firmware; said once",
+                event.detail,
+            )
 
     def _count_frame(self, frame: Frame) -> None:
         self.good_frames += 1
@@ -113,7 +123,8 @@ class Ledger:
         self.reboots += reboot
         self.epoch = frame.epoch
         self._next_index.clear()
-        # From frame 0 on we have heard everything; else the first STATUS is the base of the device's own count.
+        # From frame 0 on we have heard everything; else the first STATUS is the base of the
+        # device's own count.
         self._at_status = (self.lost_frames, 0) if frame.seq == 0 else None
 
     def _follow_index(self, frame: Frame) -> None:
@@ -128,7 +139,9 @@ class Ledger:
         self._next_index[frame.type] = (first + frame.raw[_INDEXED[frame.type]]) % WRAP
 
     def _settle(self, dropped: int) -> None:
-        """At a STATUS: split what was lost since the last one into dropped by the device and lost on the link."""
+        """At a STATUS: split what was lost since the last one into dropped by the device and lost
+        on the link.
+        """
         if self._at_status is not None:
             lost_before, dropped_before = self._at_status
             newly_dropped = (dropped - dropped_before) % WRAP

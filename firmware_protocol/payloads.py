@@ -56,7 +56,9 @@ def _rows(layout: Layout, payload: bytes, count: int) -> tuple:
     if columns == 0:
         return ((),) * count
     form = f"<{columns}{code}"
-    return tuple(struct.iter_unpack(form, payload[layout.size : layout.size + count * struct.calcsize(form)]))
+    return tuple(
+        struct.iter_unpack(form, payload[layout.size : layout.size + count * struct.calcsize(form)])
+    )
 
 
 def pack(payload: Payload) -> bytes:
@@ -66,8 +68,10 @@ def pack(payload: Payload) -> bytes:
     else:
         data = _pack_known(SPEC.layouts[payload.TYPE], payload)
     if len(data) > SPEC.max_payload:
-        raise FrameError(f"{type(payload).__name__} payload has {len(data)} bytes, the wire carries "
-                         f"{SPEC.max_payload}: put fewer samples into a frame")
+        raise FrameError(
+            f"{type(payload).__name__} payload has {len(data)} bytes, the wire carries "
+            f"{SPEC.max_payload}: put fewer samples into a frame"
+        )
     return data
 
 
@@ -85,7 +89,9 @@ def _pack_known(layout: Layout, payload: Payload) -> bytes:
         head = layout.fixed.pack(*flat)
         return head + (_pack_tail(layout, head, data) if tail else b"")
     except (struct.error, ValueError, TypeError) as error:
-        raise FrameError(f"{layout.name} does not fit its fields ({error}): {_short(payload)}") from error
+        raise FrameError(
+            f"{layout.name} does not fit its fields ({error}): {_short(payload)}"
+        ) from error
 
 
 def _pack_tail(layout: Layout, head: bytes, data: bytes | tuple) -> bytes:
@@ -105,7 +111,8 @@ def _short(payload: Payload) -> str:
 
 
 def length_rules() -> list[tuple[int, int, int, Callable[[bytes], int] | None] | None]:
-    """Per type byte: (smallest size, offset of the row count, bytes per row, row size by mask) or None.
+    """Per type byte: (smallest size, offset of the row count, bytes per row, row size by mask) or
+    None.
 
     The hot path's form of `shortage`; a test holds the two together.
     """
@@ -120,6 +127,10 @@ def length_rules() -> list[tuple[int, int, int, Callable[[bytes], int] | None] |
             rules[type_] = (layout.size, layout.offsets[tail.count], width * tail.columns, None)
         else:
             mask_at = layout.offsets[tail.columns]
-            rules[type_] = (layout.size, layout.offsets[tail.count], 0,
-                            lambda payload, at=mask_at, width=width: payload[at].bit_count() * width)
+            rules[type_] = (
+                layout.size,
+                layout.offsets[tail.count],
+                0,
+                lambda payload, at=mask_at, width=width: payload[at].bit_count() * width,
+            )
     return rules

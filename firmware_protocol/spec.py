@@ -116,7 +116,9 @@ class Layout:
     @cached_property
     def flat_names(self) -> tuple[str, ...] | None:
         """Field names when each of them is one value of `fixed`, else None."""
-        if any(field.struct_class or (field.length > 1 and field.type != "u8") for field in self.fields):
+        if any(
+            field.struct_class or (field.length > 1 and field.type != "u8") for field in self.fields
+        ):
             return None
         return tuple(field.name for field in self.fields)
 
@@ -149,30 +151,53 @@ class Spec:
 def _field(entry: dict, structs: dict[str, dict]) -> Field:
     match = re.fullmatch(r"(\w+?)(?:\[(\d+)\])?", entry["type"])
     if not match or (match[1] not in FORMATS and match[1] not in structs):
-        raise SpecError(f"spec.toml: field {entry['name']} has type {entry['type']!r}; known: "
-                        f"{', '.join([*FORMATS, *structs])}, with [k] for several")
+        raise SpecError(
+            f"spec.toml: field {entry['name']} has type {entry['type']!r}; known: "
+            f"{', '.join([*FORMATS, *structs])}, with [k] for several"
+        )
     extra = {}
     if match[1] in structs:
         inner = [_field(field, {}) for field in structs[match[1]]["field"]]
-        extra = {"struct_class": getattr(frames, structs[match[1]]["class"]),
-                 "struct_names": tuple(field.name for field in inner),
-                 "struct_format": "".join(field.format for field in inner)}
-    return Field(entry["name"], match[1], int(match[2] or 1), entry.get("unit", ""), entry["text"], **extra)
+        extra = {
+            "struct_class": getattr(frames, structs[match[1]]["class"]),
+            "struct_names": tuple(field.name for field in inner),
+            "struct_format": "".join(field.format for field in inner),
+        }
+    return Field(
+        entry["name"], match[1], int(match[2] or 1), entry.get("unit", ""), entry["text"], **extra
+    )
 
 
 def _layout(entry: dict, structs: dict[str, dict]) -> Layout:
     tail = entry.get("tail")
-    made = tail and Tail(tail["name"], tail["type"], tail.get("count", ""), tail.get("columns", 1),
-                         tail.get("unit", ""), tail["text"])
-    layout = Layout(entry["type"], entry["name"], getattr(frames, entry["class"]), entry["since"], entry["text"],
-                    tuple(_field(field, structs) for field in entry.get("field", ())), made)
+    made = tail and Tail(
+        tail["name"],
+        tail["type"],
+        tail.get("count", ""),
+        tail.get("columns", 1),
+        tail.get("unit", ""),
+        tail["text"],
+    )
+    layout = Layout(
+        entry["type"],
+        entry["name"],
+        getattr(frames, entry["class"]),
+        entry["since"],
+        entry["text"],
+        tuple(_field(field, structs) for field in entry.get("field", ())),
+        made,
+    )
     wanted = frames.field_names(layout.payload_class)
     derived = {made.count} if made else set()
-    found = tuple(f.name for f in layout.fields if not f.name.startswith("reserved") and f.name not in derived)
+    found = tuple(
+        f.name for f in layout.fields if not f.name.startswith("reserved") and f.name not in derived
+    )
     found += (made.name,) if made else ()
     if found != wanted or layout.type != layout.payload_class.TYPE:
-        raise SpecError(f"spec.toml: {layout.name} (0x{layout.type:02x}) has {found}, frames.py has {wanted}: "
-                        f"make both the same")
+        raise SpecError(
+            f"spec.toml: {layout.name} (0x{layout.type:02x}) has {found}, frames.py has {wanted}: "
+            f"make both the same"
+        )
     return layout
 
 
@@ -182,11 +207,17 @@ def load(path: Path = SPEC_PATH) -> Spec:
     structs = {entry["name"]: entry for entry in raw["struct"]}
     layouts = [_layout(entry, structs) for entry in raw["frame"]]
     protocol = raw["protocol"]
-    return Spec(protocol["proto"], protocol["minor"], protocol["max_payload"], protocol["max_wire"],
-                tuple(_field(entry, {}) for entry in raw["header"]),
-                {entry["name"]: 1 << entry["bit"] for entry in raw["flag"]},
-                tuple(entry["word"] for entry in raw["reason"]),
-                {layout.type: layout for layout in layouts}, raw)
+    return Spec(
+        protocol["proto"],
+        protocol["minor"],
+        protocol["max_payload"],
+        protocol["max_wire"],
+        tuple(_field(entry, {}) for entry in raw["header"]),
+        {entry["name"]: 1 << entry["bit"] for entry in raw["flag"]},
+        tuple(entry["word"] for entry in raw["reason"]),
+        {layout.type: layout for layout in layouts},
+        raw,
+    )
 
 
 SPEC = load()

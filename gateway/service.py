@@ -1,7 +1,8 @@
-"""The gateway process: one Zenoh session for all boards, per board a thread that serves it and one that decodes.
+"""The gateway process: one Zenoh session for all boards, per board a thread that serves it and one
+that decodes.
 
-Journal first: boards are read and journalled from the start, also with no router there. Publishing begins when the
-router comes and the name on the bus is ours (gateway/identity.py).
+Journal first: boards are read and journalled from the start, also with no router there. Publishing
+begins when the router comes and the name on the bus is ours (gateway/ports/identity.py).
 """
 
 import json
@@ -12,15 +13,15 @@ from concurrent.futures import Future
 import zenoh
 from google.protobuf.message import DecodeError
 
-from gateway.device import DeviceLink
-from gateway.identity import claim
-from gateway.keeper import Keeper
+from gateway.board.device import DeviceLink
+from gateway.ports.identity import claim
+from gateway.ports.keeper import Keeper
 from gateway.settings import DeviceSettings, GatewaySettings
-from messages import gyrofree_pb2 as pb
-from messages.bus import BusSettings, BusUnavailable, Publishers, open_client
-from messages.history import declare
-from messages.journal import Journal, JournalBusy
-from messages.topics import GATEWAY, control_key, history_key
+from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import GATEWAY, control_key, history_key
+from messages.history.answers import declare
+from messages.history.journal import Journal, JournalBusy
 
 log = logging.getLogger(__name__)
 
@@ -28,17 +29,27 @@ HISTORY_BYTES = 4 << 20  # of records in one reply; who wants more asks on from 
 BUSY_RETRY_S = 0.2  # a journal that another gateway has is asked for again after so long
 
 
-def run(settings: GatewaySettings, bus: BusSettings, stop: threading.Event, keeper: Keeper | None = None) -> None:
-    """Serve all boards of the settings until `stop` is set; without a router they are read and journalled.
+def run(
+    settings: GatewaySettings, bus: BusSettings, stop: threading.Event, keeper: Keeper | None = None
+) -> None:
+    """Serve all boards of the settings until `stop` is set; without a router they are read and
+    journalled.
 
-    `keeper` has the ports that an earlier life of this gateway left open, and holds those that this one opens.
+    `keeper` has the ports that an earlier life of this gateway left open, and holds those that this
+    one opens.
     """
     if not settings.devices:
-        log.warning("[gateway] has no [[gateway.devices]]: nothing to read; name a board and its port")
+        log.warning(
+            "[gateway] has no [[gateway.devices]]: nothing to read; name a board and its port"
+        )
     opened: Future[zenoh.Session | None] = Future()
     keeper = keeper or Keeper()
     threads = [
-        threading.Thread(target=_serve, args=(device, settings, bus.prefix, opened, stop, keeper), name=device.name)
+        threading.Thread(
+            target=_serve,
+            args=(device, settings, bus.prefix, opened, stop, keeper),
+            name=device.name,
+        )
         for device in settings.devices
     ]
     for thread in threads:
@@ -61,25 +72,38 @@ def run(settings: GatewaySettings, bus: BusSettings, stop: threading.Event, keep
 
 
 class _Line:
-    """A board's link on a thread of its own. Raises JournalBusy when another gateway has the journal."""
+    """A board's link on a thread of its own. Raises JournalBusy when another gateway has the
+    journal.
+    """
 
     def __init__(
-        self, device: DeviceSettings, settings: GatewaySettings, prefix: str, stop: threading.Event, keeper: Keeper
+        self,
+        device: DeviceSettings,
+        settings: GatewaySettings,
+        prefix: str,
+        stop: threading.Event,
+        keeper: Keeper,
     ) -> None:
         self.link = DeviceLink(device, settings, keeper)
-        self.publishers = Publishers(None, prefix, self.link.spool)  # keeps what it is given until there is a bus
+        self.publishers = Publishers(
+            None, prefix, self.link.spool
+        )  # keeps what it is given until there is a bus
         self.link.go_live(self.publishers.put)
         self._stop = stop
         self._halt = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"link-{device.name}")
         self._thread.start()
         journal = self.link.journal
-        log.info("%s: %s, journal %s, run %d", device.name, device.port, journal.folder, journal.run)
+        log.info(
+            "%s: %s, journal %s, run %d", device.name, device.port, journal.folder, journal.run
+        )
 
     def _run(self) -> None:
         try:
             self.link.run(self._halt)
-        except Exception:  # a bug of ours: end the process, so that its supervisor starts a sound one
+        except (
+            Exception
+        ):  # a bug of ours: end the process, so that its supervisor starts a sound one
             log.exception("%s: the gateway failed and stops", self.link.name)
             self._stop.set()
             raise
@@ -99,7 +123,9 @@ def _serve(
     stop: threading.Event,
     keeper: Keeper,
 ) -> None:
-    """One board until `stop`: read it at once, publish when the session is there and the name is ours."""
+    """One board until `stop`: read it at once, publish when the session is there and the name is
+    ours.
+    """
     line = None
     try:
         line = _open_line(device, settings, prefix, stop, keeper)
@@ -116,7 +142,11 @@ def _serve(
 
 
 def _open_line(
-    device: DeviceSettings, settings: GatewaySettings, prefix: str, stop: threading.Event, keeper: Keeper
+    device: DeviceSettings,
+    settings: GatewaySettings,
+    prefix: str,
+    stop: threading.Event,
+    keeper: Keeper,
 ) -> _Line | None:
     """Wait until no other gateway has the journal; None when `stop` came first."""
     said = False
@@ -125,7 +155,11 @@ def _open_line(
             return _Line(device, settings, prefix, stop, keeper)
         except JournalBusy as busy:
             if not said:
-                log.error("%s: refused: %s; the board is not read until the journal is free", device.name, busy)
+                log.error(
+                    "%s: refused: %s; the board is not read until the journal is free",
+                    device.name,
+                    busy,
+                )
             said = True
         stop.wait(BUSY_RETRY_S)
     return None
@@ -140,7 +174,9 @@ def _publish(
     stop: threading.Event,
     keeper: Keeper,
 ) -> None:
-    """Serve the name on the bus until `stop`. Refused, the line is closed, and opened again when the name is free."""
+    """Serve the name on the bus until `stop`. Refused, the line is closed, and opened again when
+    the name is free.
+    """
     refused = threading.Event()
 
     def give_up() -> None:
@@ -155,9 +191,14 @@ def _publish(
     try:
         if mine is not None:
             link = mine.link
-            key, control = history_key(prefix, device.name), control_key(prefix, device.name, "board-control")
+            key, control = (
+                history_key(prefix, device.name),
+                control_key(prefix, device.name, "board-control"),
+            )
             queryables = [
-                session.declare_queryable(key, lambda query: answer_history(query, key, link.journal)),
+                session.declare_queryable(
+                    key, lambda query: answer_history(query, key, link.journal)
+                ),
                 declare(session, prefix, device.name, GATEWAY, link.spool),
                 session.declare_queryable(control, lambda query: take_order(query, control, link)),
             ]
@@ -184,10 +225,11 @@ def take_order(query: zenoh.Query, key: str, link: DeviceLink) -> None:
 
 
 def answer_history(query: zenoh.Query, key: str, journal: Journal) -> None:
-    """Answer `first` and `last` (sequences, both included) with verbatim journal records in one payload.
+    """Answer `first` and `last` (sequences, both included) with verbatim journal records in one
+    payload.
 
-    The attachment is JSON: first_kept, last, durable, run. A range that retention has removed comes back without its
-    records and first_kept says so; a malformed one gets an error reply.
+    The attachment is JSON: first_kept, last, durable, run. A range that retention has removed comes
+    back without its records and first_kept says so; a malformed one gets an error reply.
     """
     try:
         first = int(query.parameters.get("first") or 1)

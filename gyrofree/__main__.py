@@ -1,6 +1,6 @@
 """``python -m gyrofree`` is the command line."""
 
-from gyrofree.cli import main
+from gyrofree.commands.main import main
 
 if __name__ == "__main__":
     main()

@@ -1,7 +1,7 @@
 """gyrofree.toml: one file, read once, refused loudly.
 
-Each room owns the model of its section; this module puts them together, and turns what is wrong in the file into one
-line per fault: file, line, section, what was found, what is wanted.
+Each room owns the model of its section; this module puts them together, and turns what is wrong in
+the file into one line per fault: file, line, section, what was found, what is wanted.
 """
 
 import difflib
@@ -15,8 +15,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from dashboard.settings import DashboardSettings
 from estimator.settings import EstimatorSettings
 from gateway.settings import GatewaySettings
-from messages.bus import BusSettings
-from sessions.settings import RecorderSettings
+from messages.bus.session import BusSettings
+from sessions.recording.settings import RecorderSettings
 
 DEFAULT_PATH = Path("gyrofree.toml")
 
@@ -42,7 +42,9 @@ def load(path: Path) -> Settings:
     try:
         text = path.read_text()
     except OSError as error:
-        raise ConfigError(f"{path}: {error.strerror}; name another file with --config FILE") from None
+        raise ConfigError(
+            f"{path}: {error.strerror}; name another file with --config FILE"
+        ) from None
     try:
         values = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -62,7 +64,9 @@ def check(values: dict[str, Any], source: str, text: str = "") -> Settings:
     try:
         return Settings.model_validate(values)
     except ValidationError as error:
-        raise ConfigError("\n".join(_line(fault, source, text) for fault in error.errors())) from None
+        raise ConfigError(
+            "\n".join(_line(fault, source, text) for fault in error.errors())
+        ) from None
 
 
 def _line(fault: dict[str, Any], source: str, text: str) -> str:
@@ -105,7 +109,9 @@ def _inner_model(annotation: Any) -> Any:
 
 
 def _line_number(text: str, path: list[str], key: str) -> str:
-    """':N' of the line that sets `key` below the header of its section, or '' when it cannot be told."""
+    """':N' of the line that sets `key` below the header of its section, or '' when it cannot be
+    told.
+    """
     section = ".".join(part for part in path if not part.isdigit())
     wanted = next((int(part) for part in path if part.isdigit()), 0)
     current, count = "", -1

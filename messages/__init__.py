@@ -1,1 +1,3 @@
-"""The bus: contract, topics and session. Frames, units and quaternion order are stated in gyrofree.proto."""
+"""The bus: contract, topics and session. Frames, units and quaternion order are stated in
+gyrofree.proto.
+"""

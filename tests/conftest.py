@@ -16,8 +16,13 @@ def data_dir() -> Path:
         if candidate and Path(candidate).is_dir():
             return Path(candidate)
     if os.environ.get("CI"):
-        pytest.fail("no real logs, and CI skips nothing: set GYROFREE_DATA or put shared/ beside the checkout")
-    pytest.skip("real logs not found: set GYROFREE_DATA to the folder that holds car_drive/ and receivers/")
+        pytest.fail(
+            "no real logs, and CI skips nothing: set GYROFREE_DATA or put shared/ beside the"
+            " checkout"
+        )
+    pytest.skip(
+        "real logs not found: set GYROFREE_DATA to the folder that holds car_drive/ and receivers/"
+    )
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 """The accelerometer axes on the cube: arrows coloured by how well each reading fits the others.
 
-Below <body>/axes: arrows (axes in use), excluded (thin grey lines, hollow), and one label per axis by its name.
+Below <body>/axes: arrows (axes in use), excluded (thin grey lines, hollow), and one label per axis
+by its name.
 """
 
 import numpy as np
@@ -8,7 +9,7 @@ from viser import SceneApi
 
 from dashboard.scene import geometry as geo
 from dashboard.scene.palette import AXES, GREY, SKY, VERMILLION, YELLOW, rgb
-from messages import gyrofree_pb2 as pb
+from messages.contract import gyrofree_pb2 as pb
 
 LENGTH, LABEL_AT = 0.42, 0.5  # half sides
 DOUBTFUL, BAD = 2.0, 4.0  # |residual| over its sigma
@@ -21,7 +22,11 @@ def residual_colour(axis: pb.AxisHealth.Axis) -> str:
         return GREY
     if axis.state != pb.AxisHealth.STATE_GOOD:
         return VERMILLION
-    ratio = abs(axis.residual_mps2) / axis.residual_sigma_mps2 if axis.residual_sigma_mps2 > 0.0 else 0.0
+    ratio = (
+        abs(axis.residual_mps2) / axis.residual_sigma_mps2
+        if axis.residual_sigma_mps2 > 0.0
+        else 0.0
+    )
     return VERMILLION if ratio >= BAD else YELLOW if ratio >= DOUBTFUL else SKY
 
 
@@ -34,10 +39,18 @@ class AxisArrows:
         self._labels: dict[str, object] = {}
         self._parts: list[object] = []
         self._sent: tuple = ()
-        self._draw(CUBE_NAMES, geo.SENSORS_B, geo.DIRECTIONS_B, [AXES[i % 3] for i in range(12)], (False,) * 12)
+        self._draw(
+            CUBE_NAMES,
+            geo.SENSORS_B,
+            geo.DIRECTIONS_B,
+            [AXES[i % 3] for i in range(12)],
+            (False,) * 12,
+        )
 
     def update(self, health: pb.AxisHealth | None) -> None:
-        """The newest AxisHealth of the device; None leaves the arrows in the colours of x, y and z."""
+        """The newest AxisHealth of the device; None leaves the arrows in the colours of x, y and
+        z.
+        """
         if health is None or not health.axes:
             return
         colours = [residual_colour(axis) for axis in health.axes]
@@ -46,7 +59,10 @@ class AxisArrows:
         if key == self._sent:
             return
         self._sent = key
-        placed = all(len(a.position_b_m) == 3 and len(a.direction_b) == 3 for a in health.axes) and health.scale_m > 0
+        placed = (
+            all(len(a.position_b_m) == 3 and len(a.direction_b) == 3 for a in health.axes)
+            and health.scale_m > 0
+        )
         if placed:
             r = np.array([a.position_b_m for a in health.axes]) / health.scale_m
             theta = np.array([a.direction_b for a in health.axes])
@@ -57,7 +73,12 @@ class AxisArrows:
         self._draw(tuple(a.name for a in health.axes), r, theta, colours, out)
 
     def _draw(
-        self, names: tuple[str, ...], r: np.ndarray, theta: np.ndarray, colours: list[str], out: tuple[bool, ...]
+        self,
+        names: tuple[str, ...],
+        r: np.ndarray,
+        theta: np.ndarray,
+        colours: list[str],
+        out: tuple[bool, ...],
     ) -> None:
         lines = np.stack([r, r + LENGTH * theta], axis=1).astype(np.float32)
         left_out = np.array(out, dtype=bool)
@@ -83,7 +104,7 @@ class AxisArrows:
                     rgb(GREY),
                     thickness=2.0,
                     thickness_units="screen",
-                )  # fmt: skip
+                )
             )
         if set(self._labels) != set(names):
             for label in self._labels.values():

@@ -1,6 +1,7 @@
 """What the scene is built of: ground, table, cube with its twelve axes, vehicle.
 
-Each function adds its nodes to a scene and puts the handles of those that change later into `nodes`, by their names.
+Each function adds its nodes to a scene and puts the handles of those that change later into
+`nodes`, by their names.
 """
 
 import numpy as np
@@ -11,9 +12,16 @@ from dashboard.scene.palette import GREY, ORANGE, YELLOW, estimator_title, rgb
 
 Nodes = dict[str, object]  # handles by name
 
-GROUND_BELOW = 1.0  # m below a vehicle, so that fixes scattered in height are not cut by the grid's lines
+GROUND_BELOW = (
+    1.0  # m below a vehicle, so that fixes scattered in height are not cut by the grid's lines
+)
 BOARD = (1.5, 1.0, 0.12)  # half a tilt board, drawn as large as the cube
-LABEL_CORNERS = ((1, 1, 1.1), (-1, -1, 1.35), (1, -1, 1.6), (-1, 1, 1.85))  # apart, so that names do not hide another
+LABEL_CORNERS = (
+    (1, 1, 1.1),
+    (-1, -1, 1.35),
+    (1, -1, 1.6),
+    (-1, 1, 1.85),
+)  # apart, so that names do not hide another
 
 
 def ground(scene: SceneApi, nodes: Nodes, vehicle: bool, dark: bool) -> None:
@@ -34,7 +42,9 @@ def ground(scene: SceneApi, nodes: Nodes, vehicle: bool, dark: bool) -> None:
 
 
 def table(scene: SceneApi, nodes: Nodes, dark: bool) -> None:
-    """The disc below the cube, with marks at its rim so that its turning is seen; in body axes, half sides."""
+    """The disc below the cube, with marks at its rim so that its turning is seen; in body axes,
+    half sides.
+    """
     nodes["/world/table"] = scene.add_frame("/world/table", show_axes=False)
     vertices, faces = geo.disc(2.3, 0.14, 96)
     scene.add_mesh_simple(
@@ -53,15 +63,25 @@ def table(scene: SceneApi, nodes: Nodes, dark: bool) -> None:
     rim = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))])
     marks = np.stack([rim * inner[:, None], rim * 2.26], axis=1) + [0, 0, -1.11]
     scene.add_line_segments(
-        "/world/table/marks", marks.astype(np.float32), rgb(GREY), thickness=2.0, thickness_units="screen"
+        "/world/table/marks",
+        marks.astype(np.float32),
+        rgb(GREY),
+        thickness=2.0,
+        thickness_units="screen",
     )
 
 
 def cube(scene: SceneApi, nodes: Nodes, body: str, colour: str, name: str, index: int) -> None:
-    """One estimator's cube below the frame `body`; number 0 is the main one and carries axes and rate arrow."""
+    """One estimator's cube below the frame `body`; number 0 is the main one and carries axes and
+    rate arrow.
+    """
     main = index == 0
     scene.add_line_segments(
-        f"{body}/edges", geo.box_edges((1, 1, 1)), rgb(colour), thickness=3.0, thickness_units="screen"
+        f"{body}/edges",
+        geo.box_edges((1, 1, 1)),
+        rgb(colour),
+        thickness=3.0,
+        thickness_units="screen",
     )
     scene.add_box(
         f"{body}/faces",
@@ -84,8 +104,12 @@ def cube(scene: SceneApi, nodes: Nodes, body: str, colour: str, name: str, index
 
 
 def board(scene: SceneApi, body: str, colour: str, name: str, index: int) -> None:
-    """One filter's tilt board below the frame `body`, forward-right-down; number 0 is filled and shows its nose."""
-    scene.add_line_segments(f"{body}/edges", geo.box_edges(BOARD), rgb(colour), thickness=3.0, thickness_units="screen")
+    """One filter's tilt board below the frame `body`, forward-right-down; number 0 is filled and
+    shows its nose.
+    """
+    scene.add_line_segments(
+        f"{body}/edges", geo.box_edges(BOARD), rgb(colour), thickness=3.0, thickness_units="screen"
+    )
     if index == 0:
         scene.add_box(
             f"{body}/faces",
@@ -117,13 +141,19 @@ def _rate_arrow(scene: SceneApi, nodes: Nodes, body: str) -> None:
     """The arrow of omega; where it points is set with each update."""
     path = f"{body}/rate"
     points = np.array([[[0, 0, 0], [0, 0, 0.01]]], dtype=np.float32)
-    nodes[path] = scene.add_arrows(path, points, rgb(ORANGE), shaft_radius=0.045, head_radius=0.11, head_length=0.24)
-    nodes[f"{path}_label"] = scene.add_label(f"{path}_label", "", anchor="center-left", font_screen_scale=0.9)
+    nodes[path] = scene.add_arrows(
+        path, points, rgb(ORANGE), shaft_radius=0.045, head_radius=0.11, head_length=0.24
+    )
+    nodes[f"{path}_label"] = scene.add_label(
+        f"{path}_label", "", anchor="center-left", font_screen_scale=0.9
+    )
 
 
 def vehicle(scene: SceneApi, nodes: Nodes, body: str, colour: str, name: str) -> None:
     """A car, its heading and its estimator's name below the frame `body`, forward-right-down, m."""
-    scene.add_line_segments(f"{body}/edges", geo.vehicle_edges(), rgb(colour), thickness=3.0, thickness_units="screen")
+    scene.add_line_segments(
+        f"{body}/edges", geo.vehicle_edges(), rgb(colour), thickness=3.0, thickness_units="screen"
+    )
     scene.add_box(
         f"{body}/faces",
         color=rgb(colour),

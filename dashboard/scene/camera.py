@@ -1,17 +1,22 @@
-"""Where the camera stands so that the body is seen whole, beside the panels or above the sheet of a phone."""
+"""Where the camera stands so that the body is seen whole, beside the panels or above the sheet of a
+phone.
+"""
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
-PHONE_ASPECT = 0.6  # width over height below which the page has a sheet over its lower part instead of panels beside
+# width over height below which the page has a sheet over its lower part instead of panels beside
+PHONE_ASPECT = 0.6
 PHONE_CENTRE = 0.28  # where the middle of the picture is then, as a part of the height from the top
 
 
 @dataclass(frozen=True)
 class Aim:
-    """A usual view: the point looked at, where from, and what must fit; display frame, its units."""
+    """A usual view: the point looked at, where from, and what must fit; display frame, its
+    units.
+    """
 
     centre: tuple[float, float, float]
     offset: tuple[float, float, float]
@@ -19,14 +24,17 @@ class Aim:
 
 
 CUBE = Aim((0.0, 0.0, 0.25), (4.3, -3.6, 2.35), 2.9)
-VEHICLE = Aim((0.0, 0.0, 0.0), (-50.0, -42.0, 58.0), 42.0)  # m; the last 200 m of a way that is not all straight
+VEHICLE = Aim(
+    (0.0, 0.0, 0.0), (-50.0, -42.0, 58.0), 42.0
+)  # m; the last 200 m of a way that is not all straight
 
 
 def aim(view: Aim, fov: float, aspect: float) -> tuple[np.ndarray, np.ndarray]:
-    """Position and look_at of a camera, (3,) each, for a vertical field of view (rad) and a width over height.
+    """Position and look_at of a camera, (3,) each, for a vertical field of view (rad) and a width
+    over height.
 
-    The camera goes back from the centre until half_width fits. On a phone it is moved down across its line of sight,
-    so that the centre rises to PHONE_CENTRE.
+    The camera goes back from the centre until half_width fits. On a phone it is moved down across
+    its line of sight, so that the centre rises to PHONE_CENTRE.
     """
     centre, offset = np.array(view.centre), np.array(view.offset)
     half_height = math.tan(fov / 2)  # of the picture, at distance 1

@@ -1,9 +1,10 @@
 """One uPlot chart: curves with 3-sigma bands, grey gaps, and a heading with live values.
 
-uPlot's own legend knows values only under the cursor, so the heading takes its place. Known traps of the charts and
-what is done about them: NaN is never sent; the time axis is told that it is not a date; a gap is a grey series on a
-scale of its own, drawn last and opaque so that it covers the straight line beneath. What was filled in after a loss has
-an amber strip at the bottom, and a note a vertical line, made the same way.
+uPlot's own legend knows values only under the cursor, so the heading takes its place. Known traps
+of the charts and what is done about them: NaN is never sent; the time axis is told that it is not a
+date; a gap is a grey series on a scale of its own, drawn last and opaque so that it covers the
+straight line beneath. What was filled in after a loss has an amber strip at the bottom, and a note
+a vertical line, made the same way.
 """
 
 from collections.abc import Sequence
@@ -21,7 +22,9 @@ REPAIRED, MARK = "#e69f00", "#cc79a7"  # both of the colour-blind safe palette
 
 @dataclass
 class Curve:
-    """One line of a chart. t (n,) s, y (n,) in the chart's unit; half (n,) is the half width of its band."""
+    """One line of a chart. t (n,) s, y (n,) in the chart's unit; half (n,) is the half width of its
+    band.
+    """
 
     label: str
     colour: str
@@ -46,7 +49,9 @@ class Shade:
 
 
 class Chart:
-    """A chart inside a container of a client's GUI; show() builds it again only when its set of curves changes."""
+    """A chart inside a container of a client's GUI; show() builds it again only when its set of
+    curves changes.
+    """
 
     def __init__(
         self,
@@ -78,8 +83,8 @@ class Chart:
     ) -> None:
         """Draw the window [t0, t1]; gaps are those of the curve number `primary`.
 
-        Stretches [from, until] of `late` get a strip at the bottom: filled in after a loss. Each of `marks` (s) gets a
-        line from top to bottom. A shade lies behind the times it names.
+        Stretches [from, until] of `late` get a strip at the bottom: filled in after a loss. Each of
+        `marks` (s) gets a line from top to bottom. A shade lies behind the times it names.
         """
         shades = [shade for shade in shades if len(shade.t)]
         heading = self._heading_html(curves, shades)
@@ -99,7 +104,8 @@ class Chart:
         if self._plot is None:
             self._build(curves, data, dark, shades)
         elif signature != self._signature:
-            # Changed in place: a browser that is behind would complain of an update of a chart already removed.
+            # Changed in place: a browser that is behind would complain of an update of a chart
+            # already removed.
             self._plot.series, self._plot.bands = _lines(curves, dark, shades)
             self._plot.data = data
         else:
@@ -114,25 +120,34 @@ class Chart:
             if not curve.label:
                 continue
             good = curve.y[np.isfinite(curve.y)] if curve.live else curve.y[:0]
-            value = number(float(good[-1]), self._digits) if len(good) else ("–" if curve.live else "")
+            value = (
+                number(float(good[-1]), self._digits) if len(good) else ("–" if curve.live else "")
+            )
             mark = "gf-dash" if curve.dash else "gf-line"
             stale = " gf-stale" if curve.stale else ""
             items.append(
-                f'<span class="gf-item{stale}"><i class="{mark}" style="border-color:{curve.colour}"></i>'
-                f"{curve.label} <b>{value}</b></span>"
+                f'<span class="gf-item{stale}"><i class="{mark}"'
+                f' style="border-color:{curve.colour}"></i>{curve.label} <b>{value}</b></span>'
             )
         for shade in shades:
             if shade.on.any():
-                items.append(f'<span class="gf-item"><i class="gf-line" style="border-color:{shade.colour};'
-                             f'border-width:8px"></i>{shade.label}</span>')  # fmt: skip
+                items.append(
+                    f'<span class="gf-item"><i class="gf-line" style="border-color:{shade.colour};'
+                    f'border-width:8px"></i>{shade.label}</span>'
+                )
         empty = "" if items else '<span class="gf-item gf-stale">no data yet</span>'
         return (
-            f'<div class="gf-chart"><span class="gf-title">{self._title} <em>{self._unit}</em></span>'
-            f'<span class="gf-legend">{"".join(items)}{empty}</span></div>'
+            f'<div class="gf-chart"><span class="gf-title">{self._title}'
+            f" <em>{self._unit}</em></span><span"
+            f' class="gf-legend">{"".join(items)}{empty}</span></div>'
         )
 
     def _build(
-        self, curves: Sequence[Curve], data: tuple[np.ndarray, ...], dark: bool, shades: Sequence[Shade] = ()
+        self,
+        curves: Sequence[Curve],
+        data: tuple[np.ndarray, ...],
+        dark: bool,
+        shades: Sequence[Shade] = (),
     ) -> None:
         lines, bands = _lines(curves, dark, shades)
         with self._folder:
@@ -141,7 +156,10 @@ class Chart:
                 series=lines,
                 bands=bands,
                 scales={"x": {"time": False}, "y": {}, "gap": {"range": (0, 1)}},
-                axes=({"size": 26, "font": "11px sans-serif"}, {"size": 46, "font": "11px sans-serif"}),
+                axes=(
+                    {"size": 26, "font": "11px sans-serif"},
+                    {"size": 46, "font": "11px sans-serif"},
+                ),
                 legend={"show": False},
                 height=self._height,
                 padding=(6, 10, 0, 0),
@@ -156,14 +174,28 @@ def _lines(
     lines: list[dict] = [{"label": "t"}]
     bands: list[dict] = []
     for curve in curves:
-        line = {"label": curve.label, "stroke": curve.colour, "width": curve.width, "points": {"show": False}}
+        line = {
+            "label": curve.label,
+            "stroke": curve.colour,
+            "width": curve.width,
+            "points": {"show": False},
+        }
         lines.append(line | ({"dash": (6, 4)} if curve.dash else {}))
         if curve.half is not None:
             bands.append({"series": (len(lines), len(lines) + 1), "fill": rgba(curve.colour, 0.20)})
             edge = {"stroke": rgba(curve.colour, 0.35), "width": 0.7, "points": {"show": False}}
-            lines += [edge | {"label": f"{curve.label} +3σ"}, edge | {"label": f"{curve.label} −3σ"}]
+            lines += [
+                edge | {"label": f"{curve.label} +3σ"},
+                edge | {"label": f"{curve.label} −3σ"},
+            ]
     for shade in shades:
-        fill = {"scale": "gap", "stroke": shade.colour, "width": 0, "fill": rgba(shade.colour, 0.25), "fillTo": 0}
+        fill = {
+            "scale": "gap",
+            "stroke": shade.colour,
+            "width": 0,
+            "fill": rgba(shade.colour, 0.25),
+            "fillTo": 0,
+        }
         lines.append(fill | {"label": shade.label, "points": {"show": False}})
     grey = "#3b3b3b" if dark else "#d5d5d5"
     gap = {"label": "gap", "scale": "gap", "stroke": grey, "width": 0, "fill": grey, "fillTo": 0}
@@ -182,11 +214,14 @@ def _data(
     marks: Sequence[float] = (),
     shades: Sequence[Shade] = (),
 ) -> tuple[np.ndarray, ...]:
-    """The arrays of a chart: time, each curve with the edges of its band, and the gap mask; all of one length."""
+    """The arrays of a chart: time, each curve with the edges of its band, and the gap mask; all of
+    one length.
+    """
     edges, x = series.grid(t0, t1)
     lines = [series.decimate(curve.t, curve.y, edges)[0] for curve in curves]
     low, high = min(float(y.min()) for y in lines), max(float(y.max()) for y in lines)
-    # A band that grows without bound would press the curves flat: it is cut half their range outside.
+    # A band that grows without bound would press the curves flat: it is cut half their range
+    # outside.
     reach = max((high - low) / 2, 1e-9)
     out = [x]
     for curve, y in zip(curves, lines, strict=True):

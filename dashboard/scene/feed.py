@@ -1,7 +1,9 @@
-"""From the bus into the store: Zenoh's thread only appends, one thread of ours takes the messages in.
+"""From the bus into the store: Zenoh's thread only appends, one thread of ours takes the messages
+in.
 
-Pictures want the newest, so nothing waits for a gap; what was missed is asked for and comes in late, marked. A device
-that is heard for the first time is asked for its last ten minutes: at once as an overview, then the newest in full.
+Pictures want the newest, so nothing waits for a gap; what was missed is asked for and comes in
+late, marked. A device that is heard for the first time is asked for its last ten minutes: at once
+as an overview, then the newest in full.
 """
 
 import logging
@@ -12,11 +14,11 @@ from collections import deque
 import zenoh
 
 from dashboard.scene.store import Store
-from messages import bus as busmod
-from messages import gyrofree_pb2 as pb
-from messages import topics as tp
-from messages.history import Asker
-from messages.mending import Arrival, Mender, Question
+from messages.bus import session as busmod
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract import topics as tp
+from messages.history.answers import Asker
+from messages.history.mending import Arrival, Mender, Question
 
 log = logging.getLogger(__name__)
 
@@ -30,9 +32,13 @@ BUSY_S, IDLE_S = 0.02, 0.1  # pause between rounds with and without a browser
 
 
 class Feed:
-    """One Zenoh session of the dashboard; `watched` is set while a browser looks. stop() ends it."""
+    """One Zenoh session of the dashboard; `watched` is set while a browser looks. stop() ends
+    it.
+    """
 
-    def __init__(self, settings: busmod.BusSettings, store: Store, watched: threading.Event) -> None:
+    def __init__(
+        self, settings: busmod.BusSettings, store: Store, watched: threading.Event
+    ) -> None:
         self._settings, self._store, self.watched = settings, store, watched
         self._queue: deque = deque(maxlen=QUEUE)
         self._stop = threading.Event()
@@ -53,11 +59,15 @@ class Feed:
         return self._session is not None and busmod.connected(self._session)
 
     def recorder(self, command: pb.RecorderCommand, timeout_s: float = 5.0) -> pb.RecorderStatus:
-        """Give the recorder an order and return its answer; raises ConnectionError when it does not come."""
+        """Give the recorder an order and return its answer; raises ConnectionError when it does not
+        come.
+        """
         if self._session is None:
             raise ConnectionError("no connection to the router yet")
         replies = self._session.get(
-            tp.recorder_control_key(self._settings.prefix), payload=command.SerializeToString(), timeout=timeout_s
+            tp.recorder_control_key(self._settings.prefix),
+            payload=command.SerializeToString(),
+            timeout=timeout_s,
         )
         for reply in replies:
             if reply.ok is not None:
@@ -65,7 +75,8 @@ class Feed:
         raise ConnectionError("the recorder does not answer: is `gyrofree record` running?")
 
     def estimator(self, command: pb.EstimatorCommand, timeout_s: float = 20.0) -> pb.Reply:
-        """Give the estimator of a device an order and return its answer; raises ConnectionError without one.
+        """Give the estimator of a device an order and return its answer; raises ConnectionError
+        without one.
 
         A fit takes seconds, and the order waits for the samples before it.
         """
@@ -78,7 +89,9 @@ class Feed:
         raise ConnectionError("the estimator does not answer: is `gyrofree estimator` running?")
 
     def board(self, device: str, command: pb.BoardCommand, timeout_s: float = 8.0) -> pb.Reply:
-        """Give a board an order and return its answer; raises ConnectionError when its gateway does not answer."""
+        """Give a board an order and return its answer; raises ConnectionError when its gateway does
+        not answer.
+        """
         if self._session is None:
             raise ConnectionError("no connection to the router yet")
         key = tp.control_key(self._settings.prefix, device, "board-control")
@@ -88,7 +101,9 @@ class Feed:
         raise ConnectionError("the gateway does not answer: is `gyrofree gateway` running?")
 
     def replay(self, command: pb.ReplayCommand, timeout_s: float = 5.0) -> pb.ReplayStatus:
-        """Give the replay an order and return its answer; raises ConnectionError when there is none."""
+        """Give the replay an order and return its answer; raises ConnectionError when there is
+        none.
+        """
         if self._session is None:
             raise ConnectionError("no connection to the router yet")
         key = tp.replay_control_key(self._settings.prefix)
@@ -98,7 +113,9 @@ class Feed:
         raise ConnectionError("no replay answers: it has ended")
 
     def note(self, device: str, note: pb.Note) -> None:
-        """Publish a remark, for the recording and for every chart; raises ConnectionError without a router."""
+        """Publish a remark, for the recording and for every chart; raises ConnectionError without a
+        router.
+        """
         if not self.connected or self._session is None:
             raise ConnectionError("no router")
         if self._publishers is None:
@@ -116,8 +133,12 @@ class Feed:
             self._session = busmod.open_client(self._settings, self._stop)
         except busmod.BusUnavailable:
             return  # stopped while waiting
-        self._asker = Asker(self._session, self._settings.prefix, lambda *answer: self._answers.append(answer))
-        subscriber = self._session.declare_subscriber(f"{self._settings.prefix}/**", self._on_sample)
+        self._asker = Asker(
+            self._session, self._settings.prefix, lambda *answer: self._answers.append(answer)
+        )
+        subscriber = self._session.declare_subscriber(
+            f"{self._settings.prefix}/**", self._on_sample
+        )
         log.info("showing %s/* from %s", self._settings.prefix, self._settings.router)
         while not self._stop.wait(BUSY_S if self.watched.is_set() else IDLE_S):
             self._drain()
@@ -139,7 +160,10 @@ class Feed:
             try:
                 address = tp.parse(key)
                 if address.topic.name in TOPICS:
-                    self._take(Arrival(address.topic, address.device, address.estimator, payload, 0), arrived)
+                    self._take(
+                        Arrival(address.topic, address.device, address.estimator, payload, 0),
+                        arrived,
+                    )
             except Exception as error:  # a foreign message must not stop the picture
                 log.warning("%s: not shown (%s: %s)", key, type(error).__name__, error)
         self._store.dropped = max(0, self._received - self._taken - len(self._queue))
@@ -158,7 +182,9 @@ class Feed:
     def _ask_past(self, device: str, now_ns: int) -> None:
         """The overview first, for it is quick; then the newest in full."""
         overview = pb.HistoryQuery(from_utc_ns=now_ns - int(PAST_S * 1e9), every_s=PAST_EVERY_S)
-        full = pb.HistoryQuery(from_utc_ns=now_ns - int(FULL_S * 1e9), until_utc_ns=now_ns, max_bytes=1 << 20)
+        full = pb.HistoryQuery(
+            from_utc_ns=now_ns - int(FULL_S * 1e9), until_utc_ns=now_ns, max_bytes=1 << 20
+        )
         for query in (overview, full):
             for source in (tp.GATEWAY, tp.ESTIMATES):
                 self._asker.ask((device, source, query), device, source, query)
@@ -174,11 +200,19 @@ class Feed:
                 name, _, estimator = item.topic.partition("/")
                 topic = TOPICS.get(name)
                 if topic is not None:
-                    late.append(Arrival(topic, device, estimator, item.payload, item.published_ns, late=True))
+                    late.append(
+                        Arrival(
+                            topic, device, estimator, item.payload, item.published_ns, late=True
+                        )
+                    )
             if reply is not None and reply.next:
                 query.position = reply.next
                 self._asker.ask(token, device, source, query)
-        decoded = [(a.topic, a.estimator, busmod.decode(a.topic, a.payload)) for a in late if a.topic.name in TOPICS]
+        decoded = [
+            (a.topic, a.estimator, busmod.decode(a.topic, a.payload))
+            for a in late
+            if a.topic.name in TOPICS
+        ]
         self._store.put_late(device, [row for row in decoded if row[2] is not None], repaired)
 
     def _ask(self, question: Question) -> None:

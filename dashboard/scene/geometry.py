@@ -1,16 +1,17 @@
 """Shapes of the scene and the step from navigation frame to screen.
 
-n is north-east-down everywhere outside. The node '/world' alone turns n into viser's z-up display frame (east, north,
-up), so every node below it carries its quaternion and position as they stand in the messages.
+n is north-east-down everywhere outside. The node '/world' alone turns n into viser's z-up display
+frame (east, north, up), so every node below it carries its quaternion and position as they stand in
+the messages.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from estimator.ins.geodetic import ned_between
-from estimator.layouts.layout import CUBE
-from messages import gyrofree_pb2 as pb
+from inertial.layouts.layout import CUBE
+from inertial.navigation.geodetic import ned_between
+from messages.contract import gyrofree_pb2 as pb
 
 # Rotation n (north, east, down) -> display (east, north, up): half a turn about (1, 1, 0), w x y z.
 Q_DISPLAY_N = (0.0, 0.5**0.5, 0.5**0.5, 0.0)
@@ -41,13 +42,19 @@ def quaternion(values) -> tuple[float, float, float, float] | None:
 def ned_from_geodetic(
     latitude_deg: float, longitude_deg: float, height_m: float, origin: tuple[float, float, float]
 ) -> np.ndarray:
-    """North, east, down in m from an origin (latitude deg, longitude deg, height m); for places near by."""
+    """North, east, down in m from an origin (latitude deg, longitude deg, height m); for places
+    near by.
+    """
     there, here = np.radians((latitude_deg, longitude_deg)), np.radians(origin[:2])
     return np.array(ned_between((here[0], here[1], origin[2]), (there[0], there[1], height_m)))
 
 
-def ellipsoid(covariance, sigmas: float = 3.0) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
-    """Half axes (3) and orientation (w, x, y, z) of the surface `sigmas` standard deviations out; None without one."""
+def ellipsoid(
+    covariance, sigmas: float = 3.0
+) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+    """Half axes (3) and orientation (w, x, y, z) of the surface `sigmas` standard deviations out;
+    None without one.
+    """
     if len(covariance) != 9:
         return None
     c = np.asarray(covariance, dtype=float).reshape(3, 3)
@@ -61,7 +68,9 @@ def ellipsoid(covariance, sigmas: float = 3.0) -> tuple[tuple[float, ...], tuple
 
 
 def matrix_to_quaternion(c: np.ndarray) -> tuple[float, float, float, float]:
-    """Rotation matrix (3, 3) to w, x, y, z (Shepperd's method: divides by the largest component)."""
+    """Rotation matrix (3, 3) to w, x, y, z (Shepperd's method: divides by the largest
+    component).
+    """
     trace = float(np.trace(c))
     squares = np.array([trace, *np.diag(c)])
     k = int(np.argmax(squares))
@@ -80,14 +89,27 @@ def matrix_to_quaternion(c: np.ndarray) -> tuple[float, float, float, float]:
 def box_edges(half: tuple[float, float, float], centre=(0.0, 0.0, 0.0)) -> np.ndarray:
     """The 12 edges of a box as line segments (12, 2, 3)."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-    pairs = [(i, j) for i in range(8) for j in range(i + 1, 8) if np.sum(corners[i] != corners[j]) == 1]
+    pairs = [
+        (i, j) for i in range(8) for j in range(i + 1, 8) if np.sum(corners[i] != corners[j]) == 1
+    ]
     return (corners[np.array(pairs)] * np.asarray(half) + np.asarray(centre)).astype(np.float32)
 
 
 def vehicle_edges() -> np.ndarray:
-    """Outline of a passenger car in forward-right-down axes, m: segments (n, 2, 3); origin at the floor's middle."""
+    """Outline of a passenger car in forward-right-down axes, m: segments (n, 2, 3); origin at the
+    floor's middle.
+    """
     side = np.array(
-        [[2.2, -0.3], [2.2, -0.75], [1.1, -0.9], [0.4, -1.45], [-1.3, -1.45], [-2.0, -0.95], [-2.2, -0.9], [-2.2, -0.3]]
+        [
+            [2.2, -0.3],
+            [2.2, -0.75],
+            [1.1, -0.9],
+            [0.4, -1.45],
+            [-1.3, -1.45],
+            [-2.0, -0.95],
+            [-2.2, -0.9],
+            [-2.2, -0.3],
+        ]
     )
     loops = [np.column_stack([side[:, 0], np.full(len(side), y), side[:, 1]]) for y in (-0.9, 0.9)]
     around = [np.stack([loop, np.roll(loop, -1, axis=0)], axis=1) for loop in loops]
@@ -103,15 +125,17 @@ def disc(radius: float, thickness: float, sides: int = 64) -> tuple[np.ndarray, 
     j = (i + 1) % sides
     top = np.column_stack([np.full(sides, 2 * sides), i, j])
     bottom = np.column_stack([np.full(sides, 2 * sides + 1), j + sides, i + sides])
-    wall = np.vstack([np.column_stack([i, i + sides, j]), np.column_stack([j, i + sides, j + sides])])
+    wall = np.vstack(
+        [np.column_stack([i, i + sides, j]), np.column_stack([j, i + sides, j + sides])]
+    )
     return vertices.astype(np.float32), np.vstack([top, bottom, wall]).astype(np.uint32)
 
 
 class Track:
     """A growing line of points in n, in pieces, so that a browser gets only the last piece again.
 
-    Points nearer than `spacing` (m) to the last are left out; when there are too many pieces, every second point goes
-    and the spacing doubles.
+    Points nearer than `spacing` (m) to the last are left out; when there are too many pieces, every
+    second point goes and the spacing doubles.
     """
 
     PIECE = 250
@@ -129,7 +153,9 @@ class Track:
         if last is not None and np.linalg.norm(np.subtract(point, last)) < self.spacing:
             return
         if len(self.pieces[-1]) >= self.PIECE:
-            self.pieces.append([self.pieces[-1][-1]])  # pieces share a point, so that the line is not broken
+            self.pieces.append(
+                [self.pieces[-1][-1]]
+            )  # pieces share a point, so that the line is not broken
         self.pieces[-1].append(point)
         if len(self.pieces) > self.PIECES:
             self._thin()
@@ -162,7 +188,9 @@ def yaw_of(q_nb: Sequence[float]) -> float:
 
 
 def facing(q_nb: Sequence[float], other: Sequence[float]) -> tuple[float, ...] | None:
-    """q_nb (4,) turned about the vertical to the heading of another; None where it is no rotation."""
+    """q_nb (4,) turned about the vertical to the heading of another; None where it is no
+    rotation.
+    """
     q = quaternion(q_nb)
     if q is None or quaternion(other) is None:
         return q

@@ -1,10 +1,12 @@
-"""Colours (Okabe and Ito's set, distinguishable with the common colour deficiencies) and number formats."""
+"""Colours (Okabe and Ito's set, distinguishable with the common colour deficiencies) and number
+formats.
+"""
 
 import html
 import math
 from collections.abc import Iterable
 
-from messages import gyrofree_pb2 as pb
+from messages.contract import gyrofree_pb2 as pb
 
 ORANGE, SKY, GREEN, YELLOW = "#E69F00", "#56B4E9", "#009E73", "#F0E442"
 BLUE, VERMILLION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#8C8C8C"
@@ -54,7 +56,9 @@ SOURCES = {
 
 
 def estimator_colour(name: str, among: Iterable[str] = ()) -> str:
-    """The colour of an estimator: fixed for ours, else by its place among the names that have none."""
+    """The colour of an estimator: fixed for ours, else by its place among the names that have
+    none.
+    """
     if name in _ESTIMATORS:
         return _ESTIMATORS[name]
     others = sorted({other for other in among if other not in _ESTIMATORS} | {name})
@@ -64,7 +68,9 @@ def estimator_colour(name: str, among: Iterable[str] = ()) -> str:
 def estimator_title(name: str) -> str:
     """The estimator's name for people."""
     if name.startswith(GYRO_FREE):
-        return f"gyro-free, {_TITLES.get(name.removeprefix(GYRO_FREE), name.removeprefix(GYRO_FREE))}"
+        return (
+            f"gyro-free, {_TITLES.get(name.removeprefix(GYRO_FREE), name.removeprefix(GYRO_FREE))}"
+        )
     return _TITLES.get(name, name)
 
 
@@ -98,7 +104,9 @@ def escape(text: str) -> str:
 
 
 def rows(items: Iterable[tuple[str, str]], stale: bool = False) -> str:
-    """A two-column table as HTML; values may carry markup, so callers escape what comes from outside."""
+    """A two-column table as HTML; values may carry markup, so callers escape what comes from
+    outside.
+    """
     body = "".join(f"<tr><td>{label}</td><td>{value}</td></tr>" for label, value in items)
     return f'<table class="gf-rows{" gf-stale" if stale else ""}">{body}</table>'
 

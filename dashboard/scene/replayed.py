@@ -1,12 +1,14 @@
-"""What is known of a replay: whether it plays, and which devices are its own. Called under the store's lock."""
+"""What is known of a replay: whether it plays, and which devices are its own. Called under the
+store's lock.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from messages import gyrofree_pb2 as pb
-from sessions.replay import SUFFIX
+from messages.contract import gyrofree_pb2 as pb
+from sessions.replay.replay import SUFFIX
 
 ENDED_S = 5.0  # without a status a replay has ended; the next one is another
 
@@ -22,7 +24,11 @@ class Replayed:
 
     def take(self, status: pb.ReplayStatus, arrived: float) -> None:
         """One more status."""
-        if self.status is None or arrived - self.arrived > ENDED_S or self.status.session != status.session:
+        if (
+            self.status is None
+            or arrived - self.arrived > ENDED_S
+            or self.status.session != status.session
+        ):
             self.began, self.paused_at = arrived, np.inf
         self.paused_at = min(self.paused_at, arrived) if status.paused else np.inf
         self.status, self.arrived = status, arrived
@@ -40,12 +46,16 @@ class Replayed:
         return "paused" if self.status.paused else "playing"
 
     def clock(self, device: str, now: float) -> float:
-        """What the age of a device's messages counts to: time stands still for a replay that does, too."""
+        """What the age of a device's messages counts to: time stands still for a replay that does,
+        too.
+        """
         return min(now, self.paused_at) if self.state(device, now) == "paused" else now
 
     def device(self, devices: Mapping) -> str | None:
         """First one of `devices` that this replay has sent data of; None before."""
         for name in sorted(devices):
-            if name.endswith(SUFFIX) and any(one.arrived > self.began for one in devices[name].latest.values()):
+            if name.endswith(SUFFIX) and any(
+                one.arrived > self.began for one in devices[name].latest.values()
+            ):
                 return name
         return None

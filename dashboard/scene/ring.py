@@ -4,7 +4,9 @@ import numpy as np
 
 
 class Ring:
-    """The newest `capacity` rows of a table whose first column is the time, s. Not locked: the store does that."""
+    """The newest `capacity` rows of a table whose first column is the time, s. Not locked: the
+    store does that.
+    """
 
     def __init__(self, columns: int, capacity: int) -> None:
         self._rows = np.full((capacity, columns + 1), np.nan)
@@ -12,7 +14,9 @@ class Ring:
         self.count = 0
 
     def append(self, t: float, values: np.ndarray | list[float]) -> None:
-        """Add a row; missing values at its end stay NaN, too many are cut. A row not after the last is dropped."""
+        """Add a row; missing values at its end stay NaN, too many are cut. A row not after the last
+        is dropped.
+        """
         if self.count and t <= self._rows[self._next - 1, 0]:
             return
         row = self._rows[self._next]
@@ -22,7 +26,9 @@ class Ring:
         self.count = min(self.count + 1, len(self._rows))
 
     def merge(self, rows: np.ndarray) -> None:
-        """Take in older rows (n, columns + 1), time first, in any order; at an equal time what is there stays."""
+        """Take in older rows (n, columns + 1), time first, in any order; at an equal time what is
+        there stays.
+        """
         held = self.rows()
         both = np.concatenate([held, rows])
         order = np.argsort(both[:, 0], kind="stable")
@@ -40,7 +46,9 @@ class Ring:
         return np.concatenate([self._rows[self._next :], self._rows[: self._next]])
 
     def window(self, t0: float, t1: float) -> tuple[np.ndarray, np.ndarray]:
-        """Times (n,) and values (n, columns) of the rows with t0 <= t <= t1, oldest first, copied."""
+        """Times (n,) and values (n, columns) of the rows with t0 <= t <= t1, oldest first,
+        copied.
+        """
         rows = self.rows()
         first, last = np.searchsorted(rows[:, 0], [t0, t1 + 1e-9])
         chosen = rows[first:last].copy()

@@ -1,19 +1,20 @@
 """The 3-D scene of one browser: what is where, from the newest messages of the chosen device.
 
-Names of the nodes, which tests and other tools may rely on. Below /world everything stands in n (north, east, down):
-a node's quaternion (w, x, y, z) is the q_nb of the message and its position is in metres (the cube: half sides).
+Names of the nodes, which tests and other tools may rely on. Below /world everything stands in n
+(north, east, down): a node's quaternion (w, x, y, z) is the q_nb of the message and its position is
+in metres (the cube: half sides).
 
-    /world                              n turned into the z-up display frame; moved against the vehicle when following
-    /world/truth                        body frame of what is really the case; simulated devices only
-    /world/truth/edges
-    /world/estimate/<estimator>/body    body frame of one estimator (rate/<estimator> or nav/<estimator>)
-    /world/estimate/<estimator>/body/{edges,faces,axes,label}      axes: the twelve sensors, on the main estimator only
-    /world/estimate/<estimator>/body/rate, .../rate_label          arrow of omega_ib_b, on the main estimator only
-    /world/estimate/<estimator>/trajectory/<piece>                 vehicles
-    /world/estimate/<estimator>/ellipsoid                          3-sigma position, at the body
-    (a board that only tilts: attitude/<estimator>, all with the heading of the truth or of the first)
-    /world/table                        the table below the cube, turning with the truth, else with the main estimate
-    /world/fixes/<piece>                GNSS fixes
+    /world                              n turned into the z-up display frame; moved against the
+    vehicle when following /world/truth                        body frame of what is really the
+    case; simulated devices only /world/truth/edges /world/estimate/<estimator>/body    body frame
+    of one estimator (rate/<estimator> or nav/<estimator>)
+    /world/estimate/<estimator>/body/{edges,faces,axes,label}      axes: the twelve sensors, on the
+    main estimator only /world/estimate/<estimator>/body/rate, .../rate_label          arrow of
+    omega_ib_b, on the main estimator only /world/estimate/<estimator>/trajectory/<piece>
+    vehicles /world/estimate/<estimator>/ellipsoid                          3-sigma position, at the
+    body (a board that only tilts: attitude/<estimator>, all with the heading of the truth or of the
+    first) /world/table                        the table below the cube, turning with the truth,
+    else with the main estimate /world/fixes/<piece>                GNSS fixes
     /world/fixes/rejected/<piece>       those of them that the main estimator did not believe
     /world/ground                       grid
 """
@@ -64,7 +65,9 @@ class SceneView:
     def reset_camera(self, vehicle: bool) -> None:
         """Look at the body from the usual side."""
         seen = self._client.camera
-        position, look_at = camera.aim(camera.VEHICLE if vehicle else camera.CUBE, seen.fov, seen.aspect)
+        position, look_at = camera.aim(
+            camera.VEHICLE if vehicle else camera.CUBE, seen.fov, seen.aspect
+        )
         with self._client.atomic():
             seen.up_direction = (0.0, 0.0, 1.0)
             seen.position, seen.look_at = position, look_at
@@ -124,7 +127,8 @@ class SceneView:
                 colour = rgb(estimator_colour(estimator, device.estimators("nav")))
                 self._track(f"/world/estimate/{estimator}/trajectory", track, colour)
 
-    # --- building -------------------------------------------------------------------------------------------------
+    # --- building
+    # -------------------------------------------------------------------------------------------------
 
     def _lights(self) -> None:
         """Our own lights: the default ones are so strong that colours turn to white."""
@@ -135,7 +139,9 @@ class SceneView:
 
     def _build(self, kind: str, estimators: list[str], truth: bool) -> None:
         scene, dark, vehicle = self._scene, self._choice.dark, kind == "nav"
-        self._nodes["/world"] = scene.add_frame("/world", show_axes=False, wxyz=geo.Q_DISPLAY_N, visible=self._shown)
+        self._nodes["/world"] = scene.add_frame(
+            "/world", show_axes=False, wxyz=geo.Q_DISPLAY_N, visible=self._shown
+        )
         bodies.ground(scene, self._nodes, vehicle, dark)
         for index, name in enumerate(estimators):
             colour = estimator_colour(name, estimators)
@@ -145,7 +151,12 @@ class SceneView:
                 bodies.vehicle(scene, self._nodes, body, colour, name)
                 path = f"/world/estimate/{name}/ellipsoid"
                 self._nodes[path] = scene.add_icosphere(
-                    path, radius=1.0, color=rgb(colour), opacity=0.22, cast_shadow=False, visible=False
+                    path,
+                    radius=1.0,
+                    color=rgb(colour),
+                    opacity=0.22,
+                    cast_shadow=False,
+                    visible=False,
                 )
             elif kind == "attitude":
                 bodies.board(scene, body, colour, name, index)
@@ -165,7 +176,8 @@ class SceneView:
                 thickness_units="screen",
             )
 
-    # --- updating -------------------------------------------------------------------------------------------------
+    # --- updating
+    # -------------------------------------------------------------------------------------------------
 
     def _set(self, path: str, *, q=None, p=None) -> None:
         """Send a pose when it changed."""
@@ -191,16 +203,27 @@ class SceneView:
         if self._arrows is not None and health is not None:
             self._arrows.update(health.message)
         if estimators:
-            self._update_rate_arrow(f"/world/estimate/{estimators[0]}/body/rate", device, estimators[0])
+            self._update_rate_arrow(
+                f"/world/estimate/{estimators[0]}/body/rate", device, estimators[0]
+            )
 
     def _update_board(self, device: Device, estimators: list[str]) -> None:
-        """Filters that know no north start at any heading: all are turned to the truth's, or to the first one's."""
+        """Filters that know no north start at any heading: all are turned to the truth's, or to the
+        first one's.
+        """
         truth = device.get("truth")
-        north = truth.message.q_nb if truth is not None else device.get("attitude", estimators[0]).message.q_nb
+        north = (
+            truth.message.q_nb
+            if truth is not None
+            else device.get("attitude", estimators[0]).message.q_nb
+        )
         if truth is not None:
             self._set("/world/truth", q=geo.quaternion(north))
         for name in estimators:
-            self._set(f"/world/estimate/{name}/body", q=geo.facing(device.get("attitude", name).message.q_nb, north))
+            self._set(
+                f"/world/estimate/{name}/body",
+                q=geo.facing(device.get("attitude", name).message.q_nb, north),
+            )
 
     def _update_rate_arrow(self, path: str, device: Device, estimator: str) -> None:
         node, label = self._nodes.get(path), self._nodes.get(f"{path}_label")
@@ -212,8 +235,8 @@ class SceneView:
         if not self._turning:
             return
         text, direction = f"ω {number(np.degrees(size), 0, '°/s')}", omega / size
-        # It stands on the face it leaves the cube through, so that a slow rate is seen outside the cube as well; one
-        # that points into the table comes from above instead.
+        # It stands on the face it leaves the cube through, so that a slow rate is seen outside the
+        # cube as well; one that points into the table comes from above instead.
         face = direction / np.max(np.abs(direction))
         reach = direction * (0.25 + min(ARROW_PER_RADPS * size, ARROW_LONGEST))
         start, tip = (face, face + reach) if direction[2] > -0.5 else (-face - reach, -face)
@@ -259,8 +282,12 @@ class SceneView:
             elif tail in _TAILS:
                 yield node, _TAILS[tail]
 
-    def _track(self, base: str, track: geo.Track, colour: tuple[int, int, int], point_size: float = 0.0) -> None:
-        """Bring a track to the browser, as points of that size in m, or as a line when there is no size."""
+    def _track(
+        self, base: str, track: geo.Track, colour: tuple[int, int, int], point_size: float = 0.0
+    ) -> None:
+        """Bring a track to the browser, as points of that size in m, or as a line when there is no
+        size.
+        """
         if self._thinned.get(base, track.thinned) != track.thinned:
             for path in [path for path in self._nodes if path.startswith(f"{base}/")]:
                 self._nodes.pop(path).remove()
@@ -274,7 +301,12 @@ class SceneView:
             line = np.asarray(piece, dtype=np.float32)
             if point_size:
                 self._nodes[path] = self._scene.add_point_cloud(
-                    path, line, colour, point_size=point_size, point_shape="circle", precision="float32"
+                    path,
+                    line,
+                    colour,
+                    point_size=point_size,
+                    point_shape="circle",
+                    precision="float32",
                 )
             else:
                 segments = np.stack([line[:-1], line[1:]], axis=1)

@@ -1,8 +1,9 @@
 """Many samples become a few hundred points without losing a peak, and gaps stay gaps.
 
-A browser gets every point of a chart again with each update, so charts are decimated here: the time window is cut into
-buckets and each keeps the smallest and the largest value of a series. All series of a chart share the buckets, because
-uPlot wants one x array for all. uPlot draws a straight line across NaN, so a gap is told by a mask beside the values.
+A browser gets every point of a chart again with each update, so charts are decimated here: the time
+window is cut into buckets and each keeps the smallest and the largest value of a series. All series
+of a chart share the buckets, because uPlot wants one x array for all. uPlot draws a straight line
+across NaN, so a gap is told by a mask beside the values.
 """
 
 from collections.abc import Sequence
@@ -22,9 +23,10 @@ def grid(t0: float, t1: float, points: int = POINTS) -> tuple[np.ndarray, np.nda
 def decimate(t: np.ndarray, y: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Smallest and largest value of each bucket in the order in which the series moves.
 
-    t (n,) ascending, s; y (n,); edges (b + 1,). Returns values (2 b,) and filled (b,): which buckets hold a sample.
-    A bucket without one is interpolated between its neighbours, before the first and after the last it is held.
-    A series without any finite value gives zeros and an all-False mask.
+    t (n,) ascending, s; y (n,); edges (b + 1,). Returns values (2 b,) and filled (b,): which
+    buckets hold a sample. A bucket without one is interpolated between its neighbours, before the
+    first and after the last it is held. A series without any finite value gives zeros and an
+    all-False mask.
     """
     buckets = len(edges) - 1
     good = np.isfinite(y) & (t >= edges[0]) & (t <= edges[-1])
@@ -60,12 +62,16 @@ def gap_mask(t: np.ndarray, edges: np.ndarray, gap_s: float) -> np.ndarray:
 
 
 def gap_limit(t: np.ndarray, least: float = 0.25) -> float:
-    """The pause between samples above which a series counts as interrupted: five usual periods, at least `least` s."""
+    """The pause between samples above which a series counts as interrupted: five usual periods, at
+    least `least` s.
+    """
     return least if len(t) < 3 else max(least, 5.0 * float(np.median(np.diff(t))))
 
 
 def stretch_mask(stretches: Sequence[Sequence[float]], edges: np.ndarray) -> np.ndarray:
-    """1 inside the stretches [from, until], s, else 0; (2 b,) for b buckets, one bucket at least for each."""
+    """1 inside the stretches [from, until], s, else 0; (2 b,) for b buckets, one bucket at least
+    for each.
+    """
     inside = np.zeros(len(edges) - 1)
     for begin, end in stretches:
         if end >= edges[0] and begin <= edges[-1]:
@@ -75,7 +81,9 @@ def stretch_mask(stretches: Sequence[Sequence[float]], edges: np.ndarray) -> np.
 
 
 def moment_mask(moments: Sequence[float], edges: np.ndarray) -> np.ndarray:
-    """1 at the first point of each bucket that holds one of the moments, s, else 0; (2 b,) for b buckets."""
+    """1 at the first point of each bucket that holds one of the moments, s, else 0; (2 b,) for b
+    buckets.
+    """
     mask = np.zeros(2 * (len(edges) - 1))
     inside = [moment for moment in moments if edges[0] <= moment < edges[-1]]
     mask[2 * (np.searchsorted(edges, np.array(inside), side="right") - 1)] = 1.0

@@ -1,4 +1,6 @@
-"""start(): the viser server on the loopback, the feed, and the two loops that bring browsers up to date."""
+"""start(): the viser server on the loopback, the feed, and the two loops that bring browsers up to
+date.
+"""
 
 import contextlib
 import io
@@ -17,8 +19,8 @@ from dashboard.scene.feed import Feed
 from dashboard.scene.store import Store
 from dashboard.scene.style import LEFT_WIDTH, css
 from dashboard.scene.view import View
-from messages import gyrofree_pb2 as pb
-from messages.bus import BusSettings
+from messages.bus.session import BusSettings
+from messages.contract import gyrofree_pb2 as pb
 
 log = logging.getLogger(__name__)
 
@@ -39,9 +41,13 @@ class SceneError(RuntimeError):
 
 
 class SceneHandle:
-    """The running scene. `port` is where viser listens; the front door sends signed-in people there."""
+    """The running scene. `port` is where viser listens; the front door sends signed-in people
+    there.
+    """
 
-    def __init__(self, server: viser.ViserServer, feed: Feed, store: Store, on_record: RecordCall | None) -> None:
+    def __init__(
+        self, server: viser.ViserServer, feed: Feed, store: Store, on_record: RecordCall | None
+    ) -> None:
         self.port = server.get_port()
         self.store = store
         self.feed = feed
@@ -54,8 +60,18 @@ class SceneHandle:
         server.on_client_connect(self._connected)
         server.on_client_disconnect(self._disconnected)
         self._threads = [
-            threading.Thread(target=self._loop, args=(POSE_S, View.tick_scene), name="dashboard-poses", daemon=True),
-            threading.Thread(target=self._loop, args=(PANEL_S, View.tick_panels), name="dashboard-panels", daemon=True),
+            threading.Thread(
+                target=self._loop,
+                args=(POSE_S, View.tick_scene),
+                name="dashboard-poses",
+                daemon=True,
+            ),
+            threading.Thread(
+                target=self._loop,
+                args=(PANEL_S, View.tick_panels),
+                name="dashboard-panels",
+                daemon=True,
+            ),
         ]
         for thread in self._threads:
             thread.start()
@@ -124,12 +140,17 @@ def start(
 ) -> SceneHandle:
     """Serve the scene at settings.viser_port of `host`.
 
-    `on_record` gets the orders of the record buttons and returns the recorder's answer or raises ConnectionError; by
-    default the recorder is asked on the bus. Raises SceneError when the port is taken.
+    `on_record` gets the orders of the record buttons and returns the recorder's answer or raises
+    ConnectionError; by default the recorder is asked on the bus. Raises SceneError when the port is
+    taken.
     """
     # A browser may go while it is brought up to date; its view is dropped a moment later.
-    warnings.filterwarnings("ignore", message="Queued a .* on a closed connection", category=UserWarning)
-    with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner that would stand among our data
+    warnings.filterwarnings(
+        "ignore", message="Queued a .* on a closed connection", category=UserWarning
+    )
+    with contextlib.redirect_stdout(
+        io.StringIO()
+    ):  # viser prints a banner that would stand among our data
         server = viser.ViserServer(
             host=host, port=settings.viser_port or _free_port(host), label="gyrofree", verbose=False
         )
@@ -137,7 +158,8 @@ def start(
         # viser takes the next free port without a word; the proxy would then talk to a stranger.
         server.stop()
         raise SceneError(
-            f"[dashboard] viser_port {settings.viser_port}: already in use; stop the other program or set it to 0"
+            f"[dashboard] viser_port {settings.viser_port}: already in use; stop the other program"
+            " or set it to 0"
         )
     _dress(server)
     store = store or Store()
@@ -145,7 +167,9 @@ def start(
 
 
 def _dress(server: viser.ViserServer) -> None:
-    """What a browser sees before its own view is there: our colours and a line of text, not viser's own controls."""
+    """What a browser sees before its own view is there: our colours and a line of text, not viser's
+    own controls.
+    """
     server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
     server.gui.add_html(css(), order=-1.0)
     server.gui.main_panel.dock_left()

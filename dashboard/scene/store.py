@@ -1,7 +1,8 @@
 """Latest values and ring buffers, per device, filled by the feed and read by the views.
 
-Time is `header.utc_ns` in seconds after the first message of the device; whether a value is stale is judged by when it
-arrived, because a replay carries the past's time. Every method that reads or writes takes the store's lock briefly.
+Time is `header.utc_ns` in seconds after the first message of the device; whether a value is stale
+is judged by when it arrived, because a replay carries the past's time. Every method that reads or
+writes takes the store's lock briefly.
 """
 
 import threading
@@ -15,16 +16,28 @@ from dashboard.scene.geometry import Track, ned_from_geodetic, yaw_of
 from dashboard.scene.replayed import Replayed
 from dashboard.scene.ring import Ring
 from dashboard.scene.tilt import tilt_rows
-from messages import gyrofree_pb2 as pb
-from messages import topics as tp
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract import topics as tp
 
-LEADERS = ("products-ekf", "products-free", "huber-nhc", "ekf")  # estimators that stand first wherever they run
+LEADERS = (
+    "products-ekf",
+    "products-free",
+    "huber-nhc",
+    "ekf",
+)  # estimators that stand first wherever they run
 HISTORY_S = 620.0  # kept in the rings; the longest window a view offers is 600 s
 LATE_JOIN_S = 2.0  # repaired stretches nearer than this are one
 MARKS = 200  # notes and marks of a device that are drawn
 STALE_S = 1.0  # a value older than this is greyed
 FIXES_REMEMBERED = 100  # until the filter has said whether it believes them
-SLOW_STALE_S = {"link": 3.0, "status": 3.0, "estimator": 3.0, "board": 30.0, "gnss": 2.5, "innovation": 10.0}
+SLOW_STALE_S = {
+    "link": 3.0,
+    "status": 3.0,
+    "estimator": 3.0,
+    "board": 30.0,
+    "gnss": 2.5,
+    "innovation": 10.0,
+}
 
 
 # Columns of the rings.
@@ -35,8 +48,16 @@ RATE_SIGHT, RATE_BOUND, RATE_YAW = slice(27, 30), slice(30, 33), 33
 TRUTH_OMEGA, TRUTH_F, TRUTH_ANGLE = slice(0, 3), slice(3, 6), 6
 NAV_POSITION, NAV_VELOCITY, NAV_SIGMA_POSITION, NAV_YAW = slice(0, 3), slice(3, 6), slice(6, 9), 9
 NAV_HORIZON, NAV_CRISP, NAV_INPUTS, NAV_MEMBERSHIP = 10, 11, slice(12, 14), slice(14, 20)
-INNOVATION_VALUE, INNOVATION_SIGMA, INNOVATION_NIS, INNOVATION_ERROR = slice(0, 6), slice(6, 12), 12, slice(13, 16)
-INNOVATION_AHEAD, INNOVATION_RESIDUAL = slice(16, 19), slice(19, 22)  # fix minus prediction, minus solution: NED m
+INNOVATION_VALUE, INNOVATION_SIGMA, INNOVATION_NIS, INNOVATION_ERROR = (
+    slice(0, 6),
+    slice(6, 12),
+    12,
+    slice(13, 16),
+)
+INNOVATION_AHEAD, INNOVATION_RESIDUAL = (
+    slice(16, 19),
+    slice(19, 22),
+)  # fix minus prediction, minus solution: NED m
 GNSS_POSITION = slice(0, 3)
 
 
@@ -55,19 +76,27 @@ class Latest:
 
 @dataclass
 class Device:
-    """What is known of one device. `latest` is keyed by topic name and estimator ('' where there is none)."""
+    """What is known of one device. `latest` is keyed by topic name and estimator ('' where there is
+    none).
+    """
 
     name: str
     utc0_ns: int
     latest: dict[tuple[str, str], Latest] = field(default_factory=dict)
     rings: dict[tuple[str, str], Ring] = field(default_factory=dict)
     tracks: dict[str, Track] = field(default_factory=dict)
-    fixes: dict[int, tuple[float, ...]] = field(default_factory=dict)  # p_n of the newest, by sequence
+    fixes: dict[int, tuple[float, ...]] = field(
+        default_factory=dict
+    )  # p_n of the newest, by sequence
     t_newest: float = 0.0
     t_first: float = 0.0  # below zero when older data were fetched
-    late: list[list[float]] = field(default_factory=list)  # stretches [from, until] that were filled in, s
+    late: list[list[float]] = field(
+        default_factory=list
+    )  # stretches [from, until] that were filled in, s
     marks: list[tuple[float, str]] = field(default_factory=list)  # notes: when, s, and their text
-    origin: tuple[float, float, float] | None = None  # latitude deg, longitude deg, height m of n's origin
+    origin: tuple[float, float, float] | None = (
+        None  # latitude deg, longitude deg, height m of n's origin
+    )
     run: int = 0
     generation: int = 0  # counts the times everything was forgotten because time jumped back
 
@@ -80,7 +109,9 @@ class Device:
 
     @property
     def body(self) -> str:
-        """Topic of the estimates that move its body in the scene: nav of a vehicle, attitude of a board, else rate."""
+        """Topic of the estimates that move its body in the scene: nav of a vehicle, attitude of a
+        board, else rate.
+        """
         if not self.is_vehicle:
             return "rate"
         return "attitude" if not self.navigates and self.estimators("attitude") else "nav"
@@ -104,8 +135,12 @@ class Device:
         latest = self.get(topic, estimator)
         return latest is None or latest.age(now) > SLOW_STALE_S.get(topic, STALE_S)
 
-    def window(self, topic: str, estimator: str, t0: float, t1: float) -> tuple[np.ndarray, np.ndarray]:
-        """Ring rows of a topic in a window; empty arrays when there are none. Call under the store's lock."""
+    def window(
+        self, topic: str, estimator: str, t0: float, t1: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Ring rows of a topic in a window; empty arrays when there are none. Call under the
+        store's lock.
+        """
         ring = self.rings.get((topic, estimator))
         return ring.window(t0, t1) if ring else (np.empty(0), np.empty((0, 34)))
 
@@ -131,7 +166,14 @@ class Store:
         with self.lock:
             return self.devices.get(name)
 
-    def put(self, topic: tp.Topic, device: str, estimator: str, message: Message, arrived: float | None = None) -> None:
+    def put(
+        self,
+        topic: tp.Topic,
+        device: str,
+        estimator: str,
+        message: Message,
+        arrived: float | None = None,
+    ) -> None:
         """Take one message in. `arrived` is time.monotonic() of its arrival, s."""
         arrived = time.monotonic() if arrived is None else arrived
         with self.lock:
@@ -144,8 +186,12 @@ class Store:
             else:
                 self._put_device(topic, device, estimator, message, arrived)
 
-    def put_late(self, name: str, messages: list[tuple[tp.Topic, str, Message]], repaired: bool) -> None:
-        """Take in older messages of a device: what the bus had lost (`repaired`), or what was before we listened."""
+    def put_late(
+        self, name: str, messages: list[tuple[tp.Topic, str, Message]], repaired: bool
+    ) -> None:
+        """Take in older messages of a device: what the bus had lost (`repaired`), or what was
+        before we listened.
+        """
         with self.lock:
             known = self.devices.get(name)
             if known is None:
@@ -173,7 +219,9 @@ class Store:
                 else:
                     known.rings[key] = ring
 
-    def _put_device(self, topic: tp.Topic, name: str, estimator: str, message: Message, arrived: float) -> None:
+    def _put_device(
+        self, topic: tp.Topic, name: str, estimator: str, message: Message, arrived: float
+    ) -> None:
         utc_ns = message.header.utc_ns
         known = self.devices.get(name)
         if known is None:
@@ -182,7 +230,8 @@ class Store:
         row, before = _ROWS.get(topic.name), known.get(topic.name, estimator)
         back = before is not None and before.t - t > 1.0
         if row is not None and utc_ns and (back or t - known.t_newest > 3600.0):
-            # A replay started over, or the first time stamps were not yet those of a clock: the old axis is of no use.
+            # A replay started over, or the first time stamps were not yet those of a clock: the old
+            # axis is of no use.
             known = self.devices[name] = Device(name, utc_ns, generation=known.generation + 1)
             t = 0.0
         known.run = message.header.run or known.run
@@ -203,7 +252,9 @@ def _ring(device: Device, topic: tp.Topic, estimator: str, columns: int, rate: f
 
 def _sigmas(covariance: list[float]) -> list[float]:
     """Standard deviations of a row-major 3 x 3 covariance; NaN where there is none."""
-    return list(np.sqrt(np.maximum(covariance[0::4], 0.0))) if len(covariance) == 9 else [np.nan] * 3
+    return (
+        list(np.sqrt(np.maximum(covariance[0::4], 0.0))) if len(covariance) == 9 else [np.nan] * 3
+    )
 
 
 def _stretch(late: list[list[float]], t: float) -> None:
@@ -241,7 +292,9 @@ def _imu(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.ImuBat
     if len(m.f_b_mps2) != len(m.omega_ib_b_radps) or len(m.f_b_mps2) % 3:
         return
     ring = _ring(device, topic, estimator, 6, rate=200.0)
-    rows = np.hstack([np.asarray(m.f_b_mps2).reshape(-1, 3), np.asarray(m.omega_ib_b_radps).reshape(-1, 3)])
+    rows = np.hstack(
+        [np.asarray(m.f_b_mps2).reshape(-1, 3), np.asarray(m.omega_ib_b_radps).reshape(-1, 3)]
+    )
     for i, row in enumerate(rows):
         ring.append(t + i * m.period_s, row)
 
@@ -257,7 +310,12 @@ def _truth(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.Trut
 
 def _rate(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.RateEstimate) -> None:
     nis = m.nis if m.nis_dof else np.nan
-    row = _three(m.omega_ib_b_radps) + _sigmas(m.omega_covariance) + _three(m.f_b_mps2) + [m.angle_z_rad, nis]
+    row = (
+        _three(m.omega_ib_b_radps)
+        + _sigmas(m.omega_covariance)
+        + _three(m.f_b_mps2)
+        + [m.angle_z_rad, nis]
+    )
     row += _three(m.p_n_m) + _six(m.innovation) + _six(m.innovation_sigma) + [m.nis_dof]
     row += _three(m.sight) + _three(m.bound_sigma_radps) + [yaw_of(m.q_nb)]
     _ring(device, topic, estimator, 34).append(t, row)
@@ -282,19 +340,27 @@ def _gnss(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.GnssF
     origin = device.origin or (m.latitude_deg, m.longitude_deg, m.height_m)
     p_n = ned_from_geodetic(m.latitude_deg, m.longitude_deg, m.height_m, origin)
     _ring(device, topic, estimator, 9, rate=10.0).append(t, list(p_n))
-    if device.origin is not None:  # without an origin the fix would land in another frame than the trajectory
+    if (
+        device.origin is not None
+    ):  # without an origin the fix would land in another frame than the trajectory
         device.tracks.setdefault("fixes", Track(spacing=0.5)).add(p_n)
         device.fixes[m.header.sequence] = tuple(p_n)
         if len(device.fixes) > FIXES_REMEMBERED:
             device.fixes.pop(next(iter(device.fixes)))
 
 
-def _innovation(device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.Innovation) -> None:
+def _innovation(
+    device: Device, topic: tp.Topic, estimator: str, t: float, m: pb.Innovation
+) -> None:
     row = _six(m.value) + _six(m.sigma) + [m.nis] + _three(m.error_to_reference)
     row += _six(m.prediction_error)[:3] + _six(m.residual)[:3]
     _ring(device, topic, estimator, 22, rate=10.0).append(t, row)
     # A fix withheld on purpose is not accepted either, but it comes with its error.
-    if not m.accepted and not m.error_to_reference and estimator == device.estimators("innovation")[0]:
+    if (
+        not m.accepted
+        and not m.error_to_reference
+        and estimator == device.estimators("innovation")[0]
+    ):
         p_n = device.fixes.get(m.for_sequence)
         if p_n is not None:
             device.tracks.setdefault("rejected", Track(spacing=0.5)).add(p_n)

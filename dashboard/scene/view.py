@@ -1,4 +1,6 @@
-"""Panels and controls of one browser. Each browser has its own device, window, pause, follow, theme and page."""
+"""Panels and controls of one browser. Each browser has its own device, window, pause, follow, theme
+and page.
+"""
 
 import threading
 import time
@@ -10,11 +12,12 @@ from dashboard.scene.feed import Feed
 from dashboard.scene.panels import PAGES, Devices, Position, Record, Snapshot, Tilt, Timeline
 from dashboard.scene.scene import LAYERS, Choice, SceneView
 from dashboard.scene.store import Device, Store
-from messages import gyrofree_pb2 as pb
+from messages.contract import gyrofree_pb2 as pb
 
 WINDOWS = {"10 s": 10.0, "30 s": 30.0, "60 s": 60.0, "5 min": 300.0, "10 min": 600.0}
 TRACK_S = 0.2  # trajectories grow five times a second
-ASKED_FOR_S = 60.0  # a replay that begins this near to the opening of a page was asked for by the person at it
+# a replay that begins this near to the opening of a page was asked for by the person at it
+ASKED_FOR_S = 60.0
 
 
 class View:
@@ -38,7 +41,9 @@ class View:
         self._tracks_at = 0.0
         self._lock = threading.RLock()  # callbacks of the browser against the loops
         self._page = 0
-        self._page_chosen = False  # by the person; until then the device's kind says which is of interest
+        self._page_chosen = (
+            False  # by the person; until then the device's kind says which is of interest
+        )
         self._theme()
         self.scene = SceneView(client, self._choice)
         with client.atomic():
@@ -48,11 +53,16 @@ class View:
 
     @property
     def own_uuids(self) -> frozenset[str]:
-        """Inputs that change nothing but this browser's own view: all except the recorder's and those of orders."""
-        orders = self._record.uuids.union(self._timeline.uuids, *(page.uuids for page in self._pages))
+        """Inputs that change nothing but this browser's own view: all except the recorder's and
+        those of orders.
+        """
+        orders = self._record.uuids.union(
+            self._timeline.uuids, *(page.uuids for page in self._pages)
+        )
         return frozenset(self._client.gui._gui_input_handle_from_uuid) - orders
 
-    # --- ticks ----------------------------------------------------------------------------------------------------
+    # --- ticks
+    # ----------------------------------------------------------------------------------------------------
 
     def tick_scene(self) -> None:
         """Poses, and less often trajectories."""
@@ -86,7 +96,9 @@ class View:
             t1 = device.t_newest if self._paused_at is None else self._paused_at
             t0 = max(t1 - self._window_s, device.t_first)
             clock = self._store.replay.clock(device.name, now)
-            snapshot = Snapshot(self._store, device, t0, max(t1, t0 + 1.0), clock, self._choice.dark)
+            snapshot = Snapshot(
+                self._store, device, t0, max(t1, t0 + 1.0), clock, self._choice.dark
+            )
             if not self._page_chosen:
                 first = {"nav": Position, "attitude": Tilt, "rate": PAGES[0]}[device.body]
                 self._open(PAGES.index(first))
@@ -94,16 +106,23 @@ class View:
                 self._devices.update(snapshot)
             self._pages[self._page].update(snapshot)
 
-    # --- building -------------------------------------------------------------------------------------------------
+    # --- building
+    # -------------------------------------------------------------------------------------------------
 
     def _build_left(self, on_record: Callable) -> None:
         gui = self._client.gui
         gui.set_panel_label("gyrofree")
         self._chooser = gui.add_dropdown("Device", ("–",), visible=False)
-        self._chooser.on_update(lambda event: self._choose(self._chooser.value, by_person=event.client is not None))
+        self._chooser.on_update(
+            lambda event: self._choose(self._chooser.value, by_person=event.client is not None)
+        )
         self._devices = Devices(self._client, gui.add_folder(None))
-        self._paused_note = gui.add_html('<div class="gf-paused">❚❚ PAUSED · data keep coming in</div>', visible=False)
-        self._pause_button = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, color="gray", hint="Key P")
+        self._paused_note = gui.add_html(
+            '<div class="gf-paused">❚❚ PAUSED · data keep coming in</div>', visible=False
+        )
+        self._pause_button = gui.add_button(
+            "Pause", icon=viser.Icon.PLAYER_PAUSE, color="gray", hint="Key P"
+        )
         self._pause_button.on_click(lambda _: self._pause(self._paused_at is None))
         self._record = Record(self._client, on_record)
         with gui.add_folder("View", expand_by_default=False):
@@ -122,7 +141,9 @@ class View:
         reset.on_click(lambda _: self._reset_camera())
         for layer in LAYERS:
             box = gui.add_checkbox(f"Show {layer}", True)
-            box.on_update(lambda _, layer=layer, box=box: self._choice.layers.__setitem__(layer, box.value))
+            box.on_update(
+                lambda _, layer=layer, box=box: self._choice.layers.__setitem__(layer, box.value)
+            )
 
     def _build_right(self) -> None:
         gui = self._client.gui
@@ -130,9 +151,13 @@ class View:
         with panel.add_tab("Charts", viser.Icon.CHART_LINE):
             self._marker = gui.add_html("")
             tabs = gui.add_button_group("Page", tuple(page.title for page in PAGES))
-            tabs.on_click(lambda _: self._choose_page([page.title for page in PAGES].index(tabs.value)))
+            tabs.on_click(
+                lambda _: self._choose_page([page.title for page in PAGES].index(tabs.value))
+            )
             self._folders = [gui.add_folder(None, visible=False) for _ in PAGES]
-        self._pages = [page(self._client, folder) for page, folder in zip(PAGES, self._folders, strict=True)]
+        self._pages = [
+            page(self._client, folder) for page, folder in zip(PAGES, self._folders, strict=True)
+        ]
         for page in self._pages:
             page.feed = self._feed
         panel.dock_right()
@@ -144,7 +169,9 @@ class View:
         add = self._client.gui.add_command
         toggle_pause = add("Pause or go on", hotkey="P")
         toggle_pause.on_trigger(lambda _: self._pause(self._paused_at is None))
-        add("Dark or light", hotkey="D").on_trigger(lambda _: setattr(self._dark, "value", not self._dark.value))
+        add("Dark or light", hotkey="D").on_trigger(
+            lambda _: setattr(self._dark, "value", not self._dark.value)
+        )
         add("Follow the vehicle or not", hotkey="F").on_trigger(
             lambda _: setattr(self._follow, "value", not self._follow.value)
         )
@@ -153,11 +180,15 @@ class View:
             turn = add(f"Page: {page.title}", hotkey=str(index + 1) if index < 9 else None)
             turn.on_trigger(lambda _, index=index: self._choose_page(index))
 
-    # --- what the person does -------------------------------------------------------------------------------------
+    # --- what the person does
+    # -------------------------------------------------------------------------------------
 
     def _theme(self) -> None:
         self._client.gui.configure_theme(
-            dark_mode=self._choice.dark, show_logo=False, show_share_button=False, brand_color=(30, 110, 165)
+            dark_mode=self._choice.dark,
+            show_logo=False,
+            show_share_button=False,
+            brand_color=(30, 110, 165),
         )
 
     def _set_dark(self, dark: bool) -> None:
@@ -211,7 +242,9 @@ class View:
                 self._chooser.value = self._device_name
 
     def _show_replay_asked_for(self) -> None:
-        """Turn to the device of a replay that began about when this page was opened, unless another was chosen."""
+        """Turn to the device of a replay that began about when this page was opened, unless another
+        was chosen.
+        """
         if self._device_chosen or abs(self._store.replay.began - self._opened_at) > ASKED_FOR_S:
             return
         name = self._store.replay.device(self._store.devices)

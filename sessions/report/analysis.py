@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.manifest import Manifest
+from sessions.recording.manifest import Manifest
 from sessions.report.data import Rate, Run
 from sessions.report.paper import CubeTest, PositionError, cube_test, local_gravity, position_error
 from sessions.report.segments import STEP, Segment, measured, reference, segment
@@ -73,7 +73,9 @@ def analyse(run: Run, manifest: Manifest | None) -> Analysis:
         rates=[_rate_result(rate, run, parts, bias, g) for rate in run.rates],
         cube=cube,
         rest=rest,
-        allan_axes=allan_axes(run.accel, rest) if run.accel is not None and rest is not None else [],
+        allan_axes=allan_axes(run.accel, rest)
+        if run.accel is not None and rest is not None
+        else [],
         navigation=_navigation(run),
         gravity=g,
         completeness=_completeness(manifest, run.device),
@@ -107,7 +109,9 @@ def _all_still(run: Run) -> Segment | None:
     return None
 
 
-def _rate_result(rate: Rate, run: Run, parts: list[Segment], bias: Array | None, g: float) -> RateResult:
+def _rate_result(
+    rate: Rate, run: Run, parts: list[Segment], bias: Array | None, g: float
+) -> RateResult:
     found = plateaus(rate, parts, run.tacho) if run.tacho is not None else []
     rms = angle = None
     if run.tacho is not None:
@@ -144,9 +148,13 @@ def _navigation(run: Run) -> list[NavigationResult]:
                 fixes=len(mine.t) if mine is not None else 0,
                 nis_mean=nis.mean if nis is not None else None,
                 nis=nis,
-                rejected=float(1.0 - mine.accepted.mean()) if mine is not None and len(mine.t) else 0.0,
+                rejected=float(1.0 - mine.accepted.mean())
+                if mine is not None and len(mine.t)
+                else 0.0,
                 distance_m=float(steps.sum()),
-                sigma_end_m=float(np.hypot(nav.sigma[-1, 6], nav.sigma[-1, 7])) if nav.sigma.shape[1] > 7 else 0.0,
+                sigma_end_m=float(np.hypot(nav.sigma[-1, 6], nav.sigma[-1, 7]))
+                if nav.sigma.shape[1] > 7
+                else 0.0,
             )
         )
     return found

@@ -1,4 +1,6 @@
-"""A recording becomes a report: HTML, PDF and JSON. The same recording and specification give the same bytes."""
+"""A recording becomes a report: HTML, PDF and JSON. The same recording and specification give the
+same bytes.
+"""
 
 import hashlib
 import json
@@ -9,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from sessions.manifest import Manifest, SessionError, read_manifest
+from sessions.export.table import Progress, silent
+from sessions.recording.manifest import Manifest, SessionError, read_manifest
 from sessions.report.analysis import Analysis, analyse
 from sessions.report.data import load_run
 from sessions.report.document import compose
@@ -18,7 +21,6 @@ from sessions.report.html import to_html
 from sessions.report.metrics import Metric, metrics
 from sessions.report.pdf import to_pdf
 from sessions.report.verdict import Check, Spec, judge, overall
-from sessions.table import Progress, silent
 
 
 @dataclass(frozen=True)
@@ -40,10 +42,14 @@ class Report:
         return files
 
 
-def build(path: Path, spec: Spec, device: str = "", boot: int | None = None, progress: Progress = silent) -> Report:
-    """Report on an MCAP file; session.json beside it, where there is one, adds completeness and provenance.
+def build(
+    path: Path, spec: Spec, device: str = "", boot: int | None = None, progress: Progress = silent
+) -> Report:
+    """Report on an MCAP file; session.json beside it, where there is one, adds completeness and
+    provenance.
 
-    Raises ReportError when the recording has nothing to report on, SpecError for a limit on no figure, OSError.
+    Raises ReportError when the recording has nothing to report on, SpecError for a limit on no
+    figure, OSError.
     """
     manifest = _manifest(path)
     run = load_run(path, device, boot, lambda done, what: progress(0.6 * done, what))
@@ -79,7 +85,12 @@ def sha256_of(path: Path) -> str:
 
 
 def _json(
-    found: Analysis, manifest: Manifest | None, sha256: str, spec: Spec, figures: list[Metric], checks: list[Check]
+    found: Analysis,
+    manifest: Manifest | None,
+    sha256: str,
+    spec: Spec,
+    figures: list[Metric],
+    checks: list[Check],
 ) -> str:
     content = {
         "session": manifest.id if manifest else None,

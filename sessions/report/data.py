@@ -1,4 +1,6 @@
-"""What a report needs of a recording, as arrays. SI, body frame b; times in s from the first sample of the run."""
+"""What a report needs of a recording, as arrays. SI, body frame b; times in s from the first sample
+of the run.
+"""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -6,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from messages.topics import ACCEL, GNSS, INNOVATION, LINK, NAV, RATE, TACHO, TRUTH, parse
-from sessions.table import Progress, Selection, Table, silent, tables
+from messages.contract.topics import ACCEL, GNSS, INNOVATION, LINK, NAV, RATE, TACHO, TRUTH, parse
+from sessions.export.table import Progress, Selection, Table, silent, tables
 
 Array = NDArray[np.float64]
 XYZ = ("x", "y", "z")
@@ -91,15 +93,20 @@ class Run:
     rates: list[Rate] = field(default_factory=list)
     navigation: list[Navigation] = field(default_factory=list)
     corrections: list[Corrections] = field(default_factory=list)
-    fixes: Array = field(default_factory=lambda: np.zeros((0, 4)))  # t, latitude rad, longitude rad, height m
+    fixes: Array = field(
+        default_factory=lambda: np.zeros((0, 4))
+    )  # t, latitude rad, longitude rad, height m
     link: dict[str, float] = field(default_factory=dict)  # last ledger of the line
 
 
 WANTED = frozenset(topic.name for topic in (ACCEL, TACHO, RATE, TRUTH, NAV, INNOVATION, GNSS, LINK))
 
 
-def load_run(path: Path, device: str = "", boot: int | None = None, progress: Progress = silent) -> Run:
-    """The longest boot (or the named one) of a device (default: the one with most samples) of a recording.
+def load_run(
+    path: Path, device: str = "", boot: int | None = None, progress: Progress = silent
+) -> Run:
+    """The longest boot (or the named one) of a device (default: the one with most samples) of a
+    recording.
 
     Raises ReportError when there is no such device or boot, or no estimate at all; OSError.
     """
@@ -110,7 +117,9 @@ def load_run(path: Path, device: str = "", boot: int | None = None, progress: Pr
         if address.topic in (ACCEL, RATE, NAV):
             devices[address.device] = devices.get(address.device, 0) + len(table)
     if not devices:
-        raise ReportError(f"{path}: no samples and no estimates of any device; nothing to report on")
+        raise ReportError(
+            f"{path}: no samples and no estimates of any device; nothing to report on"
+        )
     device = device or max(sorted(devices), key=lambda name: devices[name])
     if device not in devices:
         raise ReportError(f"{path}: no device {device!r}; there is {', '.join(sorted(devices))}")
@@ -118,7 +127,9 @@ def load_run(path: Path, device: str = "", boot: int | None = None, progress: Pr
     timed = [table for key, table in mine.items() if parse(key).topic in (ACCEL, RATE, NAV)]
     lengths = _boots(timed)
     if boot is not None and boot not in lengths:
-        raise ReportError(f"{path}: no boot {boot} of {device}; there are {', '.join(map(str, sorted(lengths)))}")
+        raise ReportError(
+            f"{path}: no boot {boot} of {device}; there are {', '.join(map(str, sorted(lengths)))}"
+        )
     epoch = boot if boot is not None else max(sorted(lengths), key=lambda b: round(lengths[b], 1))
     return _run(mine, device, epoch, tuple(sorted(lengths)))
 
@@ -141,8 +152,16 @@ def _run(mine: dict[str, Table], device: str, epoch: int, boots: tuple[int, ...]
         part = Table(table.columns, {name: column[at] for name, column in table.data.items()})
         if len(part):
             by_topic.setdefault(address.topic.name, []).append((address.estimator, part))
-    starts = [part.data["utc_s"].min() for topic in (ACCEL, RATE, NAV) for _, part in by_topic.get(topic.name, [])]
-    ends = [part.data["utc_s"].max() for topic in (ACCEL, RATE, NAV) for _, part in by_topic.get(topic.name, [])]
+    starts = [
+        part.data["utc_s"].min()
+        for topic in (ACCEL, RATE, NAV)
+        for _, part in by_topic.get(topic.name, [])
+    ]
+    ends = [
+        part.data["utc_s"].max()
+        for topic in (ACCEL, RATE, NAV)
+        for _, part in by_topic.get(topic.name, [])
+    ]
     t0 = float(min(starts))
 
     def only(topic: str) -> Table | None:
@@ -162,23 +181,34 @@ def _run(mine: dict[str, Table], device: str, epoch: int, boots: tuple[int, ...]
         truth_omega_z=truth.data["omega_ib_b_radps_z"] if truth else np.zeros(0),
         rates=[_rate(name, table, t0) for name, table in by_topic.get(RATE.name, [])],
         navigation=[_navigation(name, table, t0) for name, table in by_topic.get(NAV.name, [])],
-        corrections=[_corrections(name, table, t0) for name, table in by_topic.get(INNOVATION.name, [])],
+        corrections=[
+            _corrections(name, table, t0) for name, table in by_topic.get(INNOVATION.name, [])
+        ],
         fixes=_fixes(only(GNSS.name), t0),
         link={name: float(link.data[name][-1]) for name in LEDGER} if link else {},
     )
 
 
 LEDGER = (
-    "bytes_in", "good_frames", "bad_chunks", "bad_bytes", "lost_frames", "lost_samples", "device_dropped",
-    "latency_p99_s", "clock_skew_ppm",
-)  # fmt: skip
+    "bytes_in",
+    "good_frames",
+    "bad_chunks",
+    "bad_bytes",
+    "lost_frames",
+    "lost_samples",
+    "device_dropped",
+    "latency_p99_s",
+    "clock_skew_ppm",
+)
 
 
 def _accel(table: Table | None, t0: float) -> Accel | None:
     if table is None:
         return None
     names = [column.name for column in table.columns if column.name.endswith("_mps2")]
-    return Accel(table.data["utc_s"] - t0, table.vector(*names), float(np.median(table.data["period_s"])))
+    return Accel(
+        table.data["utc_s"] - t0, table.vector(*names), float(np.median(table.data["period_s"]))
+    )
 
 
 def _tacho(table: Table | None, t0: float) -> Tacho | None:
@@ -202,7 +232,9 @@ def _rate(name: str, table: Table, t0: float) -> Rate:
         alpha_b=_xyz(table, "alpha_b_radps2"),
         f_b=_xyz(table, "f_b_mps2"),
         angle_z=table.data["angle_z_rad"],
-        p_n=_xyz(table, "p_n_m", ("n", "e", "d")) if "p_n_m_n" in table.data else np.zeros((len(table), 3)),
+        p_n=_xyz(table, "p_n_m", ("n", "e", "d"))
+        if "p_n_m_n" in table.data
+        else np.zeros((len(table), 3)),
         nis=table.data["nis"],
         nis_dof=table.data["nis_dof"],
         still=table.data["still"] > 0,
@@ -212,7 +244,11 @@ def _rate(name: str, table: Table, t0: float) -> Rate:
 
 def _navigation(name: str, table: Table, t0: float) -> Navigation:
     sigma = [column.name for column in table.columns if column.name.startswith("sigma_")]
-    at = np.isfinite(table.data["p_ned_m_n"]) if "p_ned_m_n" in table.data else np.zeros(len(table), dtype=bool)
+    at = (
+        np.isfinite(table.data["p_ned_m_n"])
+        if "p_ned_m_n" in table.data
+        else np.zeros(len(table), dtype=bool)
+    )
     position = _xyz(table, "p_ned_m", ("n", "e", "d"))[at] if at.any() else np.zeros((0, 3))
     velocity = _xyz(table, "v_n_mps", ("n", "e", "d"))[at] if at.any() else np.zeros((0, 3))
     spread = table.vector(*sigma)[at] if sigma and at.any() else np.zeros((int(at.sum()), 15))

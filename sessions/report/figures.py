@@ -1,4 +1,6 @@
-"""The report's figures as PNG: the paper's, in the paper's order, then ours. Same analysis, same bytes."""
+"""The report's figures as PNG: the paper's, in the paper's order, then ours. Same analysis, same
+bytes.
+"""
 
 import io
 from collections.abc import Callable
@@ -12,14 +14,30 @@ from sessions.report.analysis import Analysis
 from sessions.report.data import Run
 from sessions.report.segments import STEP, reference
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # Okabe and Ito: for all eyes
+COLOURS = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#CC79A7",
+    "#E69F00",
+    "#56B4E9",
+)  # Okabe and Ito: for all eyes
 REFERENCE = "#000000"
 STYLE = {
-    "font.family": "DejaVu Sans", "font.size": 8.5, "axes.spines.top": False, "axes.spines.right": False,
-    "axes.grid": True, "grid.color": "#dddddd", "grid.linewidth": 0.6, "lines.linewidth": 0.9,
-    "legend.frameon": False, "axes.prop_cycle": matplotlib.cycler(color=COLOURS), "axes.titlesize": 9,
-    "svg.hashsalt": "gyrofree", "agg.path.chunksize": 10000,
-}  # fmt: skip
+    "font.family": "DejaVu Sans",
+    "font.size": 8.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 0.9,
+    "legend.frameon": False,
+    "axes.prop_cycle": matplotlib.cycler(color=COLOURS),
+    "axes.titlesize": 9,
+    "svg.hashsalt": "gyrofree",
+    "agg.path.chunksize": 10000,
+}
 WIDE, HIGH, DPI = 7.2, 2.7, 160  # inches, inches, dots per inch
 
 
@@ -56,7 +74,12 @@ def _raw(figure: Figure, found: Analysis) -> bool:
     axes = figure.subplots(2, 2, sharex=True, sharey=True)
     for k, ax in enumerate(axes.flat):
         for axis in range(3):
-            ax.plot(found.cube.t, found.cube.f_axis[:, 3 * k + axis], label=f"a{k + 1}{axis + 1}", linewidth=0.6)
+            ax.plot(
+                found.cube.t,
+                found.cube.f_axis[:, 3 * k + axis],
+                label=f"a{k + 1}{axis + 1}",
+                linewidth=0.6,
+            )
         ax.set_title(f"triad {k + 1}")
         ax.legend(ncols=3, loc="upper right", fontsize=7)
     figure.supxlabel("time, s")
@@ -104,7 +127,9 @@ def _omega(figure: Figure, found: Analysis) -> bool:
         ax.plot(rate.t, np.degrees(rate.omega_b[:, 2]), label=rate.name)
     t, omega = _reference(found.run)
     if len(t):
-        ax.plot(t, np.degrees(omega), color=REFERENCE, linestyle="--", linewidth=0.8, label="tachometer")
+        ax.plot(
+            t, np.degrees(omega), color=REFERENCE, linestyle="--", linewidth=0.8, label="tachometer"
+        )
     ax.legend()
     return True
 
@@ -117,7 +142,13 @@ def _angle(figure: Figure, found: Analysis) -> bool:
         ax.plot(rate.t, np.degrees(rate.angle_z - rate.angle_z[0]), label=rate.name)
     t, omega = _reference(found.run)
     if len(t):
-        ax.plot(t, np.degrees(np.cumsum(omega) * STEP), color=REFERENCE, linestyle="--", label="tachometer")
+        ax.plot(
+            t,
+            np.degrees(np.cumsum(omega) * STEP),
+            color=REFERENCE,
+            linestyle="--",
+            label="tachometer",
+        )
     ax.legend()
     return True
 
@@ -143,7 +174,15 @@ def _plateau_errors(figure: Figure, found: Analysis) -> bool:
         levels = np.degrees([part.segment.omega for part in rate.plateaus])
         error = np.degrees([part.error[2] for part in rate.plateaus])
         spread = 2.0 * np.degrees(np.nan_to_num([part.standard_error[2] for part in rate.plateaus]))
-        ax.errorbar(levels + 1.5 * k, error, yerr=spread, fmt="os^Dv"[k % 5], capsize=3, markersize=4, label=rate.name)
+        ax.errorbar(
+            levels + 1.5 * k,
+            error,
+            yerr=spread,
+            fmt="os^Dv"[k % 5],
+            capsize=3,
+            markersize=4,
+            label=rate.name,
+        )
     ax.axhline(0.0, color="#555555", linewidth=0.8)
     ax.set_yscale("symlog", linthresh=1.0)
     ax.set_xlabel("reference, deg/s")
@@ -225,7 +264,15 @@ FIGURES: tuple[tuple[str, str, Callable[[Figure, Analysis], bool]], ...] = (
     ("angle", "Rotation angle about z.", _angle),
     ("position", "Position error of the unaided inertial navigation.", _position),
     ("plateaus", "Mean rate error on every plateau, with two standard errors.", _plateau_errors),
-    ("allan", "Overlapping Allan deviation of every axis over the longest standstill, 68 % band of one.", _allan),
-    ("nis", "Normalised innovation squared over its degrees of freedom, running mean; 1 is consistent.", _nis),
+    (
+        "allan",
+        "Overlapping Allan deviation of every axis over the longest standstill, 68 % band of one.",
+        _allan,
+    ),
+    (
+        "nis",
+        "Normalised innovation squared over its degrees of freedom, running mean; 1 is consistent.",
+        _nis,
+    ),
     ("track", "Track of every navigation filter.", _track),
-)  # fmt: skip
+)

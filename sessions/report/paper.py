@@ -1,6 +1,8 @@
-"""The published table test's own quantities, from a recording, in the order in which the paper shows them.
+"""The published table test's own quantities, from a recording, in the order in which the paper
+shows them.
 
-Equation numbers in round brackets are the paper's; docs/equations.md derives them. SI, body frame b.
+Equation numbers in round brackets are the paper's; docs/equations.md derives them. SI, body frame
+b.
 """
 
 from dataclasses import dataclass
@@ -8,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.ins.earth import gravity
-from estimator.rate.field import cube_angular_acceleration, cube_specific_force
+from inertial.navigation.earth import gravity
+from inertial.rate.field import cube_angular_acceleration, cube_specific_force
 from sessions.report.data import Accel, Rate, Run
 from sessions.report.segments import STEP, Segment, reference
 
@@ -27,7 +29,9 @@ class CubeTest:
     f_axis: Array  # (n, 12) m/s^2
     p_b: Array  # (n, 3) m/s^2 (25)
     alpha_b: Array  # (n, 3) rad/s^2 (26)
-    bias_b: Array | None  # (3,) m/s^2, equivalent bias from the standstills; None without two headings
+    bias_b: (
+        Array | None
+    )  # (3,) m/s^2, equivalent bias from the standstills; None without two headings
     tilt: float | None  # rad, of the table's axis against the vertical
 
 
@@ -59,11 +63,14 @@ def local_gravity(run: Run) -> float:
     return float(gravity(float(np.median(run.fixes[:, 1])), float(np.median(run.fixes[:, 3]))))
 
 
-def equivalent_bias(t: Array, p: Array, segments: list[Segment], run: Run) -> tuple[Array | None, float | None]:
+def equivalent_bias(
+    t: Array, p: Array, segments: list[Segment], run: Run
+) -> tuple[Array | None, float | None]:
     """Bias of p (m/s^2) and tilt of the table's axis (rad) from standstills at different headings.
 
-    At rest p = b + g (u(psi), cos tilt), where the horizontal part u of gravity turns against the table's angle psi
-    and the bias b does not: two headings tell them apart. None where all standstills have one heading.
+    At rest p = b + g (u(psi), cos tilt), where the horizontal part u of gravity turns against the
+    table's angle psi and the bias b does not: two headings tell them apart. None where all
+    standstills have one heading.
     """
     resting = [part for part in segments if part.still and part.holds(t).sum() > 20]
     if run.tacho is None or len(resting) < 2:
@@ -87,15 +94,20 @@ def equivalent_bias(t: Array, p: Array, segments: list[Segment], run: Run) -> tu
     return np.array([bx, by, float(np.mean(heights)) - g * np.cos(tilt)]), tilt
 
 
-def position_error(rate: Rate, bias_b: Array | None, start: float, g: float) -> PositionError | None:
+def position_error(
+    rate: Rate, bias_b: Array | None, start: float, g: float
+) -> PositionError | None:
     """At the end of the run; None for an estimator that does not navigate.
 
-    (27): x = 1/2 b t^2 + 1/6 [d x] (0, 0, -g) t^3. Our estimators take b out at the standstill, so what remains is
-    laid on the drift: d = 6 |x| / (g t^3), x horizontal. closed_form is the first term with b left in.
+    (27): x = 1/2 b t^2 + 1/6 [d x] (0, 0, -g) t^3. Our estimators take b out at the standstill, so
+    what remains is laid on the drift: d = 6 |x| / (g t^3), x horizontal. closed_form is the first
+    term with b left in.
     """
     if not np.any(rate.p_n) or rate.t[-1] <= start:
         return None
     t = float(rate.t[-1] - start)
     error = rate.p_n[-1]
     closed = None if bias_b is None else 0.5 * float(np.linalg.norm(bias_b)) * t**2
-    return PositionError(rate.name, t, error, closed, 6.0 * float(np.hypot(error[0], error[1])) / (g * t**3))
+    return PositionError(
+        rate.name, t, error, closed, 6.0 * float(np.hypot(error[0], error[1])) / (g * t**3)
+    )

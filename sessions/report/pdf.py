@@ -43,18 +43,29 @@ def to_pdf(document: Document) -> bytes:
     _register_fonts()
     buffer = io.BytesIO()
     pages = BaseDocTemplate(
-        buffer, pagesize=A4, leftMargin=MARGIN, rightMargin=MARGIN, topMargin=MARGIN, bottomMargin=MARGIN,
-        title=document.title, author="gyrofree", invariant=1,
-    )  # fmt: skip
+        buffer,
+        pagesize=A4,
+        leftMargin=MARGIN,
+        rightMargin=MARGIN,
+        topMargin=MARGIN,
+        bottomMargin=MARGIN,
+        title=document.title,
+        author="gyrofree",
+        invariant=1,
+    )
     height = A4[1] - 2 * MARGIN
-    frame = Frame(MARGIN, MARGIN, WIDTH, height, leftPadding=0, rightPadding=0, topPadding=0, bottomPadding=0)
+    frame = Frame(
+        MARGIN, MARGIN, WIDTH, height, leftPadding=0, rightPadding=0, topPadding=0, bottomPadding=0
+    )
     pages.addPageTemplates(PageTemplate(frames=[frame], onPage=_footer(document)))
     pages.build(_story(document))
     return buffer.getvalue()
 
 
 def _register_fonts() -> None:
-    """DejaVu, which matplotlib carries: the figures and the text look alike, and mathematical signs exist."""
+    """DejaVu, which matplotlib carries: the figures and the text look alike, and mathematical signs
+    exist.
+    """
     folder = Path(font_manager.findfont("DejaVu Sans")).parent
     for name in (FONT, BOLD):
         if name not in pdfmetrics.getRegisteredFontNames():
@@ -76,18 +87,27 @@ def _footer(document: Document):
 def _story(document: Document) -> list:
     verdict = VERDICTS.get(document.verdict, DIM)
     head = Table(
-        [[
-            Paragraph(escape(document.title), _style("title", 17, fontName=BOLD)),
-            Paragraph(document.verdict.upper(), _style("verdict", 13, fontName=BOLD, textColor=verdict, alignment=2)),
-        ]],
+        [
+            [
+                Paragraph(escape(document.title), _style("title", 17, fontName=BOLD)),
+                Paragraph(
+                    document.verdict.upper(),
+                    _style("verdict", 13, fontName=BOLD, textColor=verdict, alignment=2),
+                ),
+            ]
+        ],
         colWidths=[WIDTH * 0.72, WIDTH * 0.28],
         style=[("LINEBELOW", (0, 0), (-1, -1), 1.5, INK), ("LEFTPADDING", (0, 0), (-1, -1), 0)],
-    )  # fmt: skip
+    )
     story: list = [head, Spacer(0, 4 * mm), _pairs(document.facts)]
     if document.checks:
-        story += _grid(Grid("Acceptance", ("figure", "measured", "limit", "result"), list(document.checks)))
+        story += _grid(
+            Grid("Acceptance", ("figure", "measured", "limit", "result"), list(document.checks))
+        )
     for number, picture in enumerate(document.pictures, 1):
-        caption = Paragraph(escape(f"Figure {number}. {picture.caption}"), _style("caption", 7.5, textColor=DIM))
+        caption = Paragraph(
+            escape(f"Figure {number}. {picture.caption}"), _style("caption", 7.5, textColor=DIM)
+        )
         image = Image(io.BytesIO(picture.png))
         image.drawHeight *= WIDTH / image.drawWidth
         image.drawWidth = WIDTH
@@ -99,12 +119,17 @@ def _story(document: Document) -> list:
 
 
 def _title(text: str) -> Paragraph:
-    return Paragraph(escape(text), _style("heading", 10.5, fontName=BOLD, spaceBefore=7 * mm, spaceAfter=2 * mm))
+    return Paragraph(
+        escape(text), _style("heading", 10.5, fontName=BOLD, spaceBefore=7 * mm, spaceAfter=2 * mm)
+    )
 
 
 def _pairs(rows: list[tuple[str, str]]) -> Table:
     cells = [
-        [Paragraph(escape(name), _style("name", 8, textColor=DIM)), Paragraph(escape(value), _style("value", 8))]
+        [
+            Paragraph(escape(name), _style("name", 8, textColor=DIM)),
+            Paragraph(escape(value), _style("value", 8)),
+        ]
         for name, value in rows
     ]
     padding = {"LEFTPADDING": 0, "BOTTOMPADDING": 1, "TOPPADDING": 1}
@@ -117,28 +142,43 @@ def _grid(grid: Grid) -> list:
     body, bold = _style("cell", size), _style("head", size, fontName=BOLD, textColor=DIM)
     cells = [[Paragraph(escape(cell), bold) for cell in grid.head]]
     cells += [[Paragraph(escape(cell), body) for cell in row] for row in grid.rows]
-    style = TableStyle([
-        ("LINEBELOW", (0, 0), (-1, 0), 0.7, INK), ("LINEBELOW", (0, 1), (-1, -1), 0.3, LINE),
-        ("LEFTPADDING", (0, 0), (-1, -1), 0), ("TOPPADDING", (0, 0), (-1, -1), 1.5),
-        ("BOTTOMPADDING", (0, 0), (-1, -1), 1.5), ("VALIGN", (0, 0), (-1, -1), "TOP"),
-    ])  # fmt: skip
+    style = TableStyle(
+        [
+            ("LINEBELOW", (0, 0), (-1, 0), 0.7, INK),
+            ("LINEBELOW", (0, 1), (-1, -1), 0.3, LINE),
+            ("LEFTPADDING", (0, 0), (-1, -1), 0),
+            ("TOPPADDING", (0, 0), (-1, -1), 1.5),
+            ("BOTTOMPADDING", (0, 0), (-1, -1), 1.5),
+            ("VALIGN", (0, 0), (-1, -1), "TOP"),
+        ]
+    )
     widths = _widths(grid)
     blocks = [_title(grid.title), Table(cells, colWidths=widths, style=style, repeatRows=1)]
     if grid.remark:
-        blocks.append(Paragraph(escape(grid.remark), _style("remark", 7, textColor=DIM, spaceBefore=1.5 * mm)))
+        blocks.append(
+            Paragraph(escape(grid.remark), _style("remark", 7, textColor=DIM, spaceBefore=1.5 * mm))
+        )
     return [KeepTogether(blocks)] if len(grid.rows) < 12 else blocks
 
 
 def _widths(grid: Grid) -> list[float]:
     """In proportion to the longest text of each column."""
     columns = list(zip(grid.head, *grid.rows, strict=True))
-    longest = [max(6, *(max(len(word) for word in text.split("\n")) for text in column)) for column in columns]
+    longest = [
+        max(6, *(max(len(word) for word in text.split("\n")) for text in column))
+        for column in columns
+    ]
     capped = [min(length, 24) for length in longest]
     return [WIDTH * length / sum(capped) for length in capped]
 
 
 def _signatures() -> Table:
     style = [("LINEABOVE", (k, 0), (k, 0), 0.6, INK) for k in (0, 2, 4)]
-    labels = [Paragraph(text, _style("sign", 7.5, textColor=DIM)) for text in ("Tested by", "Approved by", "Date")]
+    labels = [
+        Paragraph(text, _style("sign", 7.5, textColor=DIM))
+        for text in ("Tested by", "Approved by", "Date")
+    ]
     row = [labels[0], "", labels[1], "", labels[2]]
-    return Table([row], colWidths=[WIDTH * share for share in (0.3, 0.05, 0.3, 0.05, 0.3)], style=style)
+    return Table(
+        [row], colWidths=[WIDTH * share for share in (0.3, 0.05, 0.3, 0.05, 0.3)], style=style
+    )

@@ -1,7 +1,9 @@
-"""A run of a rate table cut into standstills and plateaus, by the tachometer alone; nobody has to mark anything.
+"""A run of a rate table cut into standstills and plateaus, by the tachometer alone; nobody has to
+mark anything.
 
-A plateau is where the smoothed reference changes by less than SLOPE for at least SHORTEST; SETTLE is cut off at both
-ends, as the table and the smoothing need it. A standstill is a plateau below STILL.
+A plateau is where the smoothed reference changes by less than SLOPE for at least SHORTEST; SETTLE
+is cut off at both ends, as the table and the smoothing need it. A standstill is a plateau below
+STILL.
 """
 
 from dataclasses import dataclass
@@ -48,10 +50,11 @@ class Segment:
 
 
 def reference(tacho: Tacho, t: Array) -> Array:
-    """Rate of the table at times t, rad/s: linear between pulses, zero where no pulse comes for SILENCE.
+    """Rate of the table at times t, rad/s: linear between pulses, zero where no pulse comes for
+    SILENCE.
 
-    A rate from pulses is the mean since the pulse before it, so it stands for the middle of that time. Where pulses
-    begin or end, the line through the nearest two is drawn on to zero.
+    A rate from pulses is the mean since the pulse before it, so it stands for the middle of that
+    time. Where pulses begin or end, the line through the nearest two is drawn on to zero.
     """
     groups = np.split(np.arange(len(tacho.t)), np.flatnonzero(np.diff(tacho.t) > SILENCE) + 1)
     times: list[Array] = []
@@ -70,7 +73,9 @@ def reference(tacho: Tacho, t: Array) -> Array:
 
 
 def measured(tacho: Tacho, t: Array) -> NDArray[np.bool_]:
-    """Where the reference is a measurement: not within SILENCE before pulses begin and after they end."""
+    """Where the reference is a measurement: not within SILENCE before pulses begin and after they
+    end.
+    """
     begins = tacho.t[np.flatnonzero(np.diff(tacho.t, prepend=-np.inf) > SILENCE)]
     ends = tacho.t[np.flatnonzero(np.diff(tacho.t, append=np.inf) > SILENCE)]
     guess = np.zeros(len(t), dtype=bool)
@@ -82,7 +87,9 @@ def measured(tacho: Tacho, t: Array) -> NDArray[np.bool_]:
 
 
 def _to_zero(t: Array, omega: Array) -> float:
-    """Where the line through two rates, the outer one first, meets zero; at most SILENCE / 2 from the outer one."""
+    """Where the line through two rates, the outer one first, meets zero; at most SILENCE / 2 from
+    the outer one.
+    """
     outward = t[0] - t[1]
     change = omega[0] - omega[1]
     reach = -omega[0] / change * outward if change * omega[0] < 0.0 else np.sign(outward) * SILENCE
@@ -91,7 +98,10 @@ def _to_zero(t: Array, omega: Array) -> float:
 
 def segment(tacho: Tacho, seconds: float) -> list[Segment]:
     """Plateaus and standstills of a run of that length, in order."""
-    from scipy.ndimage import median_filter, uniform_filter1d  # here: slow to load, and `reference` wants none of it
+    from scipy.ndimage import (
+        median_filter,
+        uniform_filter1d,
+    )  # here: slow to load, and `reference` wants none of it
 
     t = np.arange(0.0, seconds, STEP)
     if len(t) < 10:

@@ -25,7 +25,9 @@ class Allan:
     low: Array  # 68 % confidence
     high: Array
     random_walk: float  # N: of the -1/2 slope, unit times sqrt(s)
-    bias_instability: float | None  # B: minimum / 0.664; None when the minimum is at the longest tau
+    bias_instability: (
+        float | None
+    )  # B: minimum / 0.664; None when the minimum is at the longest tau
     slope: float  # d log deviation / d log tau over the first decade
 
 
@@ -36,10 +38,14 @@ def longest_rest(segments: list[Segment]) -> Segment | None:
 
 
 def allan_of(name: str, values: Array, period_s: float) -> Allan | None:
-    """Allan deviation by allantools; None for fewer than LEAST samples or a signal that does not move."""
+    """Allan deviation by allantools; None for fewer than LEAST samples or a signal that does not
+    move.
+    """
     if len(values) < LEAST or np.ptp(values) == 0.0:
         return None
-    taus, deviation, _, counts = allantools.oadev(values, 1.0 / period_s, data_type="freq", taus="octave")
+    taus, deviation, _, counts = allantools.oadev(
+        values, 1.0 / period_s, data_type="freq", taus="octave"
+    )
     keep = counts >= 3
     taus, deviation = taus[keep], deviation[keep]
     low, high = _interval(deviation, taus, period_s, len(values))
@@ -60,9 +66,13 @@ def allan_of(name: str, values: Array, period_s: float) -> Allan | None:
 
 
 def _interval(deviation: Array, taus: Array, period_s: float, n: int) -> tuple[Array, Array]:
-    """68 % of chi-square with the degrees of freedom that white noise has (n averaging times, at least 1)."""
+    """68 % of chi-square with the degrees of freedom that white noise has (n averaging times, at
+    least 1).
+    """
     edf = np.maximum(1.0, 1.5 * n * period_s / taus - 2.0)
-    return deviation * np.sqrt(edf / chi2.ppf(0.84, edf)), deviation * np.sqrt(edf / chi2.ppf(0.16, edf))
+    return deviation * np.sqrt(edf / chi2.ppf(0.84, edf)), deviation * np.sqrt(
+        edf / chi2.ppf(0.16, edf)
+    )
 
 
 def allan_axes(accel: Accel, rest: Segment) -> list[Allan]:
@@ -75,7 +85,9 @@ def allan_axes(accel: Accel, rest: Segment) -> list[Allan]:
 
 @dataclass(frozen=True)
 class Consistency:
-    """Normalised innovation squared over its degrees of freedom; 1 is what a consistent filter has."""
+    """Normalised innovation squared over its degrees of freedom; 1 is what a consistent filter
+    has.
+    """
 
     name: str
     count: int

@@ -1,13 +1,16 @@
-"""A rate table's figures in the terms of IEEE Std 1293, 836 and 952: scale factor, linearity, asymmetry, bias.
+"""A rate table's figures in the terms of IEEE Std 1293, 836 and 952: scale factor, linearity,
+asymmetry, bias.
 
 The model of the plateaus, by weighted least squares over all of them:
 
-    indicated_k = bias + scale_factor * reference_k + residual_k                                     (R-1)
-    linearity   = max_k |residual_k| / full_scale * 1e6 ppm,  full_scale = max_k |reference_k|       (R-2)
-    asymmetry   = (SF+ - SF-) / mean(SF+, SF-) * 1e6 ppm, from one fit with a slope for each direction     (R-3)
-    cross-axis  = slope of omega_x, omega_y over the reference                                       (R-4)
+    indicated_k = bias + scale_factor * reference_k + residual_k
+    (R-1) linearity   = max_k |residual_k| / full_scale * 1e6 ppm,  full_scale = max_k |reference_k|
+    (R-2) asymmetry   = (SF+ - SF-) / mean(SF+, SF-) * 1e6 ppm, from one fit with a slope for each
+    direction     (R-3) cross-axis  = slope of omega_x, omega_y over the reference
+    (R-4)
 
-Standard errors of means are of batch means (0.5 s), since an estimate's errors are correlated in time.
+Standard errors of means are of batch means (0.5 s), since an estimate's errors are correlated in
+time.
 """
 
 from dataclasses import dataclass
@@ -75,7 +78,9 @@ def plateaus(rate: Rate, segments: list[Segment], tacho: Tacho) -> list[Plateau]
 
 
 def batch_error(t: Array, values: Array) -> Array:
-    """Standard error of the mean of correlated values (n, k), from the means of BATCH long pieces."""
+    """Standard error of the mean of correlated values (n, k), from the means of BATCH long
+    pieces.
+    """
     piece = ((t - t[0]) / BATCH).astype(int)
     means = np.array([values[piece == k].mean(axis=0) for k in np.unique(piece)])
     if len(means) < 3:
@@ -111,7 +116,9 @@ def scale_factor(found: list[Plateau]) -> ScaleFactor | None:
 
 
 def _asymmetry(levels: Array, indicated: Array, sigma: Array) -> float | None:
-    """(R-3) from indicated = bias + s w + c |w|: SF+ = s + c, SF- = s - c; None where three levels do not tell."""
+    """(R-3) from indicated = bias + s w + c |w|: SF+ = s + c, SF- = s - c; None where three levels
+    do not tell.
+    """
     design = np.column_stack([np.ones_like(levels), levels, np.abs(levels)]) / sigma[:, None]
     both = levels.max() > np.radians(5.0) and levels.min() < -np.radians(5.0)
     if not both or np.linalg.matrix_rank(design, tol=1e-6 * np.abs(design).max()) < 3:

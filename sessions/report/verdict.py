@@ -80,11 +80,15 @@ def load_spec(path: Path | None) -> Spec:
         raise SpecError(f"{path}: not TOML: {error}") from None
     except ValidationError as error:
         first = error.errors()[0]
-        raise SpecError(f"{path}: {'.'.join(map(str, first['loc'])) or 'the file'}: {first['msg']}") from None
+        raise SpecError(
+            f"{path}: {'.'.join(map(str, first['loc'])) or 'the file'}: {first['msg']}"
+        ) from None
 
 
 def judge(spec: Spec, found: list[Metric]) -> list[Check]:
-    """Every limit against its figure; raises SpecError for a limit on a figure that no report has."""
+    """Every limit against its figure; raises SpecError for a limit on a figure that no report
+    has.
+    """
     values = {metric.name: metric.value for metric in found}
     texts = {metric.name: metric.text for metric in found}
     checks = []
@@ -97,7 +101,17 @@ def judge(spec: Spec, found: list[Metric]) -> list[Check]:
     return checks
 
 
-SOMETIMES = ("rate_", "scale_", "linearity", "asymmetry", "cross_", "angle_", "position_", "equivalent_", "nis_")
+SOMETIMES = (
+    "rate_",
+    "scale_",
+    "linearity",
+    "asymmetry",
+    "cross_",
+    "angle_",
+    "position_",
+    "equivalent_",
+    "nis_",
+)
 
 
 def _of_another_kind(name: str) -> bool:

@@ -1,6 +1,8 @@
-"""Inclination error and cost of the attitude filters on trials with optical truth: one JSON line per figure.
+"""Inclination error and cost of the attitude filters on trials with optical truth: one JSON line
+per figure.
 
-python tests/bench/bench_attitude.py [FOLDER]      FOLDER: attitude_optical, default $GYROFREE_DATA/attitude_optical
+python tests/bench/bench_attitude.py [FOLDER]      FOLDER: attitude_optical, default
+$GYROFREE_DATA/attitude_optical
 """
 
 import json
@@ -9,7 +11,7 @@ import os
 import sys
 from pathlib import Path
 
-from estimator.offline.attitude import run_attitude
+from logs.attitude import run_attitude
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 BAR_DEG = 0.75

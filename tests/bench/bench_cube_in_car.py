@@ -1,6 +1,8 @@
-"""How well a cube of 10 cm side sees the turns of a car: rate error on a simulated drive, sensors without errors.
+"""How well a cube of 10 cm side sees the turns of a car: rate error on a simulated drive, sensors
+without errors.
 
-One line of JSON per setting of the products filter; deg/s, body axes x y z, from 20 s after the start.
+One line of JSON per setting of the products filter; deg/s, body axes x y z, from 20 s after the
+start.
 
     python tests/bench/bench_cube_in_car.py
 """
@@ -9,12 +11,12 @@ import json
 
 import numpy as np
 
-from estimator.layouts.layout import CUBE
-from estimator.rate import products_ekf
-from estimator.rate.estimators import ProductsRate
-from estimator.simulation.cube_drive import cube_readings
-from estimator.simulation.drive import simulate
-from estimator.simulation.table import IDEAL
+from inertial.layouts.layout import CUBE
+from inertial.rate import products_ekf
+from inertial.rate.estimators import ProductsRate
+from inertial.simulation.cube_drive import cube_readings
+from inertial.simulation.drive import simulate
+from inertial.simulation.table import IDEAL
 
 SETTINGS = {
     "as on a table": {},
@@ -32,7 +34,12 @@ def main() -> None:
     turns = np.degrees(np.sqrt((truth[START:] ** 2).mean(axis=0)))
     for name, setting in SETTINGS.items():
         estimator = ProductsRate(CUBE(0.05), products_ekf.Config(**setting))
-        omega = np.array([estimator.step(k, float(drive.imu[k, 0]), row).omega_b for k, row in enumerate(readings)])
+        omega = np.array(
+            [
+                estimator.step(k, float(drive.imu[k, 0]), row).omega_b
+                for k, row in enumerate(readings)
+            ]
+        )
         error = np.degrees(np.sqrt(((omega - truth)[START:] ** 2).mean(axis=0)))
         found = {"bench": "cube_in_car", "setting": name, "error_dps": error.round(2).tolist()}
         print(json.dumps(found | {"car_turns_dps": turns.round(2).tolist()}))

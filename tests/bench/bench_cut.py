@@ -1,10 +1,12 @@
 """Link cut at 1 kHz: what is lost, how long until the recording and the charts are whole again.
 
-    python tests/bench/bench_cut.py [seconds of the cut, default 30] [minutes of the compressed outage, default 10]
+    python tests/bench/bench_cut.py [seconds of the cut, default 30] [minutes of the compressed
+    outage, default 10]
 
-A publisher with a spool, twelve axes at 1000 samples/s in messages of ten, a recorder and a dashboard's feed, all on a
-real router; the publisher's TCP connection goes through a cable that is cut. The long outage is compressed in time:
-that many minutes of messages are published as fast as they can be while the cable is cut.
+A publisher with a spool, twelve axes at 1000 samples/s in messages of ten, a recorder and a
+dashboard's feed, all on a real router; the publisher's TCP connection goes through a cable that is
+cut. The long outage is compressed in time: that many minutes of messages are published as fast as
+they can be while the cable is cut.
 """
 
 import json
@@ -17,20 +19,20 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-from bus_cut import Cable  # noqa: E402
-from stack import free_port  # noqa: E402
+from support.bus_cut import Cable  # noqa: E402
+from support.stack import free_port  # noqa: E402
 
 from dashboard.scene.feed import Feed  # noqa: E402
 from dashboard.scene.store import Store  # noqa: E402
-from messages import gyrofree_pb2 as pb  # noqa: E402
-from messages.bus import BusSettings, Publishers, open_client, open_router  # noqa: E402
-from messages.history import declare  # noqa: E402
-from messages.spool import Spool  # noqa: E402
-from messages.topics import ACCEL, STATUS  # noqa: E402
-from sessions import recorder  # noqa: E402
-from sessions.catalogue import Catalogue  # noqa: E402
-from sessions.mcap_log import read  # noqa: E402
-from sessions.settings import RecorderSettings  # noqa: E402
+from messages.bus.session import BusSettings, Publishers, open_client, open_router  # noqa: E402
+from messages.contract import gyrofree_pb2 as pb  # noqa: E402
+from messages.contract.topics import ACCEL, STATUS  # noqa: E402
+from messages.history.answers import declare  # noqa: E402
+from messages.history.spool import Spool  # noqa: E402
+from sessions.library.catalogue import Catalogue  # noqa: E402
+from sessions.recording import recorder  # noqa: E402
+from sessions.recording.mcap_log import read  # noqa: E402
+from sessions.recording.settings import RecorderSettings  # noqa: E402
 
 PERIOD_S, BATCH = 0.001, 10
 
@@ -45,9 +47,17 @@ class Board:
 
     def send(self) -> None:
         """One message, BATCH samples after the one before."""
-        header = pb.Header(device="cube", run=1, epoch=1, utc_ns=int(self.t_s * 1e9), device_us=int(self.sent * 1e4))
+        header = pb.Header(
+            device="cube",
+            run=1,
+            epoch=1,
+            utc_ns=int(self.t_s * 1e9),
+            device_us=int(self.sent * 1e4),
+        )
         counts = [self.sent % 200 + k for k in range(12 * BATCH)]
-        message = pb.AccelBatch(header=header, first_index=self.sent * BATCH, period_s=PERIOD_S, axes=12, counts=counts)
+        message = pb.AccelBatch(
+            header=header, first_index=self.sent * BATCH, period_s=PERIOD_S, axes=12, counts=counts
+        )
         message.f_mps2[:] = [0.0383 * count for count in counts]
         self._publishers.put(ACCEL, "cube", message)
         self.sent += 1
@@ -106,10 +116,16 @@ def trial(cut_s: float, compressed: bool) -> dict:
                 board.run(0.1)
                 visible = min(cut_s, 25.0)  # what the ring of the charts can hold at this rate
                 device = store.device("cube")
-                here = device is not None and device.utc0_ns * 1e-9 + device.t_newest > board.t_s - 0.5
+                here = (
+                    device is not None and device.utc0_ns * 1e-9 + device.t_newest > board.t_s - 0.5
+                )
                 if screen_s is None and here and not holes(store, device.t_newest - visible):
                     screen_s = time.monotonic() - mended
-                if disk_s is None and status[0].messages >= board.sent - 150 and not status[0].repairing:
+                if (
+                    disk_s is None
+                    and status[0].messages >= board.sent - 150
+                    and not status[0].repairing
+                ):
                     disk_s = time.monotonic() - mended
             board.run(1.0)
             time.sleep(1.0)
@@ -126,19 +142,42 @@ def trial(cut_s: float, compressed: bool) -> dict:
         found = Catalogue(settings.root).manifest(info.id).certificate["cube"]["topics"]["accel"]
         lost = sequences[-1] - sequences[0] + 1 - len(set(sequences))
         double, in_order = len(sequences) - len(set(sequences)), sequences == sorted(sequences)
-        return {"lost": lost, "double": double, "in_order": in_order, "screen_s": screen_s, "disk_s": disk_s,
-                "certificate": found}  # fmt: skip
+        return {
+            "lost": lost,
+            "double": double,
+            "in_order": in_order,
+            "screen_s": screen_s,
+            "disk_s": disk_s,
+            "certificate": found,
+        }
 
 
 def main(cut_s: float = 30.0, minutes: float = 10.0) -> None:
     """Run and print."""
-    for label, seconds, compressed in (("cut", cut_s, False), ("outage_compressed", 60.0 * minutes, True)):
+    for label, seconds, compressed in (
+        ("cut", cut_s, False),
+        ("outage_compressed", 60.0 * minutes, True),
+    ):
         got = trial(seconds, compressed)
-        more = {"cut_s": seconds, "double": got["double"], "in_order": got["in_order"], **got["certificate"]}
-        print(json.dumps({"name": f"{label}_lost", "value": got["lost"], "unit": "messages", "target": 0} | more))
+        more = {
+            "cut_s": seconds,
+            "double": got["double"],
+            "in_order": got["in_order"],
+            **got["certificate"],
+        }
+        print(
+            json.dumps(
+                {"name": f"{label}_lost", "value": got["lost"], "unit": "messages", "target": 0}
+                | more
+            )
+        )
         for where in ("screen", "disk"):
             value = got[f"{where}_s"]
-            figure = {"name": f"{label}_whole_on_{where}", "value": value and round(value, 2), "unit": "s"}
+            figure = {
+                "name": f"{label}_whole_on_{where}",
+                "value": value and round(value, 2),
+                "unit": "s",
+            }
             print(json.dumps(figure | ({"target": 5.0} if not compressed else {})), flush=True)
 
 

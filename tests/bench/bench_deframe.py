@@ -1,7 +1,9 @@
-"""Frames per second of the live path: wire bytes to events, payloads not yet decoded.  Prints one line of JSON.
+"""Frames per second of the live path: wire bytes to events, payloads not yet decoded.  Prints one
+line of JSON.
 
-The stream is ACC12 with one frame in a hundred damaged, read 4096 bytes at a time, one thread.  The baseline is the
-deframer one would write first: a loop over bytes in Python, with the same CRC from zlib.
+The stream is ACC12 with one frame in a hundred damaged, read 4096 bytes at a time, one thread.  The
+baseline is the deframer one would write first: a loop over bytes in Python, with the same CRC from
+zlib.
 
     python tests/bench/bench_deframe.py [seconds per figure]
 """
@@ -26,7 +28,9 @@ def stream(n: int) -> bytes:
     chance, wires = random.Random(n), []
     for seq in range(N_FRAMES):
         rows = tuple(tuple(chance.randint(-512, 511) for _ in range(12)) for _ in range(n))
-        wire = bytearray(encode(Acc12(seq * n, 1_000_000, 15, 0, rows), epoch=1, seq=seq, t_us=seq * n * 1000))
+        wire = bytearray(
+            encode(Acc12(seq * n, 1_000_000, 15, 0, rows), epoch=1, seq=seq, t_us=seq * n * 1000)
+        )
         if seq % 100 == 50:
             wire[chance.randrange(1, len(wire) - 1)] ^= 0x41
         wires.append(bytes(wire))
@@ -71,19 +75,26 @@ def with_ledger(wire: bytes) -> int:
 
 def decoded(wire: bytes) -> int:
     deframer = Deframer()
-    return sum(bool(event.payload) for at in range(0, len(wire), READ)
-               for event in deframer.feed(wire[at : at + READ]) if isinstance(event, Frame))
+    return sum(
+        bool(event.payload)
+        for at in range(0, len(wire), READ)
+        for event in deframer.feed(wire[at : at + READ])
+        if isinstance(event, Frame)
+    )
 
 
 def feeding(make: Callable[[], Deframer | ByteLoop]) -> Callable[[bytes], int]:
     def run(wire: bytes) -> int:
         deframer = make()
         return sum(len(deframer.feed(wire[at : at + READ])) for at in range(0, len(wire), READ))
+
     return run
 
 
 def rate(run: Callable[[bytes], int], wire: bytes, seconds: float) -> float:
-    """Frames per second of one core, best pass within a time: processor time, because others share the machine."""
+    """Frames per second of one core, best pass within a time: processor time, because others share
+    the machine.
+    """
     best, end = 0.0, time.perf_counter() + seconds
     while time.perf_counter() < end:
         start = time.process_time()
@@ -98,9 +109,13 @@ def main(seconds: float = 1.0) -> dict:
     for n in (1, 8):
         wire = stream(n)
         live, loop = rate(feeding(Deframer), wire, seconds), rate(feeding(ByteLoop), wire, seconds)
-        result |= {f"n{n}": live, f"n{n}_with_ledger": rate(with_ledger, wire, seconds),
-                   f"n{n}_payload_decoded": rate(decoded, wire, seconds), f"n{n}_byte_loop": loop,
-                   f"n{n}_ratio": round(live / loop, 1)}
+        result |= {
+            f"n{n}": live,
+            f"n{n}_with_ledger": rate(with_ledger, wire, seconds),
+            f"n{n}_payload_decoded": rate(decoded, wire, seconds),
+            f"n{n}_byte_loop": loop,
+            f"n{n}_ratio": round(live / loop, 1),
+        }
     return result
 
 

@@ -1,4 +1,5 @@
-"""Navigation: accuracy on fixes the filters never saw, cost per sample, an hour of drive. One JSON line per figure.
+"""Navigation: accuracy on fixes the filters never saw, cost per sample, an hour of drive. One JSON
+line per figure.
 
     python tests/bench/bench_drive.py [folder with imu.csv and gnss.csv]
 
@@ -14,16 +15,16 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator.ins.batch import run_filters
-from estimator.ins.error_model import ImuNoise
-from estimator.ins.filters import DEFAULT
-from estimator.ins.leg import make_model, new_leg, run_leg
-from estimator.ins.mechanise import TIME
-from estimator.ins.navigation import NAVIGATORS
-from estimator.offline.drive import run_drive
-from estimator.offline.drive_log import read_drive_log
-from estimator.simulation.drive import simulate
 from estimator.warm import warm
+from inertial.navigation.batch import run_filters
+from inertial.navigation.error_model import ImuNoise
+from inertial.navigation.filters import DEFAULT
+from inertial.navigation.leg import make_model, new_leg, run_leg
+from inertial.navigation.mechanise import TIME
+from inertial.navigation.navigation import NAVIGATORS
+from inertial.simulation.drive import simulate
+from logs.drive import run_drive
+from logs.drive_log import read_drive_log
 
 ROOT = Path(__file__).resolve().parents[2]
 SIX = ("kf", "kf-nhc", "huber", "huber-nhc", "fpe-p0-n10", "fpe-fuzzy")
@@ -48,11 +49,15 @@ def batch_us(imu: np.ndarray, fixes: list) -> dict[str, float]:
     """us per sample with all updates of one fix a second, by filter; the best of three."""
     fed = fixes[::4]
     runs = [run_filters(imu, fed, [*SIX, "mhe-robust"]) for _ in range(3)]
-    return {name: min(run[name].seconds / run[name].epochs for run in runs) * 1e6 for name in runs[0]}
+    return {
+        name: min(run[name].seconds / run[name].epochs for run in runs) * 1e6 for name in runs[0]
+    }
 
 
 def hour() -> dict[str, float]:
-    """A simulated hour at 100 Hz: six filters offline, and one live; how far their ends are apart."""
+    """A simulated hour at 100 Hz: six filters offline, and one live; how far their ends are
+    apart.
+    """
     drive = simulate(1, "B", 3600.0)
     started = time.perf_counter()
     runs = run_filters(drive.imu, drive.fixes, SIX)
@@ -67,9 +72,10 @@ def hour() -> dict[str, float]:
         said += [c for c in live.imu(row[0], row[1:4], row[4:7]) if len(c.values)]
     k = len(said) - 1
     return {
-        "six_filters_s": offline, "live_s": time.perf_counter() - started,
+        "six_filters_s": offline,
+        "live_s": time.perf_counter() - started,
         "live_minus_offline": float(np.abs(said[k].values - runs[DEFAULT].innovation[k, :6]).max()),
-    }  # fmt: skip
+    }
 
 
 def main() -> None:
@@ -81,12 +87,20 @@ def main() -> None:
     warm()
     log = read_drive_log(folder)
     print(json.dumps({"bench": "drive core", "us_per_epoch": core_us(log.imu)}), flush=True)
-    print(json.dumps({"bench": "drive batch", "us_per_epoch": batch_us(log.imu, log.fixes)}), flush=True)
+    print(
+        json.dumps({"bench": "drive batch", "us_per_epoch": batch_us(log.imu, log.fixes)}),
+        flush=True,
+    )
     result = run_drive(folder, every=4, outages=OUTAGES)
     for name, scores in result["filters"].items():
         ends = [end for end in scores["outage_end_m"] if end is not None]
         rms = math.sqrt(sum(end**2 for end in ends) / len(ends)) if ends else None
-        print(json.dumps({"bench": "drive accuracy", "filter": name, **scores, "outage_end_rms_m": rms}), flush=True)
+        print(
+            json.dumps(
+                {"bench": "drive accuracy", "filter": name, **scores, "outage_end_rms_m": rms}
+            ),
+            flush=True,
+        )
     print(json.dumps({"bench": "drive hour", **hour()}), flush=True)
 
 

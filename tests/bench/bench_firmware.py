@@ -1,8 +1,10 @@
-"""The firmware: sizes, and the load of 12 axes at 3.2 kHz over 3 Mbaud, counted in clocks of the emulated image.
+"""The firmware: sizes, and the load of 12 axes at 3.2 kHz over 3 Mbaud, counted in clocks of the
+emulated image.
 
-The emulator counts each instruction at the price in the Cortex-M3's manual, a flash wait at every taken branch out of
-the line that is open, and the SSP and UART at the rates of their dividers (emulator/cycles.py). cpu_permille is
-the image's own figure: all time not asleep, also that spent waiting for the sensors' bus.
+The emulator counts each instruction at the price in the Cortex-M3's manual, a flash wait at every
+taken branch out of the line that is open, and the SSP and UART at the rates of their dividers
+(emulator/cycles.py). cpu_permille is the image's own figure: all time not asleep, also that spent
+waiting for the sensors' bus.
 """
 
 import json
@@ -29,14 +31,20 @@ def report(**figures: object) -> None:
 
 def sizes() -> tuple[int, int]:
     """Bytes of flash, and of RAM without the stack."""
-    text = subprocess.run(["arm-none-eabi-size", str(IMAGE.with_suffix(".elf"))], capture_output=True, text=True,
-                          check=True).stdout
+    text = subprocess.run(
+        ["arm-none-eabi-size", str(IMAGE.with_suffix(".elf"))],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
     code, data, bss = map(int, text.splitlines()[1].split()[:3])
     return code + data, data + bss
 
 
 def load(rate_hz: int, baud: int) -> tuple[Status, int, int]:
-    """The last STATUS of a board that has run at this rate for two seconds; bytes it sent; overruns of its line."""
+    """The last STATUS of a board that has run at this rate for two seconds; bytes it sent; overruns
+    of its line.
+    """
     from emulator.board import Board
 
     board, deframer, frames, sent = Board(IMAGE), Deframer(), [], 0
@@ -49,7 +57,9 @@ def load(rate_hz: int, baud: int) -> tuple[Status, int, int]:
 
     live(0.1)
     for i, (name, value) in enumerate((("baud", baud), ("rate_hz", rate_hz))):
-        board.feed(encode(Command(SETTINGS[name], i, struct.pack("<I", value)), epoch=0, seq=i, t_us=0))
+        board.feed(
+            encode(Command(SETTINGS[name], i, struct.pack("<I", value)), epoch=0, seq=i, t_us=0)
+        )
         live(0.2 + 0.1 * i)
     before, sent = len(frames), 0
     live(3.2)
@@ -58,16 +68,32 @@ def load(rate_hz: int, baud: int) -> tuple[Status, int, int]:
 
 
 def main() -> None:
-    subprocess.run(["make", "-s", "-C", str(ROOT), "firmware"], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        ["make", "-s", "-C", str(ROOT), "firmware"], check=True, stdout=subprocess.DEVNULL
+    )
     flash, ram = sizes()
     for rate_hz, baud in ((100, 921_600), (1000, 921_600), (3200, 3_000_000)):
         status, rows, sent = load(rate_hz, baud)
-        report(bench="firmware_load", rate_hz=rate_hz, baud=baud, cpu_percent=status.cpu_permille / 10,
-               line_percent=round(1000 * sent / 2.9 / baud, 1), samples_per_s=round(rows / 2.9),
-               missed=status.missed_ticks, dropped=status.dropped, goal="<= 60 % at 3200 Hz")
+        report(
+            bench="firmware_load",
+            rate_hz=rate_hz,
+            baud=baud,
+            cpu_percent=status.cpu_permille / 10,
+            line_percent=round(1000 * sent / 2.9 / baud, 1),
+            samples_per_s=round(rows / 2.9),
+            missed=status.missed_ticks,
+            dropped=status.dropped,
+            goal="<= 60 % at 3200 Hz",
+        )
     stack = RAM_OF_STACK - ram - status.free_stack
-    report(bench="firmware_size", flash_bytes=flash, ram_bytes=ram, stack_bytes=stack, ram_with_stack=ram + stack,
-           goal="flash <= 24576, RAM <= 24576")
+    report(
+        bench="firmware_size",
+        flash_bytes=flash,
+        ram_bytes=ram,
+        stack_bytes=stack,
+        ram_with_stack=ram + stack,
+        goal="flash <= 24576, RAM <= 24576",
+    )
 
 
 if __name__ == "__main__":

@@ -1,8 +1,10 @@
-"""Navigation on a cube's own rate through the live pipeline, where it works and where it does not: JSON lines.
+"""Navigation on a cube's own rate through the live pipeline, where it works and where it does not:
+JSON lines.
 
-An arm of 3 m that turns at 70 to 130 deg/s, receiver of 0.3 m and 0.1 m/s twice a second, one fix in two held back; and
-a town drive (condition B), likewise one fix in two held back. RMS from 25 s on: position and velocity
-against the truth, heading, and the held-back fixes. 10 cm cube, sensors as published (20 mg, 0.5 %) or calibrated.
+An arm of 3 m that turns at 70 to 130 deg/s, receiver of 0.3 m and 0.1 m/s twice a second, one fix
+in two held back; and a town drive (condition B), likewise one fix in two held back. RMS from 25 s
+on: position and velocity against the truth, heading, and the held-back fixes. 10 cm cube, sensors
+as published (20 mg, 0.5 %) or calibrated.
 
     python tests/bench/bench_gyro_free_navigation.py [seeds]
 """
@@ -14,16 +16,28 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path[:0] = [str(Path(__file__).resolve().parent.parent.parent), str(Path(__file__).resolve().parent.parent)]
+sys.path[:0] = [
+    str(Path(__file__).resolve().parent.parent.parent),
+    str(Path(__file__).resolve().parent.parent),
+]
 
-from gyro_free_rig import COS, LATITUDE, LONGITUDE, METRES, SETTINGS, car_messages, heading_error, messages  # noqa: E402
+from support.gyro_free_rig import (  # noqa: E402
+    COS,
+    LATITUDE,
+    LONGITUDE,
+    METRES,
+    SETTINGS,
+    car_messages,
+    heading_error,
+    messages,
+)
 
 from estimator.service import Pipeline  # noqa: E402
 from estimator.settings import EstimatorSettings  # noqa: E402
-from estimator.simulation.arm import centre  # noqa: E402
-from estimator.simulation.drive import simulate  # noqa: E402
-from estimator.simulation.table import MILLI_G, SensorModel  # noqa: E402
-from messages.topics import INNOVATION, NAV  # noqa: E402
+from inertial.simulation.arm import centre  # noqa: E402
+from inertial.simulation.drive import simulate  # noqa: E402
+from inertial.simulation.table import MILLI_G, SensorModel  # noqa: E402
+from messages.contract.topics import INNOVATION, NAV  # noqa: E402
 
 PUBLISHED = SensorModel()
 CALIBRATED = SensorModel(bias=2.0 * MILLI_G, scale_error=0.0005)
@@ -62,12 +76,20 @@ def arm(seed: int, sensor: SensorModel) -> dict[str, dict[str, float]]:
         for m in entry["nav"]:
             t = m.header.device_us * 1e-6
             true_p, true_v = centre(test, t)
-            p.append([(m.latitude_deg - LATITUDE) * METRES - true_p[0],
-                      (m.longitude_deg - LONGITUDE) * METRES * COS - true_p[1]])  # fmt: skip
+            p.append(
+                [
+                    (m.latitude_deg - LATITUDE) * METRES - true_p[0],
+                    (m.longitude_deg - LONGITUDE) * METRES * COS - true_p[1],
+                ]
+            )
             v.append(np.array(m.v_n_mps)[:2] - true_v[:2])
             turn.append([heading_error(test, t, m.q_nb)])
-        out[name] = {"position_m": rms(p), "velocity_mps": rms(v), "heading_deg": rms(np.degrees(turn)),
-                     "unseen_m": rms(entry["unseen"])}  # fmt: skip
+        out[name] = {
+            "position_m": rms(p),
+            "velocity_mps": rms(v),
+            "heading_deg": rms(np.degrees(turn)),
+            "unseen_m": rms(entry["unseen"]),
+        }
     return out
 
 
@@ -79,8 +101,12 @@ def car(seed: int, sensor: SensorModel, half_side: float) -> dict[str, dict[str,
         p, v = [], []
         for m in entry["nav"]:
             k = drive.row_of(m.header.device_us * 1e-6)
-            p.append([(np.radians(m.latitude_deg) - drive.truth.latitude[k]) * 6.36e6,
-                      (np.radians(m.longitude_deg) - drive.truth.longitude[k]) * 6.36e6 * COS])  # fmt: skip
+            p.append(
+                [
+                    (np.radians(m.latitude_deg) - drive.truth.latitude[k]) * 6.36e6,
+                    (np.radians(m.longitude_deg) - drive.truth.longitude[k]) * 6.36e6 * COS,
+                ]
+            )
             v.append(np.array(m.v_n_mps)[:2] - drive.truth.v_n[k][:2])
         out[name] = {"position_m": rms(p), "velocity_mps": rms(v), "unseen_m": rms(entry["unseen"])}
     return out
@@ -98,10 +124,26 @@ def main() -> None:
     for case, made in cases.items():
         runs = [made(seed) for seed in seeds]
         for name in runs[0]:
-            median = {key: float(np.median([run[name][key] for run in runs])) for key in runs[0][name]}
-            worst = {f"{key}_worst": float(max(run[name][key] for run in runs)) for key in ("position_m",)}
-            print(json.dumps({"bench": "gyro_free_navigation", "case": case, "filter": name, "seeds": len(seeds),
-                              **median, **worst}), flush=True)  # fmt: skip
+            median = {
+                key: float(np.median([run[name][key] for run in runs])) for key in runs[0][name]
+            }
+            worst = {
+                f"{key}_worst": float(max(run[name][key] for run in runs))
+                for key in ("position_m",)
+            }
+            print(
+                json.dumps(
+                    {
+                        "bench": "gyro_free_navigation",
+                        "case": case,
+                        "filter": name,
+                        "seeds": len(seeds),
+                        **median,
+                        **worst,
+                    }
+                ),
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import psutil
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from stack import RunningDemo
+from support.stack import RunningDemo
 
 SETTLE = 10.0  # s
 SPAN = 30.0  # s, one run of the profile
@@ -27,10 +27,21 @@ def main() -> None:
         before, start = seconds(processes), time.monotonic()
         time.sleep(SPAN)
         after, span = seconds(processes), time.monotonic() - start
-        memory = {name: round(process.memory_info().rss / 2**20) for name, process in processes.items()}
+        memory = {
+            name: round(process.memory_info().rss / 2**20) for name, process in processes.items()
+        }
     share = {name: round(100 * (after[name] - before[name]) / span, 1) for name in processes}
     total = round(sum(share.values()), 1)
-    print(json.dumps({"bench": "idle", "cpu_percent_of_one_core": total, "by_process": share, "rss_mib": memory}))
+    print(
+        json.dumps(
+            {
+                "bench": "idle",
+                "cpu_percent_of_one_core": total,
+                "by_process": share,
+                "rss_mib": memory,
+            }
+        )
+    )
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
-"""Errors of the in-motion filters beside the reference's: one JSON line per condition, for a few drives.
+"""Errors of the in-motion filters beside the reference's: one JSON line per condition, for a few
+drives.
 
     python tests/bench/bench_in_motion.py [SEEDS]      default 2; the reference used 10
 
-`within_15_percent` counts velocity errors within 15 % of the reference's; `rank` is Spearman's correlation of the order
-of the methods in a column: 1 is the same order.
+`within_15_percent` counts velocity errors within 15 % of the reference's; `rank` is Spearman's
+correlation of the order of the methods in a column: 1 is the same order.
 """
 
 import json
@@ -11,8 +12,8 @@ import sys
 
 from scipy.stats import spearmanr
 
-from estimator.offline.in_motion import methods
-from estimator.offline.reproduce_in_motion import compare, mean_covariance
+from logs.in_motion import methods
+from logs.reproduce_in_motion import compare, mean_covariance
 
 # 3-D velocity error, m/s: the prototype's table of the comparison, columns A B C D K E F G H J
 COLUMNS = "ABCDKEFGHJ"
@@ -46,7 +47,9 @@ def against_reference(conditions: dict) -> list[dict]:
         names = [name for name in REFERENCE if name in conditions[column]]
         ours = [conditions[column][name]["error_velocity_mps"] for name in names]
         theirs = [REFERENCE[name][k] for name in names]
-        far = [name for name, a, b in zip(names, ours, theirs, strict=True) if abs(a / b - 1.0) > 0.15]
+        far = [
+            name for name, a, b in zip(names, ours, theirs, strict=True) if abs(a / b - 1.0) > 0.15
+        ]
         rows.append(
             {
                 "bench": "in_motion",

@@ -1,11 +1,14 @@
-"""A dashboard opened late: how long until it shows the last ten minutes of every plot, in a real page.
+"""A dashboard opened late: how long until it shows the last ten minutes of every plot, in a real
+page.
 
-    python tests/bench/bench_late.py [minutes of history, default 10] [page (default) or rings: without a browser]
+    python tests/bench/bench_late.py [minutes of history, default 10] [page (default) or rings:
+    without a browser]
 
-A cube at 100 samples/s with two estimators goes on in real time in a process of its own; before that its history has
-been written to the spools of gateway and estimator, dated back: 20 samples/s, and 100 in the last 70 s, of which a
-dashboard asks for everything. Then a dashboard is started, a real Chromium opens it, and the window of ten minutes is
-chosen. Wants playwright and /usr/bin/chromium; draws in software.
+A cube at 100 samples/s with two estimators goes on in real time in a process of its own; before
+that its history has been written to the spools of gateway and estimator, dated back: 20 samples/s,
+and 100 in the last 70 s, of which a dashboard asks for everything. Then a dashboard is started, a
+real Chromium opens it, and the window of ten minutes is chosen. Wants playwright and
+/usr/bin/chromium; draws in software.
 """
 
 import multiprocessing
@@ -16,19 +19,22 @@ import time
 from pathlib import Path
 from types import SimpleNamespace
 
-sys.path[:0] = [str(Path(__file__).resolve().parent.parent), str(Path(__file__).resolve().parent.parent.parent)]
+sys.path[:0] = [
+    str(Path(__file__).resolve().parent.parent),
+    str(Path(__file__).resolve().parent.parent.parent),
+]
 
-from feeder import Feeder  # noqa: E402
-from kill_stack import line  # noqa: E402
 from playwright.sync_api import Error, sync_playwright  # noqa: E402
-from stack import free_port  # noqa: E402
-from test_browser import CHROMIUM, FLAGS  # noqa: E402
+from support.feeder import Feeder  # noqa: E402
+from support.kill_stack import line  # noqa: E402
+from support.stack import free_port  # noqa: E402
+from tests.system.test_browser import CHROMIUM, FLAGS  # noqa: E402
 
 from dashboard.scene.service import start  # noqa: E402
-from messages.bus import BusSettings, Publishers, open_client, open_router  # noqa: E402
-from messages.history import declare  # noqa: E402
-from messages.spool import Spool  # noqa: E402
-from messages.topics import ESTIMATES, GATEWAY  # noqa: E402
+from messages.bus.session import BusSettings, Publishers, open_client, open_router  # noqa: E402
+from messages.contract.topics import ESTIMATES, GATEWAY  # noqa: E402
+from messages.history.answers import declare  # noqa: E402
+from messages.history.spool import Spool  # noqa: E402
 
 DT, DEVICE = 0.01, "cube-01"
 PATIENCE_S = 60.0
@@ -53,7 +59,10 @@ def board(folder: Path, router: str, minutes: float, ready: object) -> None:
         feeder.cube(k * DT)
         k += 5 if began + k * DT < time.time() - 70.0 else 1
     session = open_client(bus, timeout_s=60.0)
-    held = [declare(session, bus.prefix, DEVICE if s == GATEWAY else "*", s, spool) for s, spool in spools.items()]
+    held = [
+        declare(session, bus.prefix, DEVICE if s == GATEWAY else "*", s, spool)
+        for s, spool in spools.items()
+    ]
     for publishers in by_source.values():
         publishers.attach(session)
     ready.set()
@@ -78,12 +87,16 @@ def reaches(store: object, span_s: float) -> bool:
     with store.lock:
         device = store.devices.get(DEVICE)
         rings = {} if device is None else device.rings
-        spans = [t[-1] - t[0] for t, _ in (ring.window(-1e9, 1e9) for ring in rings.values()) if len(t)]
+        spans = [
+            t[-1] - t[0] for t, _ in (ring.window(-1e9, 1e9) for ring in rings.values()) if len(t)
+        ]
         return {"accel", "rate"} <= {topic for topic, _ in rings} and min(spans) > span_s
 
 
 def look(port: int, span_s: float) -> dict[str, float | None]:
-    """Times of a real page: until its first chart; the window chosen, until all charts of the open page span it."""
+    """Times of a real page: until its first chart; the window chosen, until all charts of the open
+    page span it.
+    """
     found: dict[str, float | None] = {}
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
@@ -107,12 +120,19 @@ def main(minutes: float = 10.0, until: str = "page") -> None:
     span_s = 60.0 * minutes - 15.0
     with tempfile.TemporaryDirectory() as name, open_router(bus):
         ready = context.Event()
-        process = context.Process(target=board, args=(Path(name), bus.router, minutes, ready), daemon=True)
+        process = context.Process(
+            target=board, args=(Path(name), bus.router, minutes, ready), daemon=True
+        )
         process.start()
         ready.wait(600.0)
         handle = start(bus, SimpleNamespace(viser_port=0))
         try:
-            line("late_history_in_dashboard", seconds(lambda: reaches(handle.store, span_s)), "s", target=2.0)
+            line(
+                "late_history_in_dashboard",
+                seconds(lambda: reaches(handle.store, span_s)),
+                "s",
+                target=2.0,
+            )
             if until == "rings":
                 return
             try:

@@ -1,7 +1,8 @@
-"""Serial byte to published solution at 100 Hz, through the real gateway, bus and estimator. Prints one JSON line.
+"""Serial byte to published solution at 100 Hz, through the real gateway, bus and estimator. Prints
+one JSON line.
 
-The bench writes one ACC12 frame every 10 ms into a pseudo-terminal and notes the time of the write; it also
-subscribes to the products filter's estimates. Both times are of one monotonic clock.
+The bench writes one ACC12 frame every 10 ms into a pseudo-terminal and notes the time of the write;
+it also subscribes to the products filter's estimates. Both times are of one monotonic clock.
 """
 
 import gc
@@ -16,16 +17,16 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from stack import free_port
+from support.stack import free_port
 
 from firmware_protocol.codec import FLAG_SIMULATED, encode
 from firmware_protocol.frames import Acc12
-from gateway.board_link import PtyLink
+from gateway.virtual.board_link import PtyLink
 from gyrofree.config import load
-from gyrofree.demo import Plan, write_configuration
-from gyrofree.supervisor import Supervisor
-from messages.bus import open_client, subscribe
-from messages.topics import RATE
+from gyrofree.running.demo import Plan, write_configuration
+from gyrofree.running.supervisor import Supervisor
+from messages.bus.session import open_client, subscribe
+from messages.contract.topics import RATE
 
 PERIOD = 0.01  # s
 WARM_UP = 1500  # samples: start, biases from standstill, compilation
@@ -50,7 +51,14 @@ def main() -> None:
     p50, p99 = np.percentile(latencies, [50, 99]) * 1e3
     row = {"bench": "latency", "rate_hz": 1 / PERIOD, "samples": len(latencies), "of": COUNTED}
     print(
-        json.dumps(row | {"p50_ms": round(p50, 3), "p99_ms": round(p99, 3), "max_ms": round(max(latencies) * 1e3, 3)})
+        json.dumps(
+            row
+            | {
+                "p50_ms": round(p50, 3),
+                "p99_ms": round(p99, 3),
+                "max_ms": round(max(latencies) * 1e3, 3),
+            }
+        )
     )
 
 
@@ -67,7 +75,9 @@ def measure(link: PtyLink, settings) -> list[float]:
         if message.for_index >= WARM_UP + COUNTED - 1:
             done.set()
 
-    rest = np.array([0, 0, 256, 0, 0, 256, 0, 0, -256, 0, 0, -256])  # counts: 1 g along +z_b in the cube's wiring
+    rest = np.array(
+        [0, 0, 256, 0, 0, 256, 0, 0, -256, 0, 0, -256]
+    )  # counts: 1 g along +z_b in the cube's wiring
     gc.freeze()  # the bench's own collector must not stand in its figures
     generator = np.random.default_rng(1)
     with open_client(settings.bus, timeout_s=30) as session:
@@ -76,7 +86,9 @@ def measure(link: PtyLink, settings) -> list[float]:
         for index in range(WARM_UP + COUNTED):
             counts = tuple(int(value) for value in rest + generator.normal(0, 1, 12).round())
             frame = Acc12(index, round(PERIOD * 1e9), 0xF, 0, (counts,))
-            data = encode(frame, epoch=1, seq=index, t_us=round(index * PERIOD * 1e6), flags=FLAG_SIMULATED)
+            data = encode(
+                frame, epoch=1, seq=index, t_us=round(index * PERIOD * 1e6), flags=FLAG_SIMULATED
+            )
             time.sleep(max(0.0, start + index * PERIOD - time.monotonic()))
             written[index] = time.monotonic()
             link.write(data)

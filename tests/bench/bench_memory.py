@@ -2,9 +2,10 @@
 
     python tests/bench/bench_memory.py [minutes, default 10]
 
-The whole demo runs in real time (simulated table, 100 samples/s, two estimators, recording, dashboard). Resident and
-private memory of each process are read every ten seconds; growth is the slope of a straight line through the last two
-thirds, when all rings and buffers are full. bench_soak.py does hours of recorder and gateway compressed in time.
+The whole demo runs in real time (simulated table, 100 samples/s, two estimators, recording,
+dashboard). Resident and private memory of each process are read every ten seconds; growth is the
+slope of a straight line through the last two thirds, when all rings and buffers are full.
+bench_soak.py does hours of recorder and gateway compressed in time.
 """
 
 import sys
@@ -18,8 +19,8 @@ import psutil
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from kill_stack import line  # noqa: E402
-from stack import RunningDemo  # noqa: E402
+from support.kill_stack import line  # noqa: E402
+from support.stack import RunningDemo  # noqa: E402
 
 EVERY_S = 10.0
 
@@ -46,7 +47,10 @@ def main(minutes: float = 10.0) -> None:
         t, rss, private = np.array(rows).T
         late = t > t[-1] / 3.0
         slope = np.polyfit(t[late] / 3600.0, private[late], 1)[0]
-        more = {"minutes": round(t[-1] / 60.0, 1), "rss_MB": [round(rss[len(rss) // 3], 1), round(rss[-1], 1)]}
+        more = {
+            "minutes": round(t[-1] / 60.0, 1),
+            "rss_MB": [round(rss[len(rss) // 3], 1), round(rss[-1], 1)],
+        }
         more["private_MB"] = [round(private[len(private) // 3], 1), round(private[-1], 1)]
         line(f"memory_growth_{service}", round(float(slope), 2), "MB/h", target=0.0, **more)
 

@@ -1,9 +1,11 @@
-"""The router is gone for ten minutes, in real time: does everything that was measured and estimated get into the files?
+"""The router is gone for ten minutes, in real time: does everything that was measured and estimated
+get into the files?
 
     python tests/bench/bench_outage.py [minutes, default 10] [samples per second, default 100]
 
-Router, gateway, estimator and recorder are processes, the board speaks through a pseudo-terminal all the time. The
-router is killed and started again after the outage. Then every message of every session is read.
+Router, gateway, estimator and recorder are processes, the board speaks through a pseudo-terminal
+all the time. The router is killed and started again after the outage. Then every message of every
+session is read.
 """
 
 import socket
@@ -16,14 +18,14 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from kill_stack import line  # noqa: E402
-from stack import free_port  # noqa: E402
-from test_kill import Stack, until  # noqa: E402
+from support.kill_stack import line  # noqa: E402
+from support.stack import free_port  # noqa: E402
+from tests.system.test_kill import Stack, until  # noqa: E402
 
-from messages.bus import open_client, subscribe  # noqa: E402
-from messages.topics import ACCEL, ESTIMATOR, LINK, RATE, STATUS, parse  # noqa: E402
-from sessions.catalogue import Catalogue  # noqa: E402
-from sessions.mcap_log import read  # noqa: E402
+from messages.bus.session import open_client, subscribe  # noqa: E402
+from messages.contract.topics import ACCEL, ESTIMATOR, LINK, RATE, STATUS, parse  # noqa: E402
+from sessions.library.catalogue import Catalogue  # noqa: E402
+from sessions.recording.mcap_log import read  # noqa: E402
 
 PATIENCE_S = 900.0  # for everything to be whole again
 CALM_S = 5.0
@@ -34,18 +36,26 @@ class Outage(Stack):
 
     def __enter__(self) -> "Outage":
         self.rates = 0
-        text = self.config.read_text().replace("[gateway]", f'listen = ["{self.bus.router}"]\n[gateway]', 1)
+        text = self.config.read_text().replace(
+            "[gateway]", f'listen = ["{self.bus.router}"]\n[gateway]', 1
+        )
         self.config.write_text(text + f'[estimator]\njournal = "{self.folder}/estimates"\n')
         self.router = self.start("router")
         self._client = open_client(self.bus, timeout_s=60.0)
         self._held = [
             subscribe(self._client, STATUS, "gyrofree", lambda _, m: setattr(self, "status", m)),
             subscribe(self._client, LINK, "gyrofree", lambda _, m: setattr(self, "line", m)),
-            subscribe(self._client, ESTIMATOR, "gyrofree", lambda _, m: setattr(self, "rates", m.samples)),
+            subscribe(
+                self._client, ESTIMATOR, "gyrofree", lambda _, m: setattr(self, "rates", m.samples)
+            ),
         ]
         self.others = [self.start("gateway"), self.start("estimator"), self.start("record")]
         until(lambda: self.status.recording and self.line.connected, "recorder and gateway")
-        until(lambda: "estimating:" in (self.folder / "estimator.log").read_text(), "the estimator", 600.0)
+        until(
+            lambda: "estimating:" in (self.folder / "estimator.log").read_text(),
+            "the estimator",
+            600.0,
+        )
         self._board.start()
         until(lambda: self.rates > 200, "the first estimates")
         return self
@@ -102,7 +112,9 @@ def trial(folder: Path, minutes: float, rate: float) -> dict:
 
 
 def account(folder: Path) -> dict:
-    """What the sessions hold: samples and estimates that are missing, and messages that stand twice."""
+    """What the sessions hold: samples and estimates that are missing, and messages that stand
+    twice.
+    """
     seen, double, have, estimates, line_lost = set(), 0, set(), defaultdict(set), 0
     for info in Catalogue(folder / "sessions").list():
         for row in read(info.path):
@@ -114,23 +126,47 @@ def account(folder: Path) -> dict:
             double += name in seen
             seen.add(name)
             if topic is ACCEL:
-                line_lost += message.lost_samples  # the board's own index says so: it never came to the gateway
-                have |= set(range(message.first_index, message.first_index + len(message.counts) // message.axes))
+                line_lost += (
+                    message.lost_samples
+                )  # the board's own index says so: it never came to the gateway
+                have |= set(
+                    range(
+                        message.first_index,
+                        message.first_index + len(message.counts) // message.axes,
+                    )
+                )
             elif topic is RATE:
                 estimates[row.key].add(message.for_index)
     lost = max(have) - min(have) + 1 - len(have) - line_lost
     missing = sum(len((have & set(range(min(n), max(n) + 1))) - n) for n in estimates.values())
-    return {"samples": len(have), "lost": lost, "line_lost": line_lost, "double": double,
-            "estimates_missing": missing, "estimators": len(estimates)}  # fmt: skip
+    return {
+        "samples": len(have),
+        "lost": lost,
+        "line_lost": line_lost,
+        "double": double,
+        "estimates_missing": missing,
+        "estimators": len(estimates),
+    }
 
 
 def main(minutes: float = 10.0, rate: float = 100.0) -> None:
     """Run and print."""
     with tempfile.TemporaryDirectory() as name:
         found = trial(Path(name), minutes, rate)
-    more = {"minutes": minutes, "rate_hz": rate, "samples": found["samples"], "lost_on_the_line": found["line_lost"]}
+    more = {
+        "minutes": minutes,
+        "rate_hz": rate,
+        "samples": found["samples"],
+        "lost_on_the_line": found["line_lost"],
+    }
     line("outage_samples_lost", found["lost"], "samples", target=0, **more)
-    line("outage_estimates_missing", found["estimates_missing"], "estimates", target=0, estimators=found["estimators"])
+    line(
+        "outage_estimates_missing",
+        found["estimates_missing"],
+        "estimates",
+        target=0,
+        estimators=found["estimators"],
+    )
     line("outage_double", found["double"], "messages", target=0)
     line("outage_whole_on_disk", round(found["whole_s"], 1), "s")
 

@@ -1,10 +1,13 @@
-"""Axis health: time to name a fault by kind, axis and profile; false alarms over hours of good data; cost.
+"""Axis health: time to name a fault by kind, axis and profile; false alarms over hours of good
+data; cost.
 
-One JSON line per figure on standard output, progress on standard error. Figures to reach: every fault named within 2 s
-of the moment it can be seen, by its right name, and no good axis excluded. A fault at rest or of a reading near zero
-cannot be seen by any check; the profiles turn when faults begin (12 s).
+One JSON line per figure on standard output, progress on standard error. Figures to reach: every
+fault named within 2 s of the moment it can be seen, by its right name, and no good axis excluded. A
+fault at rest or of a reading near zero cannot be seen by any check; the profiles turn when faults
+begin (12 s).
 Usage: python tests/bench/bench_parity.py [seeds] [hours of good data per profile]
-       python tests/bench/bench_parity.py 0 HOURS LAYOUT ...   false alarms only, on other layouts of 10 cm side
+       python tests/bench/bench_parity.py 0 HOURS LAYOUT ...   false alarms only, on other layouts
+       of 10 cm side
 """
 
 import json
@@ -16,10 +19,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
 
-from estimator.layouts.catalogue import find  # noqa: E402
-from estimator.rate.health import AxisState, HealthMonitor  # noqa: E402
-from estimator.simulation.faults import Faults, parse  # noqa: E402
-from estimator.simulation.table import BLOCK, TableTest  # noqa: E402
+from inertial.layouts.catalogue import find  # noqa: E402
+from inertial.rate.health import AxisState, HealthMonitor  # noqa: E402
+from inertial.simulation.faults import Faults, parse  # noqa: E402
+from inertial.simulation.table import BLOCK, TableTest  # noqa: E402
 
 PROFILES = ("published", "wobble", "fast")
 CALM = ("still", "slow")  # more profiles for false alarms
@@ -64,7 +67,11 @@ def detections(seeds: int) -> None:
     for profile in PROFILES:
         for kind in KINDS:
             print(f"{profile} {kind} ...", file=sys.stderr)
-            runs = [detect(kind, axis, profile, seed) for axis in range(12) for seed in range(1, seeds + 1)]
+            runs = [
+                detect(kind, axis, profile, seed)
+                for axis in range(12)
+                for seed in range(1, seeds + 1)
+            ]
             times = [run["s"] for run in runs if run["s"] is not None]
             line = {
                 "bench": "parity detection",
@@ -75,7 +82,9 @@ def detections(seeds: int) -> None:
                 "median_s": round(float(np.median(times)), 2) if times else None,
                 "worst_s": round(max(times), 2) if times else None,
                 "within_2s": sum(t <= 2.0 for t in times),
-                "not_named_changed_m_s2": [round(run["changes"], 2) for run in runs if run["s"] is None],
+                "not_named_changed_m_s2": [
+                    round(run["changes"], 2) for run in runs if run["s"] is None
+                ],
                 "right_name": sum(run["right"] for run in runs),
                 "good_axes_excluded": sum(run["blamed"] for run in runs),
             }

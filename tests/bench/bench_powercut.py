@@ -1,10 +1,12 @@
-"""Power cut at random moments: how much of recording and journal a disk has that kept only what fdatasync covered.
+"""Power cut at random moments: how much of recording and journal a disk has that kept only what
+fdatasync covered.
 
     python tests/bench/bench_powercut.py [trials, default 10] [seed]
 
-A recorder's store and a gateway's spool are fed twelve axes at 1000 samples/s in real time. At a random moment a file
-is copied as a disk would have it that lost everything after the last *completed* fdatasync (the size when that call
-began), which is the worst that a disk that honours flushes can do. The copies are then recovered like after any crash.
+A recorder's store and a gateway's spool are fed twelve axes at 1000 samples/s in real time. At a
+random moment a file is copied as a disk would have it that lost everything after the last
+*completed* fdatasync (the size when that call began), which is the worst that a disk that honours
+flushes can do. The copies are then recovered like after any crash.
 """
 
 import json
@@ -19,15 +21,15 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path[:0] = [str(ROOT)]
 
-from messages import gyrofree_pb2 as pb  # noqa: E402
-from messages.bus import Publishers  # noqa: E402
-from messages.journal_file import scan  # noqa: E402
-from messages.spool import Spool  # noqa: E402
-from messages.topics import ACCEL  # noqa: E402
-from sessions.manifest import RECORDING  # noqa: E402
-from sessions.recover import salvage  # noqa: E402
-from sessions.settings import RecorderSettings  # noqa: E402
-from sessions.store import start  # noqa: E402
+from messages.bus.session import Publishers  # noqa: E402
+from messages.contract import gyrofree_pb2 as pb  # noqa: E402
+from messages.contract.topics import ACCEL  # noqa: E402
+from messages.history.journal_file import scan  # noqa: E402
+from messages.history.spool import Spool  # noqa: E402
+from sessions.recording.manifest import RECORDING  # noqa: E402
+from sessions.recording.recover import salvage  # noqa: E402
+from sessions.recording.settings import RecorderSettings  # noqa: E402
+from sessions.recording.store import start  # noqa: E402
 
 PERIOD_S, BATCH = 0.001, 10
 safe: dict[str, int] = {}  # path -> bytes that a completed fdatasync covered
@@ -62,7 +64,9 @@ def trial(folder: Path, seconds: float) -> tuple[float, float]:
             continue
         counts = [sent % 200 + k for k in range(12 * BATCH)]
         header = pb.Header(device="cube", run=1, utc_ns=time.time_ns())
-        message = pb.AccelBatch(header=header, axes=12, counts=counts, f_mps2=[0.0383 * c for c in counts])
+        message = pb.AccelBatch(
+            header=header, axes=12, counts=counts, f_mps2=[0.0383 * c for c in counts]
+        )
         publishers.put(ACCEL, "cube", message)
         wrote = time.time_ns()
         store.add(wrote, "p/cube/accel", message.SerializeToString())
@@ -90,8 +94,16 @@ def main(trials: int = 10, seed: int = 1) -> None:
         with tempfile.TemporaryDirectory() as name:
             lost.append(trial(Path(name), chance.uniform(2.0, 5.0)))
     for what, values in zip(("recording", "published"), zip(*lost, strict=True), strict=True):
-        figure = {"name": f"powercut_lost_{what}", "value": round(max(values), 3), "unit": "s", "target": 1.0}
-        print(json.dumps(figure | {"least": round(min(values), 3), "trials": trials, "seed": seed}), flush=True)
+        figure = {
+            "name": f"powercut_lost_{what}",
+            "value": round(max(values), 3),
+            "unit": "s",
+            "target": 1.0,
+        }
+        print(
+            json.dumps(figure | {"least": round(min(values), 3), "trials": trials, "seed": seed}),
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

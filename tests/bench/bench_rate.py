@@ -1,11 +1,13 @@
-"""Rate error of the gyro-free estimators on simulated tables, their cost, and the bound: one JSON line per figure.
+"""Rate error of the gyro-free estimators on simulated tables, their cost, and the bound: one JSON
+line per figure.
 
-Sensors as published, uncalibrated: 4 mg noise, 3.9 mg counts, 20 mg biases, 0.5 % scale errors; 100 Hz, 30 s, 5 s of
-standstill first. Errors are RMS over all 30 s, deg/s, of the worst axis: median over seeds. Figures to reach for
-products-ekf: 1.2 published, 1.4 wobble, 1.2 fast; angle at the end 3 deg in the median, never above 8; calibrated at
-most 1.3 times the bound; 2 us per sample in a batch, 30 us live, 64 cubes at 100 Hz on one core.
-Honest figures of every case: over the samples that an estimate calls valid (worst axis), its RMS, their share of
-the time, and how many of them have the wrong sign (above 3 deg/s) or are beyond 5 sigma. The line of estimator
+Sensors as published, uncalibrated: 4 mg noise, 3.9 mg counts, 20 mg biases, 0.5 % scale errors; 100
+Hz, 30 s, 5 s of standstill first. Errors are RMS over all 30 s, deg/s, of the worst axis: median
+over seeds. Figures to reach for products-ekf: 1.2 published, 1.4 wobble, 1.2 fast; angle at the end
+3 deg in the median, never above 8; calibrated at most 1.3 times the bound; 2 us per sample in a
+batch, 30 us live, 64 cubes at 100 Hz on one core. Honest figures of every case: over the samples
+that an estimate calls valid (worst axis), its RMS, their share of the time, and how many of them
+have the wrong sign (above 3 deg/s) or are beyond 5 sigma. The line of estimator
 "products-ekf+resolved" is corrected backwards once the sign of a start while turning is known.
 Usage: python tests/bench/bench_rate.py [seeds] [folder for pictures]
 """
@@ -20,12 +22,12 @@ from scipy.stats import chi2
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
 
-from estimator.rate import products_ekf, products_track, resolved, sight  # noqa: E402
-from estimator.rate.bound import IN_USE, SOURCE, SOURCE_STILL, plot_bound, rate_bound, rms  # noqa: E402
-from estimator.rate.estimators import ESTIMATORS, ProductsRate  # noqa: E402
-from estimator.rate.products_ekf import Config  # noqa: E402
-from estimator.simulation.profiles import DEGREE, TURNING  # noqa: E402
-from estimator.simulation.table import SensorModel, TableTest  # noqa: E402
+from inertial.rate import products_ekf, products_track, resolved, sight  # noqa: E402
+from inertial.rate.bound import IN_USE, SOURCE, SOURCE_STILL, plot_bound, rate_bound, rms  # noqa: E402
+from inertial.rate.estimators import ESTIMATORS, ProductsRate  # noqa: E402
+from inertial.rate.products_ekf import Config  # noqa: E402
+from inertial.simulation.profiles import DEGREE, TURNING  # noqa: E402
+from inertial.simulation.table import SensorModel, TableTest  # noqa: E402
 
 UNSEEN = products_ekf.Config().unseen_rate ** 2  # what a published covariance of a standstill adds
 SEEN = 3.0 * DEGREE  # rad/s; a slower rate has no sign that matters
@@ -54,14 +56,18 @@ class Log:
 
 
 def track(name: str, log: Log, late: bool = False, **options):
-    """Rates (n, 3), covariances, NIS, angle and standstill after each sample, and which components are valid (n, 3).
+    """Rates (n, 3), covariances, NIS, angle and standstill after each sample, and which components
+    are valid (n, 3).
 
     late: corrected backwards once the sign is known.
     """
     estimator = ESTIMATORS[name](log.table.layout, **options)
     if hasattr(estimator, "core"):
         rows = estimator.core.rows(log.t_s, np.ascontiguousarray(log.readings))
-        out, valid = products_track.of(rows), rows[:, products_track.SIGHT : products_track.SIGHT + 3] == sight.VALID
+        out, valid = (
+            products_track.of(rows),
+            rows[:, products_track.SIGHT : products_track.SIGHT + 3] == sight.VALID,
+        )
         P = out.P + UNSEEN * np.eye(3) * (out.still & out.started)[:, None, None]
         if late:
             fresh = ESTIMATORS[name](log.table.layout, **options)
@@ -70,13 +76,20 @@ def track(name: str, log: Log, late: bool = False, **options):
                 past.into(out.omega_b, P, out.angle_z, out.q_nb)
                 valid[: len(past.omega_b)] = True
         return out.omega_b, P, out.nis, out.angle_z, out.still, valid
-    states = [estimator.step(k, t, a) for k, (t, a) in enumerate(zip(log.t_s, log.readings, strict=True))]
-    named = [np.array([getattr(s, field) for s in states]) for field in ("omega_b", "P", "nis", "angle_z", "still")]
+    states = [
+        estimator.step(k, t, a) for k, (t, a) in enumerate(zip(log.t_s, log.readings, strict=True))
+    ]
+    named = [
+        np.array([getattr(s, field) for s in states])
+        for field in ("omega_b", "P", "nis", "angle_z", "still")
+    ]
     return *named, np.array([s.sight for s in states]) == sight.VALID
 
 
 def claims(omega, P, valid, truth) -> tuple[float, float, float, float]:
-    """Of the worst axis: RMS (deg/s) over what is called valid, its share, of it wrong in sign, beyond 5 sigma."""
+    """Of the worst axis: RMS (deg/s) over what is called valid, its share, of it wrong in sign,
+    beyond 5 sigma.
+    """
     error, sigma = omega - truth, np.sqrt(np.einsum("kii->ki", P))
     said = np.maximum(valid.sum(axis=0), 1)
     rms_valid = np.degrees(np.sqrt((error**2 * valid).sum(axis=0) / said))
@@ -121,7 +134,9 @@ def figures(name: str, case: str, seeds: int, late: bool = False, **options) -> 
 
 
 def against_bound(profile: str, seeds: int, pictures: Path | None) -> dict:
-    """RMS of the Monte Carlo over the posterior Cramer-Rao bound, calibrated sensors; NEES and NIS."""
+    """RMS of the Monte Carlo over the posterior Cramer-Rao bound, calibrated sensors; NEES and
+    NIS.
+    """
     errors, nees, nis = [], [], []
     for seed in range(1, seeds + 1):
         log = Log(seed, profile=profile, sensor=CALIBRATED)
@@ -133,12 +148,23 @@ def against_bound(profile: str, seeds: int, pictures: Path | None) -> dict:
                 nees.append(error[k] @ np.linalg.solve(P[k], error[k]))
         nis.append(values[100:].mean())
     bounds = {
-        "source": SOURCE, "source_still": SOURCE_STILL, "in_use": IN_USE,
-    }  # fmt: skip
-    sigma = {k: rate_bound(log.table.layout, log.t_s, log.q_nb, log.omega_b, log.alpha_b, b) for k, b in bounds.items()}
+        "source": SOURCE,
+        "source_still": SOURCE_STILL,
+        "in_use": IN_USE,
+    }
+    sigma = {
+        k: rate_bound(log.table.layout, log.t_s, log.q_nb, log.omega_b, log.alpha_b, b)
+        for k, b in bounds.items()
+    }
     measured = np.degrees(np.sqrt(np.mean(np.square(errors), axis=(0, 1))))
     if pictures:
-        plot_bound(pictures / f"bound-{profile}.png", log.t_s, sigma["in_use"], error, f"{profile}, calibrated sensors")
+        plot_bound(
+            pictures / f"bound-{profile}.png",
+            log.t_s,
+            sigma["in_use"],
+            error,
+            f"{profile}, calibrated sensors",
+        )
     over = measured / np.degrees(rms(sigma["in_use"]))
     return {
         "rate_rms_calibrated": np.round(measured, 3).tolist(),
@@ -185,20 +211,40 @@ def main() -> None:
         figures(name, "published", 1)  # compiles
     print(json.dumps({"bench": "rate-cost"} | cost()), flush=True)
     for case in CASES:
-        print(json.dumps({"bench": "rate", "case": case, "estimator": "products-ekf", "seeds": seeds}
-                         | figures("products-ekf", case, seeds)), flush=True)  # fmt: skip
+        print(
+            json.dumps(
+                {"bench": "rate", "case": case, "estimator": "products-ekf", "seeds": seeds}
+                | figures("products-ekf", case, seeds)
+            ),
+            flush=True,
+        )
     case, named = "start-while-turning", "products-ekf" + resolved.SUFFIX
-    print(json.dumps({"bench": "rate", "case": case, "estimator": named, "seeds": seeds}
-                     | figures("products-ekf", case, seeds, late=True)), flush=True)  # fmt: skip
+    print(
+        json.dumps(
+            {"bench": "rate", "case": case, "estimator": named, "seeds": seeds}
+            | figures("products-ekf", case, seeds, late=True)
+        ),
+        flush=True,
+    )
     for name in ESTIMATORS:
         if name != "products-ekf":
             few = max(1, seeds // 2)
             for case in PUBLISHED:
-                print(json.dumps({"bench": "rate", "case": case, "estimator": name, "seeds": few}
-                                 | figures(name, case, few)), flush=True)  # fmt: skip
+                print(
+                    json.dumps(
+                        {"bench": "rate", "case": case, "estimator": name, "seeds": few}
+                        | figures(name, case, few)
+                    ),
+                    flush=True,
+                )
     for profile in (*PUBLISHED, "slow"):
-        print(json.dumps({"bench": "rate-bound", "case": profile, "seeds": seeds}
-                         | against_bound(profile, seeds, pictures)), flush=True)  # fmt: skip
+        print(
+            json.dumps(
+                {"bench": "rate-bound", "case": profile, "seeds": seeds}
+                | against_bound(profile, seeds, pictures)
+            ),
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
 """CPU of the recorder at 1 kHz: one JSON line on standard output.
 
-A real router and publisher run in this process, the recorder in its own, whose CPU time (user and system, all
-threads) is read before and after. Twelve axes at 1000 samples/s, first as a gateway sends them, ten to a message,
-which is what the limit is for; then, for comparison, one to a message. A bare Zenoh subscriber
-that does nothing took 1.6 to 2.0 % and 5 % of a core on a busy two-core machine: most of both figures is the bus.
+A real router and publisher run in this process, the recorder in its own, whose CPU time (user and
+system, all threads) is read before and after. Twelve axes at 1000 samples/s, first as a gateway
+sends them, ten to a message, which is what the limit is for; then, for comparison, one to a
+message. A bare Zenoh subscriber that does nothing took 1.6 to 2.0 % and 5 % of a core on a busy
+two-core machine: most of both figures is the bus.
 Usage: python tests/bench/bench_recorder.py [seconds]
 """
 
@@ -22,10 +23,10 @@ import psutil
 ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT))
 
-from messages import gyrofree_pb2 as pb  # noqa: E402
-from messages.bus import BusSettings, open_client, open_router  # noqa: E402
-from messages.topics import ACCEL  # noqa: E402
-from sessions.catalogue import Catalogue  # noqa: E402
+from messages.bus.session import BusSettings, open_client, open_router  # noqa: E402
+from messages.contract import gyrofree_pb2 as pb  # noqa: E402
+from messages.contract.topics import ACCEL  # noqa: E402
+from sessions.library.catalogue import Catalogue  # noqa: E402
 
 RATE = 1000.0  # samples/s
 BATCH = 10  # samples per message, as a gateway sends them
@@ -33,10 +34,10 @@ LIMIT = 2.0  # % of one core
 SERVE = """
 import sys
 from pathlib import Path
-from gyrofree.process import stop_on_signals
-from messages.bus import BusSettings
-from sessions import recorder
-from sessions.settings import RecorderSettings
+from gyrofree.running.process import stop_on_signals
+from messages.bus.session import BusSettings
+from sessions.recording import recorder
+from sessions.recording.settings import RecorderSettings
 stop = stop_on_signals()
 recorder.run(RecorderSettings(root=Path(sys.argv[1])), BusSettings(prefix="bench", router=sys.argv[2]), stop)
 """
@@ -57,7 +58,9 @@ def publish(session, stop: threading.Event, batch: int) -> None:
         while sent * batch < (time.monotonic() - begun) * RATE:
             sent += 1
             counts = [(sent * 37 + k * 113) % 521 - 260 for k in range(12 * batch)]
-            message.header.CopyFrom(pb.Header(device="cube", sequence=sent, run=1, utc_ns=time.time_ns()))
+            message.header.CopyFrom(
+                pb.Header(device="cube", sequence=sent, run=1, utc_ns=time.time_ns())
+            )
             message.counts[:] = counts
             message.f_mps2[:] = [count * 0.0382459 for count in counts]
             publisher.put(message.SerializeToString())
@@ -106,7 +109,11 @@ if __name__ == "__main__":
     duration = float(sys.argv[1]) if len(sys.argv) > 1 else 15.0
     result = {"bench": "recorder", "limit_percent": LIMIT, **measure(duration, BATCH)}
     single = measure(duration / 2, 1)
-    result["one_sample_per_message"] = {key: single[key] for key in ("cpu_percent_of_core", "messages_per_s", "lost")}
+    result["one_sample_per_message"] = {
+        key: single[key] for key in ("cpu_percent_of_core", "messages_per_s", "lost")
+    }
     result["ok"] = result["cpu_percent_of_core"] < LIMIT and result["lost"] == 0
     print(json.dumps(result))
-    sys.exit(1 if result["lost"] else 0)  # the limit depends on what else this machine does; a loss does not
+    sys.exit(
+        1 if result["lost"] else 0
+    )  # the limit depends on what else this machine does; a loss does not

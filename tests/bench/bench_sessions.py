@@ -1,10 +1,12 @@
-"""What one waits for with sessions: report, exports, the list of 500, a session of one hour opened in the browser.
+"""What one waits for with sessions: report, exports, the list of 500, a session of one hour opened
+in the browser.
 
     python tests/bench/bench_sessions.py [HOURS]
 
-One line of JSON per group of figures. The long session is the 30 s table run, written over and over through the
-recorder's own store with times and sequences that go on (100 Hz, two estimators, tachometer). Its pages are the real
-ones behind the real front door, in Chromium; without Chromium those figures are left out, and the line says so.
+One line of JSON per group of figures. The long session is the 30 s table run, written over and over
+through the recorder's own store with times and sequences that go on (100 Hz, two estimators,
+tachometer). Its pages are the real ones behind the real front door, in Chromium; without Chromium
+those figures are left out, and the line says so.
 """
 
 import contextlib
@@ -20,17 +22,17 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from table_session import SESSION, table_recording, table_root
+from support.table_session import SESSION, table_recording, table_root
 
-from messages.topics import parse
-from sessions.catalogue import Catalogue
-from sessions.curves import FILE
-from sessions.curves_build import build
-from sessions.export import FORMATS, export
-from sessions.mcap_log import read
+from messages.contract.topics import parse
+from sessions.export.export import FORMATS, export
+from sessions.library.catalogue import Catalogue
+from sessions.library.curves import FILE
+from sessions.library.curves_build import build
+from sessions.recording.mcap_log import read
+from sessions.replay.rerun import write_session
 from sessions.report.build import build as report
 from sessions.report.verdict import load_spec
-from sessions.rerun import write_session
 
 CHROMIUM = "/usr/bin/chromium"
 RUN_S = 30.0
@@ -53,13 +55,17 @@ def short() -> dict:
     with tempfile.TemporaryDirectory() as scratch:
         for form in FORMATS:
             if form not in ("kml", "gpx"):  # this one has no track
-                result[f"export_{form}_s"] = seconds(lambda form=form: export(path, form, Path(scratch) / form))
+                result[f"export_{form}_s"] = seconds(
+                    lambda form=form: export(path, form, Path(scratch) / form)
+                )
         root = Path(scratch) / "sessions"
         for k in range(500):
             folder = root / f"20240101-{k:06d}"
             folder.mkdir(parents=True)
             (folder / "recording.mcap").write_bytes(b"")
-            text = (table_root() / SESSION / "session.json").read_text().replace(SESSION, folder.name)
+            text = (
+                (table_root() / SESSION / "session.json").read_text().replace(SESSION, folder.name)
+            )
             (folder / "session.json").write_text(text)
         result["list_500_s"] = seconds(lambda: Catalogue(root).list())
         shutil.rmtree(root)
@@ -69,7 +75,8 @@ def short() -> dict:
 def repeated(hours: float) -> Iterator[tuple[int, str, bytes]]:
     """The table run's messages again and again, each with its next time and sequence."""
     decoded = [
-        (row.log_ns, row.key, parse(row.key).topic.type.FromString(row.payload)) for row in read(table_recording())
+        (row.log_ns, row.key, parse(row.key).topic.type.FromString(row.payload))
+        for row in read(table_recording())
     ]
     counts: Counter[str] = Counter()
     step = round(RUN_S * 1e9)
@@ -85,7 +92,11 @@ def repeated(hours: float) -> Iterator[tuple[int, str, bytes]]:
 
 def long(hours: float) -> dict:
     """A long session: reading it, and its page."""
-    result: dict = {"bench": "sessions_long", "hours": hours, "load_1min": round(os.getloadavg()[0], 1)}
+    result: dict = {
+        "bench": "sessions_long",
+        "hours": hours,
+        "load_1min": round(os.getloadavg()[0], 1),
+    }
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         path = write_session(folder / "sessions", LONG, repeated(hours), "", {}) / "recording.mcap"
@@ -110,11 +121,13 @@ def cpu(work) -> float:
 
 
 def pages(folder: Path) -> dict:
-    """Seconds from asking for a page until its lines are drawn: never opened before, whole, again, and compared."""
-    from front_door import open_door
+    """Seconds from asking for a page until its lines are drawn: never opened before, whole, again,
+    and compared.
+    """
     from playwright.sync_api import sync_playwright
+    from support.front_door import open_door
 
-    from dashboard.users import issue_link_token
+    from dashboard.web.users import issue_link_token
 
     with contextlib.ExitStack() as stack:
         door = stack.enter_context(open_door(folder, scene=False))

@@ -1,9 +1,10 @@
 """What a 12-axis sample costs, from readings to messages: one JSON line per figure.
 
 batch   through field and filter by run_batch, us per sample (wanted: 2)
-live    from a parsed AccelBatch to serialised messages, by Pipeline.on at default settings, us per sample (wanted: 30)
-cubes   64 boards at 100 Hz through one Pipeline, CPU seconds per second of data (wanted: below 1)
-Process time, so that what else the machine does counts little; the least of several rounds.
+live    from a parsed AccelBatch to serialised messages, by Pipeline.on at default settings, us per
+sample (wanted: 30) cubes   64 boards at 100 Hz through one Pipeline, CPU seconds per second of data
+(wanted: below 1) Process time, so that what else the machine does counts little; the least of
+several rounds.
 Usage: python tests/bench/bench_speed.py [rounds]
 """
 
@@ -16,12 +17,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
 
-from estimator.rate.estimators import ESTIMATORS  # noqa: E402
 from estimator.service import Pipeline  # noqa: E402
 from estimator.settings import EstimatorSettings  # noqa: E402
-from estimator.simulation.table import TableTest  # noqa: E402
-from messages import gyrofree_pb2 as pb  # noqa: E402
-from messages.topics import ACCEL  # noqa: E402
+from inertial.rate.estimators import ESTIMATORS  # noqa: E402
+from inertial.simulation.table import TableTest  # noqa: E402
+from messages.contract import gyrofree_pb2 as pb  # noqa: E402
+from messages.contract.topics import ACCEL  # noqa: E402
 
 UTC_NS = 1_700_000_000 * 10**9
 DT = 0.01  # s
@@ -32,7 +33,11 @@ def table() -> tuple[np.ndarray, np.ndarray, TableTest]:
     """Times (n,), s, and readings (n, 12), m/s^2, of the published profile."""
     test = TableTest(1)
     blocks = [test.block(k) for k in range(3)]
-    return np.concatenate([b.t_s for b in blocks]), np.concatenate([b.readings for b in blocks]), test
+    return (
+        np.concatenate([b.t_s for b in blocks]),
+        np.concatenate([b.readings for b in blocks]),
+        test,
+    )
 
 
 def batch(rounds: int) -> None:
@@ -76,7 +81,9 @@ def messages(device: str, readings: np.ndarray, size: int) -> list[pb.AccelBatch
 
 def through(pipeline: Pipeline, batches: list[pb.AccelBatch]) -> int:
     """Serialise all that the pipeline says; returns its bytes."""
-    return sum(len(o.message.SerializeToString()) for one in batches for o in pipeline.on(ACCEL, one))
+    return sum(
+        len(o.message.SerializeToString()) for one in batches for o in pipeline.on(ACCEL, one)
+    )
 
 
 def live(rounds: int, rate: list[str] | None, size: int) -> None:
@@ -109,7 +116,13 @@ def cubes(count: int, rate: list[str] | None, size: int) -> None:
         for stream in streams:
             through(pipeline, stream[k : k + 1])
     share = (time.process_time() - began) / 2.0
-    say("cubes", estimators=settings.rate, boards=count, hz=round(1.0 / DT), cpu_s_per_s=round(share, 3))
+    say(
+        "cubes",
+        estimators=settings.rate,
+        boards=count,
+        hz=round(1.0 / DT),
+        cpu_s_per_s=round(share, 3),
+    )
 
 
 def say(figure: str, **values: object) -> None:

@@ -1,8 +1,10 @@
-"""What bench_soak.py runs, each in a process of its own: the real parts of one service, as fast as they can.
+"""What bench_soak.py runs, each in a process of its own: the real parts of one service, as fast as
+they can.
 
-Every function takes a folder, the hours of data and a Value that it sets to the hours done. Time stamps go on at the
-data's pace, so that whatever is kept for a time is kept for as much data; what the machine's own clock decides is
-compressed. The data are twelve axes at 1000 samples/s in messages of ten.
+Every function takes a folder, the hours of data and a Value that it sets to the hours done. Time
+stamps go on at the data's pace, so that whatever is kept for a time is kept for as much data; what
+the machine's own clock decides is compressed. The data are twelve axes at 1000 samples/s in
+messages of ten.
 """
 
 import random
@@ -15,27 +17,34 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from stack import free_port
+from support.stack import free_port
 
-from messages import gyrofree_pb2 as pb
-from messages.bus import BusSettings, Publishers, open_client, open_router
-from messages.topics import ACCEL, AXES, ESTIMATOR, LINK, RATE, TACHO
+from messages.bus.session import BusSettings, Publishers, open_client, open_router
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import ACCEL, AXES, ESTIMATOR, LINK, RATE, TACHO
 
 RATE_HZ, BATCH = 1000, 10
 PER_HOUR = 3600 * RATE_HZ // BATCH  # messages of samples
-KEPT_BYTES = 64 << 20  # of every journal and of a recording's file: reached within the first twentieth
+KEPT_BYTES = (
+    64 << 20
+)  # of every journal and of a recording's file: reached within the first twentieth
 LOSS = 0.001  # of the link to the recorder, in bursts of 50 messages
 AHEAD = 1500  # messages that the dashboard may be behind
 DEVICE = "cube"
 
 
 def readings(seconds: float = 30.0) -> np.ndarray:
-    """A turntable's run (n, 120), m/s^2: ten samples of twelve axes a row, with noise; it begins and ends at rest."""
-    from estimator.simulation.table import TableTest
+    """A turntable's run (n, 120), m/s^2: ten samples of twelve axes a row, with noise; it begins
+    and ends at rest.
+    """
+    from inertial.simulation.table import TableTest
 
     test = TableTest(1)
     blocks = [test.block(k) for k in range(round(seconds / 10.0))]
-    t_s, values = np.concatenate([b.t_s for b in blocks]), np.concatenate([b.readings for b in blocks])
+    t_s, values = (
+        np.concatenate([b.t_s for b in blocks]),
+        np.concatenate([b.readings for b in blocks]),
+    )
     fine = np.arange(0.0, seconds, 1.0 / RATE_HZ)
     smooth = np.stack([np.interp(fine, t_s, column) for column in values.T], axis=1)
     noise = np.random.default_rng(1).normal(0.0, 0.04, smooth.shape)
@@ -46,8 +55,12 @@ def batches(hours: float, begin_ns: int) -> Iterator[tuple[int, pb.AccelBatch]]:
     """The messages of a gateway, numbered."""
     rows = readings()
     for k in range(round(hours * PER_HOUR)):
-        header = pb.Header(device=DEVICE, run=1, epoch=1, utc_ns=begin_ns + k * 10_000_000, device_us=k * 10_000)
-        message = pb.AccelBatch(header=header, first_index=k * BATCH, period_s=1.0 / RATE_HZ, axes=12)
+        header = pb.Header(
+            device=DEVICE, run=1, epoch=1, utc_ns=begin_ns + k * 10_000_000, device_us=k * 10_000
+        )
+        message = pb.AccelBatch(
+            header=header, first_index=k * BATCH, period_s=1.0 / RATE_HZ, axes=12
+        )
         message.f_mps2[:] = rows[k % len(rows)]
         yield k, message
 
@@ -67,11 +80,11 @@ class Tee:
 
 def gateway(folder: Path, hours: float, done: Any) -> None:
     """Frames of a board through deframer, clock and joiner into both journals."""
-    from gateway.device import DeviceLink
-    from gateway.reader import Chunk
+    from gateway.board.device import DeviceLink
+    from gateway.ports.reader import Chunk
     from gateway.settings import DeviceSettings, GatewaySettings
-    from gateway.virtual_board import SIMULATED, BoardAccel, VirtualBoard
-    from messages.journal_file import BOARD
+    from gateway.virtual.virtual_board import SIMULATED, BoardAccel, VirtualBoard
+    from messages.history.journal_file import BOARD
 
     settings = GatewaySettings(journal=folder, journal_bytes=KEPT_BYTES, published_bytes=KEPT_BYTES)
     link = DeviceLink(DeviceSettings(name=DEVICE, port="none"), settings)
@@ -100,16 +113,21 @@ def gateway(folder: Path, hours: float, done: Any) -> None:
 
 
 def recorder(folder: Path, hours: float, done: Any) -> None:
-    """Messages with bursts of losses through the repair into files that are rotated; closed files are removed."""
-    from messages.spool import Spool
-    from sessions.intake import Intake
-    from sessions.settings import RecorderSettings
-    from sessions.store import start
+    """Messages with bursts of losses through the repair into files that are rotated; closed files
+    are removed.
+    """
+    from messages.history.spool import Spool
+    from sessions.recording.intake import Intake
+    from sessions.recording.settings import RecorderSettings
+    from sessions.recording.store import start
 
     tee, chance = Tee(), random.Random(1)
     spool = Spool(folder / "spool", max_bytes=KEPT_BYTES)
     publishers, questions = Publishers(tee, "p", spool), []
-    intake, settings = Intake("p", questions.append, 0), RecorderSettings(root=folder / "s", max_file_bytes=KEPT_BYTES)
+    intake, settings = (
+        Intake("p", questions.append, 0),
+        RecorderSettings(root=folder / "s", max_file_bytes=KEPT_BYTES),
+    )
     store, dead, lost = start(settings), 0, 0
     begin_ns = time.time_ns()
 
@@ -153,8 +171,8 @@ def estimator(folder: Path, hours: float, done: Any) -> None:
     from estimator.service import Pipeline
     from estimator.settings import EstimatorSettings
     from estimator.warm import warm
-    from messages.mending import Arrival
-    from messages.spool import Spool
+    from messages.history.mending import Arrival
+    from messages.history.spool import Spool
 
     warm()
     settings = EstimatorSettings(journal=folder)
@@ -167,7 +185,9 @@ def estimator(folder: Path, hours: float, done: Any) -> None:
     )
     for k, message in batches(hours, time.time_ns()):
         message.header.sequence = k + 1
-        for arrival in worker.mender.take(Arrival(ACCEL, DEVICE, "", message.SerializeToString(), 0)):
+        for arrival in worker.mender.take(
+            Arrival(ACCEL, DEVICE, "", message.SerializeToString(), 0)
+        ):
             worker._handle(arrival)
         if k % 100 == 0:
             worker._keep()
@@ -207,17 +227,31 @@ def talk(bus: BusSettings, hours: float, taken: Any) -> None:
     for k, message in batches(hours, time.time_ns()):
         said = [(ACCEL, "", message)]
         for name in ("products-ekf", "least-squares"):
-            rate = pb.RateEstimate(header=message.header, estimator=name, omega_ib_b_radps=[0.0, 0.1, 1.0])
-            rate.omega_covariance[:], rate.f_b_mps2[:], rate.q_nb[:] = [1e-4] * 9, [0.0, 0.0, 9.8], [1.0, 0.0, 0.0, 0.0]
+            rate = pb.RateEstimate(
+                header=message.header, estimator=name, omega_ib_b_radps=[0.0, 0.1, 1.0]
+            )
+            rate.omega_covariance[:], rate.f_b_mps2[:], rate.q_nb[:] = (
+                [1e-4] * 9,
+                [0.0, 0.0, 9.8],
+                [1.0, 0.0, 0.0, 0.0],
+            )
             said.append((RATE, name, rate))
             if k % 100 == 0:
-                said.append((ESTIMATOR, name, pb.EstimatorStatus(header=message.header, estimator=name, samples=k)))
+                said.append(
+                    (
+                        ESTIMATOR,
+                        name,
+                        pb.EstimatorStatus(header=message.header, estimator=name, samples=k),
+                    )
+                )
         if k % 5 == 0:
             said.append((TACHO, "", pb.TachoRate(header=message.header, omega_radps=1.0, pulses=k)))
         if k % 25 == 0:
             said.append((AXES, "", pb.AxisHealth(header=message.header, dof=6)))
         if k % 100 == 0:
-            said.append((LINK, "", pb.LinkStatus(header=message.header, connected=True, good_frames=k)))
+            said.append(
+                (LINK, "", pb.LinkStatus(header=message.header, connected=True, good_frames=k))
+            )
         for topic, name, one in said:
             publishers.put(topic, DEVICE, one, name)
         sent += len(said)

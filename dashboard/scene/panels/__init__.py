@@ -1,4 +1,6 @@
-"""One module per panel. PAGES are the pages of charts in the order of their tabs; the others stand on the left."""
+"""One module per panel. PAGES are the pages of charts in the order of their tabs; the others stand
+on the left.
+"""
 
 from dashboard.scene.panels.acceleration import Acceleration
 from dashboard.scene.panels.angle import Angle

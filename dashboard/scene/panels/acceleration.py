@@ -14,7 +14,10 @@ class Acceleration(Panel):
     def update(self, s: Snapshot) -> None:
         if s.device.is_vehicle:
             t, rows = s.rows("imu")
-            curves = [Curve(f"f{axis}", AXES[k], t, rows[:, k], stale=s.stale("imu")) for k, axis in enumerate("xyz")]
+            curves = [
+                Curve(f"f{axis}", AXES[k], t, rows[:, k], stale=s.stale("imu"))
+                for k, axis in enumerate("xyz")
+            ]
             self.show("imu", "Specific force, body", "m/s²", curves, s, height=230, digits=2)
             return
         for k, axis in enumerate("xyz"):
@@ -24,5 +27,14 @@ class Acceleration(Panel):
                 curves.append(estimator_curve(s, "rate", name, t, rows[:, RATE_F][:, k]))
             if s.device.get("truth"):
                 t, rows = s.rows("truth")
-                curves.append(Curve("truth", truth_colour(s.dark), t, rows[:, TRUTH_F][:, k], width=1.0))
-            self.show(axis, f"Specific force f<sub>{axis}</sub> of the centre", "m/s²", curves, s, digits=2)
+                curves.append(
+                    Curve("truth", truth_colour(s.dark), t, rows[:, TRUTH_F][:, k], width=1.0)
+                )
+            self.show(
+                axis,
+                f"Specific force f<sub>{axis}</sub> of the centre",
+                "m/s²",
+                curves,
+                s,
+                digits=2,
+            )

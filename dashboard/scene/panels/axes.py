@@ -6,7 +6,9 @@ from dashboard.scene.panels.base import Panel, Snapshot
 
 
 class Axes(Panel):
-    """Specific force along each sensor axis, as read, nominal scale. An axis marked stale by the board is greyed."""
+    """Specific force along each sensor axis, as read, nominal scale. An axis marked stale by the
+    board is greyed.
+    """
 
     title = "Axes"
 
@@ -28,5 +30,9 @@ class Axes(Panel):
                 label = f"a{first // 3 + 1}{k + 1}"
                 y = rows[:, column] if rows.shape[1] > column else rows[:, :0].sum(axis=1)
                 curves.append(Curve(label, AXES[k], t, y, stale=stale))
-            title = f"Triad {first // 3 + 1}" if axes == 12 else f"Axes {first + 1} to {first + len(curves)}"
+            title = (
+                f"Triad {first // 3 + 1}"
+                if axes == 12
+                else f"Axes {first + 1} to {first + len(curves)}"
+            )
             self.show(f"triad{first}", title, "m/s²", curves, s, height=150, digits=2)

@@ -11,7 +11,7 @@ import viser
 from dashboard.scene.chart import Chart, Curve, Shade
 from dashboard.scene.palette import estimator_colour, estimator_title
 from dashboard.scene.store import Device, Store
-from messages import gyrofree_pb2 as pb
+from messages.contract import gyrofree_pb2 as pb
 
 log = logging.getLogger(__name__)
 
@@ -20,7 +20,9 @@ DEG = 180.0 / np.pi
 
 @dataclass(frozen=True)
 class Snapshot:
-    """One update of a view: the chosen device and the time window of its charts. Valid under the store's lock."""
+    """One update of a view: the chosen device and the time window of its charts. Valid under the
+    store's lock.
+    """
 
     store: Store
     device: Device
@@ -39,7 +41,9 @@ class Snapshot:
 
 
 class Panel:
-    """A page of charts and tables in a folder of one client's GUI; update() is called only while it is visible."""
+    """A page of charts and tables in a folder of one client's GUI; update() is called only while it
+    is visible.
+    """
 
     title = ""
     feed: Any = None  # dashboard.scene.feed.Feed, set by the view: how a panel gives orders
@@ -59,17 +63,29 @@ class Panel:
             log.warning("%s: %s", title, error)
             text, good = str(error), False
         title = title if good else "The estimator did not do it"
-        self.client.add_notification(title, text, color="teal" if good else "red", auto_close_seconds=8.0)
+        self.client.add_notification(
+            title, text, color="teal" if good else "red", auto_close_seconds=8.0
+        )
 
     def chart(self, key: str, title: str, unit: str, height: int = 170, digits: int = 1) -> Chart:
         """The chart of this key, made at first use below the ones before it."""
         if key not in self._charts:
             self._place += 2.0
-            self._charts[key] = Chart(self.client, self.folder, self._place, title, unit, height, digits)
+            self._charts[key] = Chart(
+                self.client, self.folder, self._place, title, unit, height, digits
+            )
         return self._charts[key]
 
-    def show(self, key: str, title: str, unit: str, curves: Sequence[Curve], s: Snapshot,
-             shades: Sequence[Shade] = (), **options) -> None:  # fmt: skip
+    def show(
+        self,
+        key: str,
+        title: str,
+        unit: str,
+        curves: Sequence[Curve],
+        s: Snapshot,
+        shades: Sequence[Shade] = (),
+        **options,
+    ) -> None:
         """Draw a chart for the window of the snapshot."""
         self.chart(key, title, unit, **options).show(
             curves,

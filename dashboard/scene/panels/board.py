@@ -1,4 +1,6 @@
-"""The board: what is wrong on it by name, what it counts, and orders to it. Orders are for operators."""
+"""The board: what is wrong on it by name, what it counts, and orders to it. Orders are for
+operators.
+"""
 
 import logging
 import time
@@ -7,13 +9,27 @@ import viser
 
 from dashboard.scene.palette import age, escape, number, rows
 from dashboard.scene.panels.base import Panel, Snapshot
-from messages import gyrofree_pb2 as pb
+from messages.contract import gyrofree_pb2 as pb
 
 log = logging.getLogger(__name__)
 
-RATES = (50, 100, 200, 400, 500, 800, 1000, 1600, 3200)  # Hz; a board wants divisors of its timer's rate
+RATES = (
+    50,
+    100,
+    200,
+    400,
+    500,
+    800,
+    1000,
+    1600,
+    3200,
+)  # Hz; a board wants divisors of its timer's rate
 BATCHES = {"automatic": 0, "1": 1, "2": 2, "4": 4, "8": 8, "16": 16}
-SELF_TEST = ("stop", "self_test", "start")  # the sensors are deflected only while no samples are taken
+SELF_TEST = (
+    "stop",
+    "self_test",
+    "start",
+)  # the sensors are deflected only while no samples are taken
 BUTTONS = (  # label, orders in their turn, icon
     ("Start sampling", ("start",), viser.Icon.PLAYER_PLAY),
     ("Stop sampling", ("stop",), viser.Icon.PLAYER_STOP),
@@ -36,7 +52,9 @@ def faults(found: list[pb.Fault], now_ns: int) -> str:
         since = max(0.0, (now_ns - fault.since_utc_ns) / 1e9)
         when = f"for {age(since)}" if fault.active else f"began {age(since)} ago, over now"
         style = "gf-alert" if fault.active else "gf-note gf-stale"
-        parts.append(f'<p class="{style}"><b>{escape(fault.name)}</b> {escape(fault.text)} · {when}</p>')
+        parts.append(
+            f'<p class="{style}"><b>{escape(fault.name)}</b> {escape(fault.text)} · {when}</p>'
+        )
     return "".join(parts)
 
 
@@ -52,9 +70,15 @@ class Board(Panel):
         gui, rates = client.gui, tuple(map(str, RATES))
         with folder:
             self._rate = gui.add_dropdown("Sample rate, Hz", rates, initial_value="100", order=2.0)
-            self._batch = gui.add_dropdown("Samples per frame", tuple(BATCHES), initial_value="automatic", order=4.0)
-            set_rate = gui.add_button("Set the sample rate", icon=viser.Icon.WAVE_SINE, color="gray", order=3.0)
-            set_batch = gui.add_button("Set the samples per frame", icon=viser.Icon.STACK, color="gray", order=5.0)
+            self._batch = gui.add_dropdown(
+                "Samples per frame", tuple(BATCHES), initial_value="automatic", order=4.0
+            )
+            set_rate = gui.add_button(
+                "Set the sample rate", icon=viser.Icon.WAVE_SINE, color="gray", order=3.0
+            )
+            set_batch = gui.add_button(
+                "Set the samples per frame", icon=viser.Icon.STACK, color="gray", order=5.0
+            )
             set_rate.on_click(lambda _: self._order(("rate_hz",), int(self._rate.value)))
             set_batch.on_click(lambda _: self._order(("batch",), BATCHES[self._batch.value]))
             self._inputs = [self._rate, self._batch, set_rate, set_batch]
@@ -72,14 +96,19 @@ class Board(Panel):
         self._device = s.device.name
         latest = s.device.get("board")
         if latest is None:
-            self._table = self.html('<p class="gf-note">The board has not said yet who it is.</p>', self._table)
+            self._table = self.html(
+                '<p class="gf-note">The board has not said yet who it is.</p>', self._table
+            )
             return
         m = latest.message
         said = faults(list(m.faults), time.time_ns()) or '<p class="gf-note">✓ no faults</p>'
         busy = number(m.status["cpu_permille"] / 10, 1, "%") if "cpu_permille" in m.status else "–"
-        items = [("firmware", escape(m.firmware)), ("serial number", escape(m.uid)),
-                 ("axes · sample period", f"{m.axes} · {number(m.sample_period_s * 1e3, 3, 'ms')}"),
-                 ("processor busy", busy)]  # fmt: skip
+        items = [
+            ("firmware", escape(m.firmware)),
+            ("serial number", escape(m.uid)),
+            ("axes · sample period", f"{m.axes} · {number(m.sample_period_s * 1e3, 3, 'ms')}"),
+            ("processor busy", busy),
+        ]
         for words, names in COUNTERS:
             if all(name in m.status for name in names):
                 items.append((words, " · ".join(number(m.status[name], 0) for name in names)))
@@ -96,4 +125,6 @@ class Board(Panel):
             log.warning("board: %s", error)
             texts, good = [*texts, str(error)], False
         title = "Board" if good else "The board did not do it"
-        self.client.add_notification(title, " · ".join(texts), color="teal" if good else "red", auto_close_seconds=8.0)
+        self.client.add_notification(
+            title, " · ".join(texts), color="teal" if good else "red", auto_close_seconds=8.0
+        )

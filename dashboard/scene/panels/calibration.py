@@ -1,4 +1,6 @@
-"""The guided calibration: which pose next, is it being taken, is it good enough, save. Orders are for operators."""
+"""The guided calibration: which pose next, is it being taken, is it good enough, save. Orders are
+for operators.
+"""
 
 import numpy as np
 import viser
@@ -6,7 +8,7 @@ import viser
 from dashboard.scene.palette import AXES, GREEN, escape, number, rgba, rows
 from dashboard.scene.panels.base import Snapshot
 from dashboard.scene.panels.guided import Guided, guidance, head, silent
-from messages import gyrofree_pb2 as pb
+from messages.contract import gyrofree_pb2 as pb
 
 MG = 1e3 / 9.80665  # mg per m/s^2
 CAMERA = np.array([0.80, -0.52, 0.50])  # where the picture is seen from, in the frame whose z is up
@@ -50,7 +52,13 @@ class Calibration(Guided):
         elif len(m.poses) < 4:
             self._show({ACTION.ACTION_CALIBRATE_CANCEL})
         else:
-            self._show({ACTION.ACTION_CALIBRATE_FIT, ACTION.ACTION_CALIBRATE_SAVE, ACTION.ACTION_CALIBRATE_CANCEL})
+            self._show(
+                {
+                    ACTION.ACTION_CALIBRATE_FIT,
+                    ACTION.ACTION_CALIBRATE_SAVE,
+                    ACTION.ACTION_CALIBRATE_CANCEL,
+                }
+            )
 
     @staticmethod
     def _card(s: Snapshot) -> str:
@@ -68,7 +76,10 @@ def content(m: pb.CalibrationStatus, gone: bool, dark: bool, card: str) -> str:
     """The panel's HTML."""
     items = [("card in use", escape(card) if card else "none: nominal scale and positions")]
     if m.state == STATE.STATE_IDLE:
-        text = "Set the body down in nine and more poses, let go each time; the page says which one next."
+        text = (
+            "Set the body down in nine and more poses, let go each time; the page says which one"
+            " next."
+        )
         return f'<p class="gf-note">{text}</p>' + rows(items)
     if m.bias_sigma_mps2:
         items += [
@@ -99,7 +110,9 @@ def upright(up_b: np.ndarray) -> np.ndarray:
 
 
 def facing(up_b: np.ndarray, camera: np.ndarray) -> np.ndarray:
-    """As upright(), turned about the vertical until as much as can be is seen of the faces that point up."""
+    """As upright(), turned about the vertical until as much as can be is seen of the faces that
+    point up.
+    """
     faces = [np.sign(up_b[k]) * np.eye(3)[k] for k in range(3) if abs(up_b[k]) > 0.3]
     first = upright(up_b)
 
@@ -114,7 +127,9 @@ def facing(up_b: np.ndarray, camera: np.ndarray) -> np.ndarray:
 
 
 def picture(up_b: np.ndarray, dark: bool) -> str:
-    """The cube as it should stand, an arrow up, as SVG: visible faces with the names of their axes."""
+    """The cube as it should stand, an arrow up, as SVG: visible faces with the names of their
+    axes.
+    """
     camera = CAMERA / np.linalg.norm(CAMERA)
     R = facing(np.asarray(up_b, dtype=float), camera)
     right = np.cross([0.0, 0.0, 1.0], camera)
@@ -125,7 +140,9 @@ def picture(up_b: np.ndarray, dark: bool) -> str:
         return 110.0 + 44.0 * float(right @ p), 112.0 - 44.0 * float(over @ p)
 
     line = "#e8e8e8" if dark else "#333333"
-    lowest = min(float((R @ np.array([x, y, z]))[2]) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1))
+    lowest = min(
+        float((R @ np.array([x, y, z]))[2]) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)
+    )
     x, y = screen(np.array([0.0, 0.0, lowest]))
     parts = [f'<ellipse cx="{x:.0f}" cy="{y:.0f}" rx="92" ry="30" fill="rgba(128,128,128,.22)"/>']
     for axis in range(3):
@@ -134,19 +151,23 @@ def picture(up_b: np.ndarray, dark: bool) -> str:
             if float((R @ normal) @ camera) <= 0.02:
                 continue
             a, b = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
-            corners = [screen(R @ (normal + p * a + q * b)) for p, q in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+            corners = [
+                screen(R @ (normal + p * a + q * b))
+                for p, q in ((1, 1), (1, -1), (-1, -1), (-1, 1))
+            ]
             points = " ".join(f"{u:.1f},{v:.1f}" for u, v in corners)
             u, v = screen(R @ normal)
             parts.append(
-                f'<polygon points="{points}" fill="{rgba(AXES[axis], 0.85)}" stroke="{line}" stroke-width="1.5" '
-                f'stroke-linejoin="round"/><text x="{u:.0f}" y="{v + 5:.0f}" text-anchor="middle" font-size="16" '
-                f'font-weight="700" fill="#000">{"+" if sign > 0 else "−"}{"xyz"[axis]}</text>'
+                f'<polygon points="{points}" fill="{rgba(AXES[axis], 0.85)}" stroke="{line}"'
+                f' stroke-width="1.5" stroke-linejoin="round"/><text x="{u:.0f}" y="{v + 5:.0f}"'
+                ' text-anchor="middle" font-size="16" font-weight="700"'
+                f' fill="#000">{"+" if sign > 0 else "−"}{"xyz"[axis]}</text>'
             )
     x, tip = 206.0, 40.0
     parts.append(
-        f'<path d="M{x},150 V{tip + 12} M{x - 8},{tip + 14} L{x},{tip} L{x + 8},{tip + 14}" fill="none" '
-        f'stroke="{line}" stroke-width="4" stroke-linecap="round"/>'
-        f'<text x="{x}" y="172" text-anchor="middle" font-size="13" fill="{line}">up</text>'
+        f'<path d="M{x},150 V{tip + 12} M{x - 8},{tip + 14} L{x},{tip} L{x + 8},{tip + 14}"'
+        f' fill="none" stroke="{line}" stroke-width="4" stroke-linecap="round"/><text x="{x}"'
+        f' y="172" text-anchor="middle" font-size="13" fill="{line}">up</text>'
     )
     return (
         '<svg class="gf-pose" viewBox="0 0 230 210" width="230" height="210" role="img" '

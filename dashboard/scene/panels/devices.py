@@ -1,4 +1,6 @@
-"""The summary on the left: which device, where its data come from, is it well, and the numbers one looks for first."""
+"""The summary on the left: which device, where its data come from, is it well, and the numbers one
+looks for first.
+"""
 
 import re
 import time
@@ -19,13 +21,15 @@ from dashboard.scene.palette import (
 )
 from dashboard.scene.panels.base import DEG, Panel, Snapshot
 from dashboard.scene.tilt import roll_pitch
-from messages import gyrofree_pb2 as pb
+from messages.contract import gyrofree_pb2 as pb
 
 _COUNTS = re.compile(r"fixes (\w+) (\d+)")
 
 
 def counts(message: str) -> dict[str, int] | None:
-    """What an estimator counted, of a message such as 'fixes used 1315, fixes late 2'; None for any other message."""
+    """What an estimator counted, of a message such as 'fixes used 1315, fixes late 2'; None for any
+    other message.
+    """
     found = [_COUNTS.fullmatch(part) for part in message.split(", ")]
     return {match[1]: int(match[2]) for match in found} if all(found) else None
 
@@ -42,7 +46,9 @@ class Devices(Panel):
     def waiting(self, text: str) -> None:
         """There is no device yet."""
         badge = '<span class="gf-badge" style="background:#8C8C8C">WAITING</span>'
-        self._table = self.html(f'<div class="gf-head">{badge}</div><p class="gf-note">{escape(text)}</p>', self._table)
+        self._table = self.html(
+            f'<div class="gf-head">{badge}</div><p class="gf-note">{escape(text)}</p>', self._table
+        )
 
     def _content(self, s: Snapshot) -> str:
         device = s.device
@@ -55,7 +61,14 @@ class Devices(Panel):
             f'<span class="gf-name">{escape(device.name)}</span>{state}</div>'
         )
         body = {"nav": self._vehicle, "attitude": self._board, "rate": self._cube}[device.body](s)
-        return head + self._alerts(s) + self._advice(s) + body + rows(self._health(s), s.stale("link")) + self._logs(s)
+        return (
+            head
+            + self._alerts(s)
+            + self._advice(s)
+            + body
+            + rows(self._health(s), s.stale("link"))
+            + self._logs(s)
+        )
 
     @staticmethod
     def _state(s: Snapshot, old: float) -> str:
@@ -67,7 +80,9 @@ class Devices(Panel):
             return '<b class="gf-replay">❚❚ replay paused</b>'
         if old >= 1.0:
             return f'<b class="gf-bad">■ stale, {age(old)}</b>'
-        return '<b class="gf-replay">▶ replay</b>' if replay else '<span class="gf-live">● live</span>'
+        return (
+            '<b class="gf-replay">▶ replay</b>' if replay else '<span class="gf-live">● live</span>'
+        )
 
     @staticmethod
     def _source(s: Snapshot) -> int:
@@ -90,7 +105,14 @@ class Devices(Panel):
             sub = "" if tacho.message.direction_known else "magnitude only"
             stale = s.stale("tacho")
             tiles.append(
-                _raw_tile("tachometer", REFERENCE, number(tacho.message.omega_radps * DEG, 1), "°/s", sub, stale)
+                _raw_tile(
+                    "tachometer",
+                    REFERENCE,
+                    number(tacho.message.omega_radps * DEG, 1),
+                    "°/s",
+                    sub,
+                    stale,
+                )
             )
         return f'<div class="gf-tiles">{"".join(tiles)}</div>'
 
@@ -105,7 +127,12 @@ class Devices(Panel):
             tiles.append(_tile(s, name, "nav", number(speed, 1), "km/h", sub))
         fix = s.device.get("gnss")
         if fix is not None:
-            quality = pb.GnssFix.Quality.Name(fix.message.quality).removeprefix("QUALITY_").replace("_", " ").lower()
+            quality = (
+                pb.GnssFix.Quality.Name(fix.message.quality)
+                .removeprefix("QUALITY_")
+                .replace("_", " ")
+                .lower()
+            )
             satellites = str(fix.message.satellites) if fix.message.satellites else "–"
             tiles.append(_raw_tile("GNSS", FIX, satellites, "satellites", quality, s.stale("gnss")))
         return f'<div class="gf-tiles">{"".join(tiles)}</div>'
@@ -114,18 +141,29 @@ class Devices(Panel):
     def _board(s: Snapshot) -> str:
         tiles = []
         for name in s.device.estimators("attitude"):
-            roll, pitch = (number(angle * DEG, 1) for angle in roll_pitch(s.device.get("attitude", name).message.q_nb))
+            roll, pitch = (
+                number(angle * DEG, 1)
+                for angle in roll_pitch(s.device.get("attitude", name).message.q_nb)
+            )
             tiles.append(_tile(s, name, "attitude", f"{roll} / {pitch}", "°", "roll / pitch"))
         return f'<div class="gf-tiles">{"".join(tiles)}</div>'
 
     @staticmethod
     def _alerts(s: Snapshot) -> str:
-        found = [s.device.get("link")] + [s.device.get("estimator", n) for n in s.device.estimators("estimator")]
-        said = [latest.message.message for latest in found if latest is not None and latest.message.message]
+        found = [s.device.get("link")] + [
+            s.device.get("estimator", n) for n in s.device.estimators("estimator")
+        ]
+        said = [
+            latest.message.message
+            for latest in found
+            if latest is not None and latest.message.message
+        ]
         texts = [text for text in said if counts(text) is None]
         board = s.device.get("board")
         if board is not None and not s.stale("board"):
-            texts += [f"{fault.name}: {fault.text}" for fault in board.message.faults if fault.active]
+            texts += [
+                f"{fault.name}: {fault.text}" for fault in board.message.faults if fault.active
+            ]
         if s.store.dropped:
             texts.append(f"the dashboard could not keep up: {s.store.dropped} messages not shown")
         return "".join(f'<p class="gf-alert">{escape(text)}</p>' for text in texts)
@@ -146,28 +184,49 @@ class Devices(Panel):
             ]
         if accel is not None:
             axes = accel.message.axes
-            items.append(("axes fresh", f"{axes - bin(accel.message.stale_mask).count('1')} of {axes}"))
+            items.append(
+                ("axes fresh", f"{axes - bin(accel.message.stale_mask).count('1')} of {axes}")
+            )
         for name in s.device.estimators("estimator"):
             m = s.device.get("estimator", name).message
             if s.stale("estimator", name):
                 items.append((estimator_title(name), '<b class="gf-bad">silent</b>'))
                 continue
-            state = m.state.partition(":")[0]  # what a person should do stands after the colon, see _advice
-            items.append((estimator_title(name), f"{escape(state)} · {number(m.us_per_sample, 0, 'µs')}"))
-            items += [(f"fixes {what}", number(count, 0)) for what, count in (counts(m.message) or {}).items()]
+            state = m.state.partition(":")[
+                0
+            ]  # what a person should do stands after the colon, see _advice
+            items.append(
+                (estimator_title(name), f"{escape(state)} · {number(m.us_per_sample, 0, 'µs')}")
+            )
+            items += [
+                (f"fixes {what}", number(count, 0))
+                for what, count in (counts(m.message) or {}).items()
+            ]
         if board is not None:
             items.append(("firmware", escape(board.message.firmware)))
         return items
 
     @staticmethod
     def _advice(s: Snapshot) -> str:
-        """What an estimator waits for the person to do, such as 'levelling: stand still for 10 s'."""
-        states = [s.device.get("estimator", n).message.state for n in s.device.estimators("estimator")]
-        return "".join(f'<p class="gf-note">{escape(text)}</p>' for text in dict.fromkeys(states) if ":" in text)
+        """What an estimator waits for the person to do, such as 'levelling: stand still for 10
+        s'.
+        """
+        states = [
+            s.device.get("estimator", n).message.state for n in s.device.estimators("estimator")
+        ]
+        return "".join(
+            f'<p class="gf-note">{escape(text)}</p>'
+            for text in dict.fromkeys(states)
+            if ":" in text
+        )
 
     @staticmethod
     def _logs(s: Snapshot) -> str:
-        lines = [text for arrived, name, text in s.store.logs if name == s.device.name and s.now - arrived < 60][-2:]
+        lines = [
+            text
+            for arrived, name, text in s.store.logs
+            if name == s.device.name and s.now - arrived < 60
+        ][-2:]
         return "".join(f'<p class="gf-note">{escape(text)}</p>' for text in lines)
 
 

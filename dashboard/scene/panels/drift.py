@@ -1,4 +1,6 @@
-"""Unaided navigation beside its closed form: how far a cube drifts by itself, and how far equation (27) says."""
+"""Unaided navigation beside its closed form: how far a cube drifts by itself, and how far equation
+(27) says.
+"""
 
 from dataclasses import dataclass
 
@@ -8,8 +10,8 @@ from dashboard.scene.chart import Curve
 from dashboard.scene.palette import GREY, VERMILLION, number
 from dashboard.scene.panels.base import DEG, Snapshot
 from dashboard.scene.store import NAV_POSITION, NAV_YAW, RATE_POSITION, RATE_YAW
-from estimator.ins.gyro_free import equivalent_drift, position_error
-from messages import gyrofree_pb2 as pb
+from estimator.devices.gyro_free import equivalent_drift, position_error
+from messages.contract import gyrofree_pb2 as pb
 
 HOUR = 3600.0
 POINTS = 60
@@ -17,12 +19,16 @@ POINTS = 60
 
 @dataclass(frozen=True)
 class Unaided:
-    """A rate estimator's own navigation since its first standstill ended, against navigation with fixes."""
+    """A rate estimator's own navigation since its first standstill ended, against navigation with
+    fixes.
+    """
 
     t: np.ndarray  # (n,) s on the device's axis
     since: float  # s, when it began
     error: np.ndarray  # (n,) m, horizontal
-    predicted: np.ndarray  # (n,) m, by equation (27) with the biases that the filter with fixes finds now
+    predicted: (
+        np.ndarray
+    )  # (n,) m, by equation (27) with the biases that the filter with fixes finds now
     bias: float  # m/s^2, horizontal
     drift: float  # rad/s, horizontal
 
@@ -50,19 +56,29 @@ def unaided(s: Snapshot, rate: str, nav: str) -> Unaided | None:
         return None
     # its heading is its own: turned by the difference when navigation with fixes began
     k = int(np.searchsorted(t, tn[0])) if tn[0] > t[start] else start
-    turn = float(n[0 if tn[0] > t[start] else np.searchsorted(tn, t[start]), NAV_YAW] - r[min(k, len(t) - 1), RATE_YAW])
+    turn = float(
+        n[0 if tn[0] > t[start] else np.searchsorted(tn, t[start]), NAV_YAW]
+        - r[min(k, len(t) - 1), RATE_YAW]
+    )
     c, sn = np.cos(turn), np.sin(turn)
     own = (p[inside][:, :2] - p[start - 1, :2]) @ np.array([[c, sn], [-sn, c]])
     true = np.column_stack([np.interp(t[inside], tn, n[:, NAV_POSITION][:, i]) for i in range(2)])
     error = np.linalg.norm(own - own[0] - (true - true[0]), axis=1)
-    b, d = (float(np.hypot(*_in_n(message.q_nb, v)[:2])) for v in (message.bias_f_b_mps2, message.bias_omega_b_radps))
+    b, d = (
+        float(np.hypot(*_in_n(message.q_nb, v)[:2]))
+        for v in (message.bias_f_b_mps2, message.bias_omega_b_radps)
+    )
     predicted = closed_form(b, d, t[inside] - t[start])
     return Unaided(t[inside], float(t[start]), error, predicted, b, d)
 
 
 def closed_form(bias: float, drift: float, t_s: np.ndarray) -> np.ndarray:
-    """Horizontal error (n,) m of equation (27) for a bias and a drift that push the same way; lengths, SI."""
-    found = position_error(np.array([bias, 0.0, 0.0]), np.array([0.0, -drift, 0.0]), np.maximum(t_s, 0.0))
+    """Horizontal error (n,) m of equation (27) for a bias and a drift that push the same way;
+    lengths, SI.
+    """
+    found = position_error(
+        np.array([bias, 0.0, 0.0]), np.array([0.0, -drift, 0.0]), np.maximum(t_s, 0.0)
+    )
     return np.abs(found[:, 0])
 
 
@@ -80,13 +96,18 @@ def table_of(u: Unaided) -> list[tuple[str, str]]:
     return [
         (f"<b>without fixes</b>, off after {seconds}", number(float(u.error[-1]), 1, "m")),
         ("by equation (27)", number(float(u.predicted[-1]), 1, "m")),
-        ("&nbsp; of bias · drift", f"{number(u.bias * 1e3 / 9.80665, 1, 'mg')} · {number(u.drift * DEG, 2, '°/s')}"),
+        (
+            "&nbsp; of bias · drift",
+            f"{number(u.bias * 1e3 / 9.80665, 1, 'mg')} · {number(u.drift * DEG, 2, '°/s')}",
+        ),
         ("drift that explains it", number(u.equivalent * DEG * HOUR, 0, "°/h")),
     ]
 
 
 def outage(m: pb.NavSolution, now: float) -> tuple[np.ndarray, np.ndarray] | None:
-    """Times (n,) s and error (n,) m by equation (27) since the last fix, of the sigmas stated of the biases."""
+    """Times (n,) s and error (n,) m by equation (27) since the last fix, of the sigmas stated of
+    the biases.
+    """
     if len(m.sigma) < 15 or m.fix_age_s <= 0.0:
         return None
     age = np.linspace(0.0, m.fix_age_s, POINTS)

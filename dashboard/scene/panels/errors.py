@@ -1,4 +1,6 @@
-"""How far the estimates are off: against the truth, else against the tachometer; a vehicle against unseen fixes."""
+"""How far the estimates are off: against the truth, else against the tachometer; a vehicle against
+unseen fixes.
+"""
 
 import numpy as np
 
@@ -35,7 +37,11 @@ class Errors(Panel):
         if not len(true_t):
             true_t, tacho = s.rows("tacho")
             known = s.device.get("tacho") and s.device.get("tacho").message.direction_known
-            true_rows, reference, axes = tacho[:, :1], "tachometer" if known else "tachometer, magnitudes", axes[:1]
+            true_rows, reference, axes = (
+                tacho[:, :1],
+                "tachometer" if known else "tachometer, magnitudes",
+                axes[:1],
+            )
         rms = []
         for k, axis in axes:
             curves = []
@@ -43,8 +49,15 @@ class Errors(Panel):
                 t, r = s.rows("rate", name)
                 if len(true_t) < 2 or not len(t):
                     continue
-                if reference != "truth" and s.device.get("rate", name).message.aid:  # it would be scored by its own aid
-                    rms.append((f"RMS ω<sub>{axis}</sub>, {estimator_title(name)}", "aided by the tachometer"))
+                if (
+                    reference != "truth" and s.device.get("rate", name).message.aid
+                ):  # it would be scored by its own aid
+                    rms.append(
+                        (
+                            f"RMS ω<sub>{axis}</sub>, {estimator_title(name)}",
+                            "aided by the tachometer",
+                        )
+                    )
                     continue
                 omega = r[:, RATE_OMEGA][:, k]
                 if reference == "truth":
@@ -53,7 +66,10 @@ class Errors(Panel):
                     true = np.interp(t, true_t, true_rows[:, 0])
                     omega = omega if reference == "tachometer" else np.abs(omega)
                 inside = (t >= true_t[0]) & (t <= true_t[-1])
-                error, sigma = ((omega - true) * DEG)[inside], (r[:, RATE_SIGMA][:, k] * DEG)[inside]
+                error, sigma = (
+                    ((omega - true) * DEG)[inside],
+                    (r[:, RATE_SIGMA][:, k] * DEG)[inside],
+                )
                 curve = estimator_curve(s, "rate", name, t[inside], error, 3 * sigma)
                 curve.about_zero = True
                 curves.append(curve)
@@ -61,9 +77,12 @@ class Errors(Panel):
                     value = number(float(np.sqrt(np.nanmean(error**2))), 2, "°/s")
                     rms.append((f"RMS ω<sub>{axis}</sub>, {estimator_title(name)}", value))
             title = f"Error of ω<sub>{axis}</sub> against {reference}"
-            self.show(f"error{axis}", title, "°/s", curves, s, height=215 if k == 2 else 150, digits=2)
+            self.show(
+                f"error{axis}", title, "°/s", curves, s, height=215 if k == 2 else 150, digits=2
+            )
         self._table = self.html(
-            rows(rms) if rms else _nothing("no reference yet: neither truth nor tachometer"), self._table
+            rows(rms) if rms else _nothing("no reference yet: neither truth nor tachometer"),
+            self._table,
         )
 
     def _vehicle(self, s: Snapshot) -> None:
@@ -75,24 +94,39 @@ class Errors(Panel):
             if held_out.any():
                 t, error = t[held_out], error[held_out]
                 half, what = _three_sigma(s, name, t), "navigation minus unseen fix"
-            else:  # before it is used, each fix is unseen too: the innovation is the error of the prediction
-                error, half = -r[:, INNOVATION_VALUE][:, :3], [3 * r[:, INNOVATION_SIGMA][:, k] for k in range(3)]
+            # before it is used, each fix is unseen too: the innovation is the error of the
+            # prediction
+            else:
+                error, half = (
+                    -r[:, INNOVATION_VALUE][:, :3],
+                    [3 * r[:, INNOVATION_SIGMA][:, k] for k in range(3)],
+                )
                 what = "prediction minus the fix about to be used"
             for k, axis in enumerate(("North", "East", "Down")):
                 curve = Curve(
-                    axis, AXES[k], t, error[:, k], half[k], stale=s.stale("innovation", name), about_zero=True
+                    axis,
+                    AXES[k],
+                    t,
+                    error[:, k],
+                    half[k],
+                    stale=s.stale("innovation", name),
+                    about_zero=True,
                 )
                 self.show(f"{name}{k}", f"{axis}: {what}", "m", [curve], s, height=150, digits=2)
             if len(error):
                 horizontal = float(np.sqrt(np.nanmean(error[:, 0] ** 2 + error[:, 1] ** 2)))
                 items += [(f"RMS horizontal, {estimator_title(name)}", number(horizontal, 2, "m"))]
-                items += [("RMS height", number(float(np.sqrt(np.nanmean(error[:, 2] ** 2))), 2, "m"))]
+                items += [
+                    ("RMS height", number(float(np.sqrt(np.nanmean(error[:, 2] ** 2))), 2, "m"))
+                ]
                 items += [("fixes in the window", str(len(error)))]
         self._table = self.html(rows(items) if items else _nothing("no fixes yet"), self._table)
 
 
 def _three_sigma(s: Snapshot, name: str, t: np.ndarray) -> list[np.ndarray | None]:
-    """What the filter claims for north, east, down, m, at times t (n,); the fix's own error comes on top."""
+    """What the filter claims for north, east, down, m, at times t (n,); the fix's own error comes
+    on top.
+    """
     at, r = s.rows("nav", name)
     if len(at) < 2:
         return [None] * 3

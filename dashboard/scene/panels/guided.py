@@ -1,4 +1,6 @@
-"""What the guided pages have in common: a row of orders that come and go, and how far the person has come."""
+"""What the guided pages have in common: a row of orders that come and go, and how far the person
+has come.
+"""
 
 from typing import Any
 
@@ -11,9 +13,13 @@ GONE_S = 3.0  # s without a word of a running guidance
 
 
 class Guided(Panel):
-    """A panel whose orders go to the estimator of the device; a subclass says which are of use now."""
+    """A panel whose orders go to the estimator of the device; a subclass says which are of use
+    now.
+    """
 
-    buttons: tuple[tuple[str, int, viser.Icon, Any], ...] = ()  # label, EstimatorCommand.Action, icon, colour
+    buttons: tuple[
+        tuple[str, int, viser.Icon, Any], ...
+    ] = ()  # label, EstimatorCommand.Action, icon, colour
     _status = None
 
     def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
@@ -22,7 +28,9 @@ class Guided(Panel):
         self._buttons: dict[int, viser.GuiButtonHandle] = {}
         with folder:
             for k, (label, action, icon, colour) in enumerate(self.buttons):
-                button = client.gui.add_button(label, icon=icon, color=colour, order=2.0 + k, visible=False)
+                button = client.gui.add_button(
+                    label, icon=icon, color=colour, order=2.0 + k, visible=False
+                )
                 button.on_click(lambda _, action=action: self._order(action))
                 self._buttons[action] = button
 
@@ -55,15 +63,22 @@ def silent(s: Snapshot, topic: str, running: bool) -> bool:
 def head(state: str, detail: str, gone: bool) -> str:
     """The first line: state and counts, with an alarm above when the estimator is silent."""
     alarm = '<p class="gf-alert">the estimator is silent: does it still run?</p>' if gone else ""
-    return f'{alarm}<div class="gf-head"><span class="gf-name">{state}</span><span>{detail}</span></div>'
+    return (
+        f'{alarm}<div class="gf-head"><span'
+        f' class="gf-name">{state}</span><span>{detail}</span></div>'
+    )
 
 
 def guidance(instruction: str, drawing: str, progress: float, message: str) -> str:
     """What to do, as words and picture, how far it has come (0 to 1), and what was said last."""
-    lead = f'<p style="margin:.2em .75em;font-size:1.15em;font-weight:600">{escape(instruction)}</p>'
+    lead = (
+        f'<p style="margin:.2em .75em;font-size:1.15em;font-weight:600">{escape(instruction)}</p>'
+    )
     bar = (
-        f'<div style="margin:.3em .75em;height:.5em;border-radius:.25em;background:rgba(128,128,128,.25)">'
-        f'<div style="height:100%;border-radius:.25em;width:{100 * min(max(progress, 0.0), 1.0):.0f}%;'
+        '<div style="margin:.3em'
+        ' .75em;height:.5em;border-radius:.25em;background:rgba(128,128,128,.25)">'
+        "<div"
+        f' style="height:100%;border-radius:.25em;width:{100 * min(max(progress, 0.0), 1.0):.0f}%;'
         f'background:{GREEN}"></div></div>'
     )
     said = f'<p class="gf-note">{escape(message)}</p>' if message else ""

@@ -1,9 +1,11 @@
-"""Health of the accelerometer axes: one row each, how well it fits the others, and since when it does not."""
+"""Health of the accelerometer axes: one row each, how well it fits the others, and since when it
+does not.
+"""
 
 from dashboard.scene.axis_arrows import BAD, residual_colour
 from dashboard.scene.palette import age, escape, number
 from dashboard.scene.panels.base import Panel, Snapshot
-from messages import gyrofree_pb2 as pb
+from messages.contract import gyrofree_pb2 as pb
 
 WORDS = {
     pb.AxisHealth.STATE_GOOD: "good",
@@ -28,7 +30,10 @@ class Health(Panel):
     def update(self, s: Snapshot) -> None:
         latest = s.device.get("axes")
         if latest is None:
-            text = "No axis health: this device has no accelerometer axes, or its estimator has not spoken yet."
+            text = (
+                "No axis health: this device has no accelerometer axes, or its estimator has not"
+                " spoken yet."
+            )
             self._table = self.html(f'<p class="gf-note">{text}</p>', self._table)
             return
         m = latest.message
@@ -41,7 +46,10 @@ class Health(Panel):
         )
         body = "".join(_row(axis, m.header.utc_ns) for axis in m.axes)
         stale = " gf-stale" if s.stale("axes") else ""
-        note = '<p class="gf-note">Bar: residual against the other axes over its σ, full at 8 σ; gate at 4 σ.</p>'
+        note = (
+            '<p class="gf-note">Bar: residual against the other axes over its σ, full at 8 σ; gate'
+            " at 4 σ.</p>"
+        )
         table = f'<table class="gf-rows{stale}">{_HEAD}{body}</table>'
         self._table = self.html(alert + head + table + note, self._table)
 
@@ -66,5 +74,9 @@ def _row(axis: pb.AxisHealth.Axis, now_ns: int) -> str:
         f"<tr><td>{escape(axis.name)}</td><td>{state}</td><td>{number(axis.residual_mps2, 3, sign=True)}</td>"
         f"<td>{bar}</td><td>{since}</td></tr>"
     )
-    text = f'<tr><td></td><td colspan="4"><small>{escape(axis.text)}</small></td></tr>' if axis.text else ""
+    text = (
+        f'<tr><td></td><td colspan="4"><small>{escape(axis.text)}</small></td></tr>'
+        if axis.text
+        else ""
+    )
     return row + text

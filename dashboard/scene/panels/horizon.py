@@ -1,4 +1,6 @@
-"""The moving horizon: how many fixes it looks back, and which memberships of the fuzzy sets decided that."""
+"""The moving horizon: how many fixes it looks back, and which memberships of the fuzzy sets decided
+that.
+"""
 
 import numpy as np
 
@@ -6,7 +8,7 @@ from dashboard.scene.chart import Curve
 from dashboard.scene.palette import AXES, estimator_title, number, rows
 from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve
 from dashboard.scene.store import NAV_CRISP, NAV_HORIZON, NAV_INPUTS, NAV_MEMBERSHIP
-from estimator.ins.fuzzy import MEMBERSHIPS, RULES, membership
+from inertial.navigation.fuzzy import MEMBERSHIPS, RULES, membership
 
 WIDTH, HEIGHT = 170, 90
 UNITS = ("m/s²", "rad/s")
@@ -22,13 +24,18 @@ def sets_svg(points: tuple[float, float, float], value: float, unit: str) -> str
     for x in xs:
         membership(float(x), np.array(points), out)
         for k in range(3):
-            lines[k] += f"{(x - low) / (high - low) * WIDTH:.1f},{HEIGHT - 18 - out[k] * (HEIGHT - 26):.1f} "
+            lines[k] += (
+                f"{(x - low) / (high - low) * WIDTH:.1f},{HEIGHT - 18 - out[k] * (HEIGHT - 26):.1f} "
+            )
     svg = f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" width="48%" role="img" aria-label="fuzzy sets">'
     for k in range(3):
         svg += f'<polyline points="{lines[k]}" fill="none" stroke="{AXES[k]}" stroke-width="1.6"/>'
     x = float(np.clip((value - low) / (high - low), 0.0, 1.0)) * WIDTH
     svg += f'<path d="M{x:.1f} 4V{HEIGHT - 18}" stroke="#8C8C8C" stroke-width="2"/>'
-    return svg + f'<text x="4" y="{HEIGHT - 4}" font-size="11" fill="#8C8C8C">{number(value, 2, unit)}</text></svg>'
+    return (
+        svg + f'<text x="4" y="{HEIGHT - 4}" font-size="11"'
+        f' fill="#8C8C8C">{number(value, 2, unit)}</text></svg>'
+    )
 
 
 class Horizon(Panel):
@@ -38,7 +45,11 @@ class Horizon(Panel):
     _top = None
 
     def update(self, s: Snapshot) -> None:
-        names = [n for n in s.device.estimators("nav") if s.device.get("nav", n).message.HasField("horizon")]
+        names = [
+            n
+            for n in s.device.estimators("nav")
+            if s.device.get("nav", n).message.HasField("horizon")
+        ]
         if not names:
             note = "No moving horizon runs: add fpe-fuzzy or mhe-robust to [estimator] navigators."
             self._top = self.html(f'<p class="gf-note">{note}</p>', self._top)
@@ -48,15 +59,25 @@ class Horizon(Panel):
         for name in names:
             m = s.device.get("nav", name).message.horizon
             items.append(
-                (estimator_title(name), f"{m.n} fixes" + (f" (from {number(m.crisp, 2)})" if m.inputs else ""))
+                (
+                    estimator_title(name),
+                    f"{m.n} fixes" + (f" (from {number(m.crisp, 2)})" if m.inputs else ""),
+                )
             )
             t, r = s.rows("nav", name)
             curves.append(estimator_curve(s, "nav", name, t, r[:, NAV_HORIZON]))
             if len(m.inputs) == 2 and not drawing:
-                drawing = sets_svg(RULES.force, m.inputs[0], UNITS[0]) + sets_svg(RULES.rate, m.inputs[1], UNITS[1])
+                drawing = sets_svg(RULES.force, m.inputs[0], UNITS[0]) + sets_svg(
+                    RULES.rate, m.inputs[1], UNITS[1]
+                )
                 self._fuzzy(s, name)
-        legend = '<p class="gf-note">small · medium · high in the colours below; grey: the vehicle now</p>'
-        self._top = self.html(drawing + (legend if drawing else "") + rows(items, s.stale("nav", names[0])), self._top)
+        legend = (
+            '<p class="gf-note">small · medium · high in the colours below; grey: the vehicle'
+            " now</p>"
+        )
+        self._top = self.html(
+            drawing + (legend if drawing else "") + rows(items, s.stale("nav", names[0])), self._top
+        )
         self.show("n", "Fixes looked back", "N", curves, s, height=170, digits=0)
 
     def _fuzzy(self, s: Snapshot, name: str) -> None:
@@ -65,11 +86,24 @@ class Horizon(Panel):
         if not known.any():
             return
         t, r = t[known], r[known]
-        for first, title in ((0, "Memberships of the specific force |f|"), (3, "Memberships of the rate |ω|")):
+        for first, title in (
+            (0, "Memberships of the specific force |f|"),
+            (3, "Memberships of the rate |ω|"),
+        ):
             curves = [
                 Curve(MEMBERSHIPS[k].split(" ")[1], AXES[k - first], t, r[:, NAV_MEMBERSHIP][:, k])
                 for k in range(first, first + 3)
             ]
             self.show(title, title, "0 to 1", curves, s, height=150, digits=2)
-        for k, (title, unit) in enumerate((("|f| as the rules see it", "m/s²"), ("|ω| as the rules see it", "rad/s"))):
-            self.show(title, title, unit, [Curve(unit, AXES[2], t, r[:, NAV_INPUTS][:, k])], s, height=130, digits=2)
+        for k, (title, unit) in enumerate(
+            (("|f| as the rules see it", "m/s²"), ("|ω| as the rules see it", "rad/s"))
+        ):
+            self.show(
+                title,
+                title,
+                unit,
+                [Curve(unit, AXES[2], t, r[:, NAV_INPUTS][:, k])],
+                s,
+                height=130,
+                digits=2,
+            )

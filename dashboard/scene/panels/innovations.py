@@ -1,4 +1,6 @@
-"""Is a filter honest: innovations inside their 3-sigma, NIS inside the chi-square bounds of its degrees of freedom."""
+"""Is a filter honest: innovations inside their 3-sigma, NIS inside the chi-square bounds of its
+degrees of freedom.
+"""
 
 import numpy as np
 import viser
@@ -16,7 +18,7 @@ from dashboard.scene.store import (
     RATE_NIS,
     RATE_NIS_DOF,
 )
-from estimator.layouts.layout import PRODUCTS
+from inertial.layouts.layout import PRODUCTS
 
 INSIDE = 0.95  # share of NIS values that an honest filter has between the two bounds
 
@@ -29,7 +31,9 @@ class Innovations(Panel):
 
     def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
         super().__init__(client, folder)
-        self._units: dict[str, str] = {}  # of the last correction: a message without one does not name it
+        self._units: dict[
+            str, str
+        ] = {}  # of the last correction: a message without one does not name it
 
     def update(self, s: Snapshot) -> None:
         topic = "innovation" if s.device.is_vehicle else "rate"
@@ -38,11 +42,19 @@ class Innovations(Panel):
             message = s.device.get(topic, name).message
             if topic == "innovation":
                 t, r = s.rows("innovation", name)
-                nis, value, sigma = r[:, INNOVATION_NIS], r[:, INNOVATION_VALUE], r[:, INNOVATION_SIGMA]
+                nis, value, sigma = (
+                    r[:, INNOVATION_NIS],
+                    r[:, INNOVATION_VALUE],
+                    r[:, INNOVATION_SIGMA],
+                )
                 dof, labels, unit = message.dof, list(message.name), "m, m/s"
             else:
                 t, r = s.rows("rate", name)
-                nis, value, sigma = r[:, RATE_NIS], r[:, RATE_INNOVATION], r[:, RATE_INNOVATION_SIGMA]
+                nis, value, sigma = (
+                    r[:, RATE_NIS],
+                    r[:, RATE_INNOVATION],
+                    r[:, RATE_INNOVATION_SIGMA],
+                )
                 dof = r[:, RATE_NIS_DOF]
                 if message.innovation_unit:
                     self._units[name] = message.innovation_unit
@@ -54,10 +66,15 @@ class Innovations(Panel):
             count = dof if topic == "innovation" else int(np.max(dof[good]))
             items += self._nis(s, topic, name, t[good], nis[good], count)
             self._innovations(s, topic, name, (t[good], value[good], sigma[good]), labels, unit)
-        note = '<p class="gf-note">No corrections yet: a filter without measurements has no innovations.</p>'
+        note = (
+            '<p class="gf-note">No corrections yet: a filter without measurements has no'
+            " innovations.</p>"
+        )
         self._table = self.html(rows(items) if items else note, self._table)
 
-    def _nis(self, s: Snapshot, topic: str, name: str, t: np.ndarray, nis: np.ndarray, dof: int) -> list:
+    def _nis(
+        self, s: Snapshot, topic: str, name: str, t: np.ndarray, nis: np.ndarray, dof: int
+    ) -> list:
         title = estimator_title(name)
         low, high = chi2.interval(INSIDE, max(dof, 1))
         curve = estimator_curve(s, topic, name, t, np.minimum(nis, 5 * high))
@@ -66,14 +83,23 @@ class Innovations(Panel):
             Curve(f"χ² {label} %", GREY, ends, np.full(2, bound), dash=True, width=1.2)
             for label, bound in (("2.5", low), ("97.5", high))
         ]
-        self.show(f"{name}nis", f"NIS, {title}", f"{dof} degrees of freedom", [curve, *bounds], s, height=200)
+        self.show(
+            f"{name}nis",
+            f"NIS, {title}",
+            f"{dof} degrees of freedom",
+            [curve, *bounds],
+            s,
+            height=200,
+        )
         inside = float(np.mean((nis >= low) & (nis <= high)) * 100)
         return [
             (f"inside 95 % bounds, {title}", number(inside, 1, "%")),
             (f"mean NIS, expected {dof}", number(float(np.mean(nis)), 2)),
         ]
 
-    def _innovations(self, s: Snapshot, topic: str, name: str, data: tuple, labels: list[str], unit: str) -> None:
+    def _innovations(
+        self, s: Snapshot, topic: str, name: str, data: tuple, labels: list[str], unit: str
+    ) -> None:
         t, value, sigma = data
         for first in (0, 3):
             curves = [
@@ -91,9 +117,16 @@ class Innovations(Panel):
             ]
             if curves:
                 self.show(
-                    f"{name}{first}", f"Innovations {first + 1} to {first + len(curves)}", unit, curves, s, digits=2
+                    f"{name}{first}",
+                    f"Innovations {first + 1} to {first + len(curves)}",
+                    unit,
+                    curves,
+                    s,
+                    digits=2,
                 )
 
 
 # The products w_i w_j in the estimators' order.
-_PRODUCTS = [f"ω<sub>{'xyz'[i]}</sub>ω<sub>{'xyz'[j]}</sub>" for i, j in zip(*PRODUCTS, strict=True)]
+_PRODUCTS = [
+    f"ω<sub>{'xyz'[i]}</sub>ω<sub>{'xyz'[j]}</sub>" for i, j in zip(*PRODUCTS, strict=True)
+]

@@ -1,6 +1,8 @@
-"""The layout bench: drag sensors in 3-D and see what the arrangement can tell, beside the published cube.
+"""The layout bench: drag sensors in 3-D and see what the arrangement can tell, beside the published
+cube.
 
-Its scene, in body axes and units of half the side, stands at /bench while the page is open; the device's is hidden.
+Its scene, in body axes and units of half the side, stands at /bench while the page is open; the
+device's is hidden.
 """
 
 import numpy as np
@@ -9,10 +11,10 @@ import viser
 from dashboard.scene import geometry as geo
 from dashboard.scene.palette import GREY, ORANGE, SKY, number, rgb, rows
 from dashboard.scene.panels.base import DEG, Panel, Snapshot
-from estimator.layouts import catalogue
-from estimator.layouts.draw import noise_ellipsoid
-from estimator.layouts.layout import CUBE, LAYOUTS, Layout
-from estimator.layouts.quality import UNKNOWNS, Quality, analyse
+from inertial.layouts import catalogue
+from inertial.layouts.draw import noise_ellipsoid
+from inertial.layouts.layout import CUBE, LAYOUTS, Layout
+from inertial.layouts.quality import UNKNOWNS, Quality, analyse
 
 HALF_SIDE = 0.05  # m
 ARROW = 0.42  # half sides
@@ -42,10 +44,16 @@ class LayoutBench(Panel):
     def _controls(self) -> None:
         gui = self.client.gui
         with self.folder:
-            self._from = gui.add_dropdown("Start from", tuple(LAYOUTS), initial_value="cube", order=0.1)
+            self._from = gui.add_dropdown(
+                "Start from", tuple(LAYOUTS), initial_value="cube", order=0.1
+            )
             self._axis = gui.add_dropdown("Sensor", self._layout.axis_names, order=0.2)
-            self._triad = gui.add_checkbox("Whole triad", True, order=0.3, hint="Move all axes that sit at one point")
-            self._save = gui.add_button("Save as TOML", icon=viser.Icon.DOWNLOAD, color="gray", order=0.4)
+            self._triad = gui.add_checkbox(
+                "Whole triad", True, order=0.3, hint="Move all axes that sit at one point"
+            )
+            self._save = gui.add_button(
+                "Save as TOML", icon=viser.Icon.DOWNLOAD, color="gray", order=0.4
+            )
         self._from.on_update(lambda _: self._take(catalogue.find(self._from.value, HALF_SIDE)))
         self._axis.on_update(lambda _: self._place_gizmo())
         self._triad.on_update(lambda _: self._place_gizmo())
@@ -80,9 +88,16 @@ class LayoutBench(Panel):
         all_r, all_theta = old.r_b.copy(), old.theta_b.copy()
         all_r[which], all_theta[which] = r, theta / np.linalg.norm(theta, axis=1)[:, None]
         self._layout = Layout(
-            "mine", all_r, all_theta, old.scale_m, old.axis_names, old.channels, old.gain, old.sensors,
+            "mine",
+            all_r,
+            all_theta,
+            old.scale_m,
+            old.axis_names,
+            old.channels,
+            old.gain,
+            old.sensors,
             "drawn on the layout bench",
-        )  # fmt: skip
+        )
         self._dirty = True
 
     def _take(self, layout: Layout) -> None:
@@ -125,12 +140,25 @@ class LayoutBench(Panel):
         lines = np.stack([r, r + ARROW * layout.theta_b], axis=1).astype(np.float32)
         self._nodes = [
             scene.add_line_segments(
-                "/bench/edges", geo.box_edges((1, 1, 1)), rgb(GREY), thickness=2.0, thickness_units="screen"
+                "/bench/edges",
+                geo.box_edges((1, 1, 1)),
+                rgb(GREY),
+                thickness=2.0,
+                thickness_units="screen",
             ),
-            scene.add_arrows("/bench/axes", lines, rgb(SKY), shaft_radius=0.022, head_radius=0.055, head_length=0.13),
+            scene.add_arrows(
+                "/bench/axes",
+                lines,
+                rgb(SKY),
+                shaft_radius=0.022,
+                head_radius=0.055,
+                head_length=0.13,
+            ),
         ]
         self._nodes += [
-            scene.add_label(f"/bench/names/{name}", name, position=tuple(tip), font_screen_scale=0.62)
+            scene.add_label(
+                f"/bench/names/{name}", name, position=tuple(tip), font_screen_scale=0.62
+            )
             for name, tip in zip(layout.axis_names, r + 0.52 * layout.theta_b, strict=True)
         ]
         if np.isfinite(q.gdop):
@@ -147,14 +175,16 @@ class LayoutBench(Panel):
                     scale=tuple(size.tolist()),
                     wxyz=geo.matrix_to_quaternion(vectors),
                     cast_shadow=False,
-                )  # fmt: skip
+                )
             )
 
     def _download(self) -> None:
         text = catalogue.as_toml(self._layout)
         self.client.send_file_download("layout.toml", text.encode(), save_immediately=True)
         self.client.add_notification(
-            "Layout saved", 'Use it with [estimator.layout] file = "layout.toml"', auto_close_seconds=8.0
+            "Layout saved",
+            'Use it with [estimator.layout] file = "layout.toml"',
+            auto_close_seconds=8.0,
         )
 
 
@@ -166,22 +196,49 @@ def figures(q: Quality, cube: Quality) -> str:
 
     feedback = {(0, 0): "none", (1, 0): "in ω′", (0, 1): "in p", (1, 1): "in ω′ and p"}
     seen = " ".join(
-        f'<span style="white-space:nowrap">{MARKS[g]} {n}</span>' for n, g in zip(UNKNOWNS, q.seen, strict=True)
+        f'<span style="white-space:nowrap">{MARKS[g]} {n}</span>'
+        for n, g in zip(UNKNOWNS, q.seen, strict=True)
     )
     mg = 1.0 / 9.80665e-3
     items = [
         ("κ", pair(q.kappa, cube.kappa, 3)),
         ("GDOP", pair(q.gdop, cube.gdop, 4)),
-        ("feedback of least squares", feedback[q.feedback_alpha, q.feedback_force] if np.isfinite(q.gdop) else "–"),
+        (
+            "feedback of least squares",
+            feedback[q.feedback_alpha, q.feedback_force] if np.isfinite(q.gdop) else "–",
+        ),
         ("rank", f"{q.rank} of 12, condition {number(q.condition, 1)}"),
         (
             "noise of p",
-            pair(float(q.sigma_least_squares[3:].max()) * mg, float(cube.sigma_least_squares[3]) * mg, 2, "mg"),
+            pair(
+                float(q.sigma_least_squares[3:].max()) * mg,
+                float(cube.sigma_least_squares[3]) * mg,
+                2,
+                "mg",
+            ),
         ),
-        ("noise of ω′", pair(float(q.sigma_least_squares[:3].max()), float(cube.sigma_least_squares[0]), 3, "rad/s²")),
+        (
+            "noise of ω′",
+            pair(
+                float(q.sigma_least_squares[:3].max()),
+                float(cube.sigma_least_squares[0]),
+                3,
+                "rad/s²",
+            ),
+        ),
         ("ω by integration", pair(float(q.walk.max()) * DEG, float(cube.walk[0]) * DEG, 2, "°/√s")),
-        ("ω at 180 °/s, filter", pair(float(q.sigma_rate.max()) * DEG, float(cube.sigma_rate.max()) * DEG, 2, "°/s")),
+        (
+            "ω at 180 °/s, filter",
+            pair(float(q.sigma_rate.max()) * DEG, float(cube.sigma_rate.max()) * DEG, 2, "°/s"),
+        ),
     ]
-    note = '<p class="gf-note">● seen ◐ weak ○ not seen alone. Orange: how noise of ω′ spreads over its directions.</p>'
-    mixed = f'<p class="gf-note">Of the products only: {", ".join(q.mixtures)}</p>' if q.mixtures else ""
+    note = (
+        '<p class="gf-note">● seen ◐ weak ○ not seen alone. Orange: how noise of ω′ spreads over'
+        " its directions.</p>"
+    )
+    mixed = (
+        f'<p class="gf-note">Of the products only: {", ".join(q.mixtures)}</p>'
+        if q.mixtures
+        else ""
+    )
     return rows(items) + f"<p>{seen}</p>" + mixed + note

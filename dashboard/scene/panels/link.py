@@ -1,4 +1,6 @@
-"""The line between board and gateway: what came, what was lost, how late, the clocks, and why bytes were bad."""
+"""The line between board and gateway: what came, what was lost, how late, the clocks, and why bytes
+were bad.
+"""
 
 from dashboard.scene.palette import escape, number, rows
 from dashboard.scene.panels.base import Panel, Snapshot
@@ -13,7 +15,9 @@ class Link(Panel):
     def update(self, s: Snapshot) -> None:
         latest = s.device.get("link")
         if latest is None:
-            self._table = self.html('<p class="gf-note">The gateway has not spoken of this line yet.</p>', self._table)
+            self._table = self.html(
+                '<p class="gf-note">The gateway has not spoken of this line yet.</p>', self._table
+            )
             return
         m = latest.message
         items = [
@@ -21,7 +25,10 @@ class Link(Panel):
             ("port", escape(m.port)),
             ("samples", number(m.sample_rate_hz, 1, "Hz")),
             ("frames", number(m.frame_rate_hz, 1, "Hz")),
-            ("latency p50 · p99", f"{number(m.latency_p50_s * 1e3, 2)} · {number(m.latency_p99_s * 1e3, 2, 'ms')}"),
+            (
+                "latency p50 · p99",
+                f"{number(m.latency_p50_s * 1e3, 2)} · {number(m.latency_p99_s * 1e3, 2, 'ms')}",
+            ),
             ("clock skew", number(m.clock_skew_ppm, 1, "ppm", sign=True)),
             ("clock scatter", number(m.clock_residual_s * 1e6, 0, "µs")),
             ("clock window", number(m.clock_window_s, 0, "s")),
@@ -33,7 +40,10 @@ class Link(Panel):
             ("lost samples", _count(m.lost_samples)),
             ("reboots · reconnects", f"{m.reboots} · {m.reconnects}"),
             ("frames of unknown type", number(m.unknown_frames, 0)),
-            ("journal, on disk", f"{number(m.durable_sequence, 0)} of {number(m.journal_sequence, 0)}"),
+            (
+                "journal, on disk",
+                f"{number(m.durable_sequence, 0)} of {number(m.journal_sequence, 0)}",
+            ),
             ("GNSS good · bad", f"{m.gnss_good} · {m.gnss_bad}"),
         ]
         content = rows(items, s.stale("link"))

@@ -1,11 +1,21 @@
-"""Navigation filters against each other: the map, the race on unseen fixes, and the button that takes GNSS away."""
+"""Navigation filters against each other: the map, the race on unseen fixes, and the button that
+takes GNSS away.
+"""
 
 import numpy as np
 import viser
 
 from dashboard.scene.chart import Curve
 from dashboard.scene.map import map_svg
-from dashboard.scene.palette import GREY, GYRO_FREE, escape, estimator_colour, estimator_title, number, rows
+from dashboard.scene.palette import (
+    GREY,
+    GYRO_FREE,
+    escape,
+    estimator_colour,
+    estimator_title,
+    number,
+    rows,
+)
 from dashboard.scene.panels import drift
 from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve
 from dashboard.scene.store import (
@@ -17,13 +27,14 @@ from dashboard.scene.store import (
     NAV_POSITION,
     NAV_SIGMA_POSITION,
 )
-from messages import gyrofree_pb2 as pb
+from messages.contract import gyrofree_pb2 as pb
 
 OUTAGE_S = 30.0
 HEAD = ("<b>race</b>, horizontal RMS, m", "unseen fix", "prediction", "fed fix", "NIS")
 METRICS = (
-    "Three metrics, not to be mixed up: error on fixes held back from the filter; its prediction against the next fix, "
-    "before that is used; and what is left to a fix after it was used, which rewards a filter that just follows."
+    "Three metrics, not to be mixed up: error on fixes held back from the filter; its prediction"
+    " against the next fix, before that is used; and what is left to a fix after it was used, which"
+    " rewards a filter that just follows."
 )
 
 
@@ -38,9 +49,13 @@ class Navigation(Panel):
         self._device, self._muted = "", False
         with folder:
             self._button = client.gui.add_button(
-                f"GNSS outage, {OUTAGE_S:.0f} s", icon=viser.Icon.SATELLITE_OFF, color="gray", order=2.0, visible=False,
+                f"GNSS outage, {OUTAGE_S:.0f} s",
+                icon=viser.Icon.SATELLITE_OFF,
+                color="gray",
+                order=2.0,
+                visible=False,
                 hint="Hold the fixes back from all filters, and see what they do without",
-            )  # fmt: skip
+            )
         self._button.on_click(lambda _: self._order())
 
     @property
@@ -52,7 +67,10 @@ class Navigation(Panel):
         self._device = s.device.name
         names = s.device.estimators("nav")
         if not names:
-            note = "No navigation yet: it needs a GNSS receiver, and a six-axis board, or a cube for which "
+            note = (
+                "No navigation yet: it needs a GNSS receiver, and a six-axis board, or a cube for"
+                " which "
+            )
             note += "[estimator] gyro_free_navigation names filters."
             self._top = self.html(f'<p class="gf-note">{note}</p>', self._top)
             return
@@ -82,11 +100,17 @@ class Navigation(Panel):
             unseen = np.isfinite(error)
             if unseen.any():
                 curves.append(estimator_curve(s, "innovation", name, t[unseen], error[unseen]))
-        ahead = drift.outage(messages[names[0]], s.device.get("nav", names[0]).t) if self._muted else None
+        ahead = (
+            drift.outage(messages[names[0]], s.device.get("nav", names[0]).t)
+            if self._muted
+            else None
+        )
         if ahead is not None:
             curves.append(Curve("equation (27), 1σ biases", GREY, *ahead, dash=True))
         if curves:
-            self.show("error", "Horizontal error on fixes held back", "m", curves, s, height=170, digits=2)
+            self.show(
+                "error", "Horizontal error on fixes held back", "m", curves, s, height=170, digits=2
+            )
 
     @staticmethod
     def _alone(s: Snapshot, names: list[str]) -> drift.Unaided | None:
@@ -107,9 +131,17 @@ class Navigation(Panel):
         _, lead = s.rows("nav", names[0])
         sigma = tuple(lead[-1, NAV_SIGMA_POSITION][:2]) if len(lead) else None
         drawn = map_svg(ways, fixes[:, GNSS_POSITION], rejected, sigma, s.dark)
-        alarm = '<p class="gf-alert">GNSS is muted: the filters go on without fixes.</p>' if self._muted else ""
+        alarm = (
+            '<p class="gf-alert">GNSS is muted: the filters go on without fixes.</p>'
+            if self._muted
+            else ""
+        )
         m = s.device.get("nav", names[0]).message
-        waits = f'<p class="gf-note">{escape(m.alignment)}</p>' if m.mode != pb.NavSolution.MODE_NAVIGATING else ""
+        waits = (
+            f'<p class="gf-note">{escape(m.alignment)}</p>'
+            if m.mode != pb.NavSolution.MODE_NAVIGATING
+            else ""
+        )
         return alarm + waits + drawn
 
     def _race(self, s: Snapshot, names: list[str]) -> str:
@@ -122,10 +154,17 @@ class Navigation(Panel):
             fed = ~unseen & np.isfinite(ahead[:, 0])
             left = r[fed][:, INNOVATION_RESIDUAL][:, :2]
             left = left[np.isfinite(left[:, 0])]
-            found.append((_rms(error[unseen]), _rms(ahead[fed]), _rms(left), name, r[fed, INNOVATION_NIS]))
+            found.append(
+                (_rms(error[unseen]), _rms(ahead[fed]), _rms(left), name, r[fed, INNOVATION_NIS])
+            )
         items = []
-        for error, ahead, left, name, nis in sorted(found, key=lambda f: (np.nan_to_num(f[0], nan=1e9), f[3])):
-            dot = f'<span style="color:{estimator_colour(name, names)}">●</span> {estimator_title(name)}'
+        for error, ahead, left, name, nis in sorted(
+            found, key=lambda f: (np.nan_to_num(f[0], nan=1e9), f[3])
+        ):
+            dot = (
+                f'<span style="color:{estimator_colour(name, names)}">●</span>'
+                f" {estimator_title(name)}"
+            )
             honest = number(float(np.mean(nis)), 1) if len(nis) else "–"
             cells = [number(v, 3) for v in (error, ahead, left)] + [honest]
             items.append("".join(f"<td>{cell}</td>" for cell in [dot, *cells]))
@@ -135,7 +174,9 @@ class Navigation(Panel):
 
     def _order(self) -> None:
         seconds = 0.0 if self._muted else OUTAGE_S
-        command = pb.EstimatorCommand(action=pb.EstimatorCommand.ACTION_MUTE_GNSS, device=self._device, seconds=seconds)
+        command = pb.EstimatorCommand(
+            action=pb.EstimatorCommand.ACTION_MUTE_GNSS, device=self._device, seconds=seconds
+        )
         self.order_estimator("GNSS outage", command)
 
 

@@ -12,7 +12,9 @@ NAMES = ("North", "East", "Down")
 
 
 class Position(Panel):
-    """A vehicle: fused solution over the fixes. The cube: unaided inertial navigation from the start."""
+    """A vehicle: fused solution over the fixes. The cube: unaided inertial navigation from the
+    start.
+    """
 
     title = "Position"
     _table = None
@@ -26,13 +28,19 @@ class Position(Panel):
                 if vehicle:
                     t, r = s.rows("nav", name)
                     half = 3 * r[:, NAV_SIGMA_POSITION][:, k]
-                    curves.append(estimator_curve(s, "nav", name, t, r[:, NAV_POSITION][:, k], half))
+                    curves.append(
+                        estimator_curve(s, "nav", name, t, r[:, NAV_POSITION][:, k], half)
+                    )
                 else:
                     t, r = s.rows("rate", name)
                     curves.append(estimator_curve(s, "rate", name, t, r[:, RATE_POSITION][:, k]))
             if vehicle and s.device.get("gnss"):
                 t, r = s.rows("gnss")
-                curves.append(Curve("GNSS", FIX, t, r[:, GNSS_POSITION][:, k], stale=s.stale("gnss"), dash=True))
+                curves.append(
+                    Curve(
+                        "GNSS", FIX, t, r[:, GNSS_POSITION][:, k], stale=s.stale("gnss"), dash=True
+                    )
+                )
             self.show(axis, axis, "m", curves, s, height=150, digits=2)
 
     @staticmethod
@@ -44,12 +52,17 @@ class Position(Panel):
         v = np.asarray(m.v_n_mps) if len(m.v_n_mps) == 3 else np.full(3, np.nan)
         sigma = np.asarray(m.sigma[6:9]) if len(m.sigma) >= 9 else np.full(3, np.nan)
         t, r = s.rows("nav", names[0])
-        travelled = float(np.sum(np.linalg.norm(np.diff(r[:, :2], axis=0), axis=1))) if len(t) > 1 else 0.0
+        travelled = (
+            float(np.sum(np.linalg.norm(np.diff(r[:, :2], axis=0), axis=1))) if len(t) > 1 else 0.0
+        )
         course = float(np.degrees(np.arctan2(v[1], v[0]))) % 360
         items = [
             ("mode", MODES.get(m.mode, "unknown")),
             ("alignment", escape(m.alignment) or "–"),
-            ("latitude, longitude", f"{number(m.latitude_deg, 7, '°')}, {number(m.longitude_deg, 7, '°')}"),
+            (
+                "latitude, longitude",
+                f"{number(m.latitude_deg, 7, '°')}, {number(m.longitude_deg, 7, '°')}",
+            ),
             ("height", number(m.height_m, 2, "m")),
             ("speed over ground", number(float(np.hypot(v[0], v[1])) * 3.6, 1, "km/h")),
             ("course", number(course, 1, "°") if np.hypot(v[0], v[1]) > 0.5 else "standing"),
@@ -68,6 +81,7 @@ def _cube_note(s: Snapshot) -> str:
         m = s.device.get("rate", name).message
         if len(m.p_n_m) == 3:
             items.append((f"distance, {name}", number(float(np.linalg.norm(m.p_n_m)), 1, "m")))
-    return '<p class="gf-note">Inertial navigation from the start without any aid: it drifts by nature.</p>' + rows(
-        items
+    return (
+        '<p class="gf-note">Inertial navigation from the start without any aid: it drifts by'
+        " nature.</p>" + rows(items)
     )

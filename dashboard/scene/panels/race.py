@@ -1,4 +1,6 @@
-"""The estimators side by side: error against the tachometer over the window, honesty, and what a step costs."""
+"""The estimators side by side: error against the tachometer over the window, honesty, and what a
+step costs.
+"""
 
 import numpy as np
 
@@ -7,17 +9,19 @@ from dashboard.scene.panels.base import DEG, Panel, Snapshot
 from dashboard.scene.store import RATE_NIS, RATE_NIS_DOF, RATE_OMEGA
 
 HEAD = (
-    "<tr><td><b>estimator</b></td><td>RMS ω<sub>z</sub>, °/s</td><td>NIS over its freedom</td><td>µs per step</td>"
-    "<td>state</td></tr>"
+    "<tr><td><b>estimator</b></td><td>RMS ω<sub>z</sub>, °/s</td><td>NIS over its"
+    " freedom</td><td>µs per step</td><td>state</td></tr>"
 )
 NOTE = (
-    "RMS of ω<sub>z</sub> against the tachometer over the window shown; NIS over its degrees of freedom is 1 for a "
-    "filter whose innovations are as large as it says."
+    "RMS of ω<sub>z</sub> against the tachometer over the window shown; NIS over its degrees of"
+    " freedom is 1 for a filter whose innovations are as large as it says."
 )
 
 
 class Race(Panel):
-    """One row for each rate estimator, the best first. Others than the default ones: [estimator] rate."""
+    """One row for each rate estimator, the best first. Others than the default ones: [estimator]
+    rate.
+    """
 
     title = "Race"
     _table = None
@@ -25,7 +29,9 @@ class Race(Panel):
     def update(self, s: Snapshot) -> None:
         names = s.device.estimators("rate")
         if not names:
-            self._table = self.html('<p class="gf-note">No rate estimators run for this device.</p>', self._table)
+            self._table = self.html(
+                '<p class="gf-note">No rate estimators run for this device.</p>', self._table
+            )
             return
         found = sorted((_error(s, name), name) for name in names)
         body = "".join(_row(s, name, error) for error, name in found)
@@ -35,7 +41,8 @@ class Race(Panel):
 
 
 def _error(s: Snapshot, name: str) -> float:
-    """RMS against the tachometer, deg/s; infinite without one, and for an estimate that the tachometer itself aided.
+    """RMS against the tachometer, deg/s; infinite without one, and for an estimate that the
+    tachometer itself aided.
 
     Without a direction channel: of the magnitudes.
     """
@@ -50,7 +57,9 @@ def _error(s: Snapshot, name: str) -> float:
     omega, reference = rows[inside][:, RATE_OMEGA][:, 2], np.interp(t[inside], true_t, true[:, 0])
     if not latest.message.direction_known:
         omega, reference = np.abs(omega), np.abs(reference)
-    return float(np.sqrt(np.nanmean((omega - reference) ** 2)) * DEG) if inside.any() else float("inf")
+    return (
+        float(np.sqrt(np.nanmean((omega - reference) ** 2)) * DEG) if inside.any() else float("inf")
+    )
 
 
 def _aid(s: Snapshot, name: str) -> str:

@@ -1,4 +1,6 @@
-"""Angular rate: every estimator with its 3-sigma band over the tachometer; a vehicle's gyroscope."""
+"""Angular rate: every estimator with its 3-sigma band over the tachometer; a vehicle's
+gyroscope.
+"""
 
 import numpy as np
 
@@ -6,11 +8,13 @@ from dashboard.scene.chart import Curve, Shade
 from dashboard.scene.palette import AXES, GREY, REFERENCE, VERMILLION, YELLOW, escape, truth_colour
 from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
 from dashboard.scene.store import RATE_BOUND, RATE_OMEGA, RATE_SIGHT, RATE_SIGMA, TRUTH_OMEGA
-from messages import gyrofree_pb2 as pb
+from messages.contract import gyrofree_pb2 as pb
 
 
 class Rates(Panel):
-    """omega_z with the tachometer first, because it is what the table turns about; then omega_x and omega_y."""
+    """omega_z with the tachometer first, because it is what the table turns about; then omega_x and
+    omega_y.
+    """
 
     title = "Rates"
     _note = None
@@ -31,20 +35,33 @@ class Rates(Panel):
                 t, rows = s.rows("tacho")
                 known = s.device.get("tacho").message.direction_known
                 label = "tachometer" if known else "tachometer |ω|"
-                curves.append(Curve(label, REFERENCE, t, rows[:, 0] * DEG, stale=s.stale("tacho"), dash=True))
+                curves.append(
+                    Curve(label, REFERENCE, t, rows[:, 0] * DEG, stale=s.stale("tacho"), dash=True)
+                )
             if s.device.get("truth"):
                 t, rows = s.rows("truth")
-                line = Curve("truth", truth_colour(s.dark), t, rows[:, TRUTH_OMEGA][:, k] * DEG, width=1.0)
+                line = Curve(
+                    "truth", truth_colour(s.dark), t, rows[:, TRUTH_OMEGA][:, k] * DEG, width=1.0
+                )
                 curves.append(line)
-            self.show(f"omega{axis}", f"ω<sub>{axis}</sub> with 3σ", "°/s", curves, s, height=215 if k == 2 else 150,
-                      shades=_sight(s, k))  # fmt: skip
+            self.show(
+                f"omega{axis}",
+                f"ω<sub>{axis}</sub> with 3σ",
+                "°/s",
+                curves,
+                s,
+                height=215 if k == 2 else 150,
+                shades=_sight(s, k),
+            )
 
     def _say_why(self, s: Snapshot) -> None:
         """The best filter's reason where it does not vouch for a component."""
         first = _best(s)
         latest = s.device.get("rate", first) if first else None
         reason = latest.message.sight_reason if latest else ""
-        self._note = self.html(f'<p class="gf-note">{escape(reason)}</p>' if reason else "", self._note)
+        self._note = self.html(
+            f'<p class="gf-note">{escape(reason)}</p>' if reason else "", self._note
+        )
 
     @staticmethod
     def _estimates(s: Snapshot, k: int) -> list[Curve]:
@@ -52,7 +69,9 @@ class Rates(Panel):
         for name in s.device.estimators("rate"):
             t, rows = s.rows("rate", name)
             sigma = rows[:, RATE_SIGMA][:, k] * DEG
-            curves.append(estimator_curve(s, "rate", name, t, rows[:, RATE_OMEGA][:, k] * DEG, 3 * sigma))
+            curves.append(
+                estimator_curve(s, "rate", name, t, rows[:, RATE_OMEGA][:, k] * DEG, 3 * sigma)
+            )
         curves += _bound(s, k)
         return curves
 
@@ -60,7 +79,9 @@ class Rates(Panel):
 def _best(s: Snapshot) -> str:
     """The estimator whose sight and bound are shown: the one that has a bound, else the first."""
     names = list(s.device.estimators("rate"))
-    with_bound = [name for name in names if len(s.device.get("rate", name).message.bound_sigma_radps)]
+    with_bound = [
+        name for name in names if len(s.device.get("rate", name).message.bound_sigma_radps)
+    ]
     return (with_bound or names or [""])[0]
 
 

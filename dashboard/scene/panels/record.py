@@ -1,4 +1,6 @@
-"""State of the recorder and the buttons that start and stop it. Who may press them is checked by the proxy."""
+"""State of the recorder and the buttons that start and stop it. Who may press them is checked by
+the proxy.
+"""
 
 import logging
 from collections.abc import Callable
@@ -6,7 +8,7 @@ from collections.abc import Callable
 import viser
 
 from dashboard.scene.palette import escape, number, rows
-from messages import gyrofree_pb2 as pb
+from messages.contract import gyrofree_pb2 as pb
 
 log = logging.getLogger(__name__)
 
@@ -14,13 +16,17 @@ log = logging.getLogger(__name__)
 class Record:
     """Two buttons, a name, and what the recorder says of itself."""
 
-    def __init__(self, client: viser.ClientHandle, call: Callable[[pb.RecorderCommand], pb.RecorderStatus]) -> None:
+    def __init__(
+        self, client: viser.ClientHandle, call: Callable[[pb.RecorderCommand], pb.RecorderStatus]
+    ) -> None:
         self._client, self._call = client, call
         gui = client.gui
         self._state = gui.add_html("")
         self._name = gui.add_text("Session", "", hint="Name of the session; empty takes the time")
         self._start = gui.add_button("Record", icon=viser.Icon.PLAYER_RECORD, color=(192, 40, 40))
-        self._stop = gui.add_button("Stop recording", icon=viser.Icon.PLAYER_STOP, color="gray", visible=False)
+        self._stop = gui.add_button(
+            "Stop recording", icon=viser.Icon.PLAYER_STOP, color="gray", visible=False
+        )
         self._start.on_click(lambda _: self._order(pb.RecorderCommand.ACTION_START))
         self._stop.on_click(lambda _: self._order(pb.RecorderCommand.ACTION_STOP))
 
@@ -36,7 +42,11 @@ class Record:
         content = self._content(latest, stale, recording)
         if self._state.content != content:
             self._state.content = content
-        for handle, visible in ((self._start, not recording), (self._name, not recording), (self._stop, recording)):
+        for handle, visible in (
+            (self._start, not recording),
+            (self._name, not recording),
+            (self._stop, recording),
+        ):
             if handle.visible != visible:
                 handle.visible = visible
         if self._start.disabled != stale:
@@ -52,7 +62,12 @@ class Record:
             items.append(("session" if recording else "last session", escape(m.session)))
         if recording:
             items.append(("length", number(m.seconds, 0, "s")))
-            items.append(("written · safe on disk", f"{number(m.messages, 0)} · {number(m.durable_messages, 0)}"))
+            items.append(
+                (
+                    "written · safe on disk",
+                    f"{number(m.messages, 0)} · {number(m.durable_messages, 0)}",
+                )
+            )
             items.append(("size", number(m.bytes / 1e6, 1, "MB")))
         lost = sum(m.lost.values())
         if lost:
@@ -69,5 +84,11 @@ class Record:
             log.warning("recorder: %s", error)
             text, good = str(error), False
         started = action == pb.RecorderCommand.ACTION_START
-        title = ("Recording" if started else "Recording stopped") if good else "The recorder did not do it"
-        self._client.add_notification(title, text, color="teal" if good else "red", auto_close_seconds=6.0)
+        title = (
+            ("Recording" if started else "Recording stopped")
+            if good
+            else "The recorder did not do it"
+        )
+        self._client.add_notification(
+            title, text, color="teal" if good else "red", auto_close_seconds=6.0
+        )

@@ -1,4 +1,6 @@
-"""Tilt of a six-axis board: an artificial horizon, and every filter's roll and pitch side by side."""
+"""Tilt of a six-axis board: an artificial horizon, and every filter's roll and pitch side by
+side.
+"""
 
 from dashboard.scene.palette import estimator_title, number, rows
 from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
@@ -28,19 +30,30 @@ class Tilt(Panel):
     @staticmethod
     def _head(s: Snapshot, names: list[str]) -> str:
         if not names:
-            return '<p class="gf-note">No tilt yet: it needs a board with accelerometers and gyroscopes.</p>'
+            return (
+                '<p class="gf-note">No tilt yet: it needs a board with accelerometers and'
+                " gyroscopes.</p>"
+            )
         latest = {name: s.device.get("attitude", name).message for name in names}
         first = latest[names[0]]
         items = []
         for name, m in latest.items():
             roll, pitch = roll_pitch(m.q_nb)
-            items.append((f"{estimator_title(name)}: roll, pitch", f"{number(roll * DEG, 1, '°')}, "
-                          f"{number(pitch * DEG, 1, '°')}"))  # fmt: skip
+            items.append(
+                (
+                    f"{estimator_title(name)}: roll, pitch",
+                    f"{number(roll * DEG, 1, '°')}, {number(pitch * DEG, 1, '°')}",
+                )
+            )
             if name != names[0]:
-                items.append(("&nbsp; off the first by", number(between(m.q_nb, first.q_nb) * DEG, 2, "°")))
+                items.append(
+                    ("&nbsp; off the first by", number(between(m.q_nb, first.q_nb) * DEG, 2, "°"))
+                )
         bias = first.bias_omega_b_radps
         if len(bias) == 3:
-            items.append(("gyro bias x, y, z", " · ".join(number(b * DEG, 2) for b in bias) + " °/s"))
+            items.append(
+                ("gyro bias x, y, z", " · ".join(number(b * DEG, 2) for b in bias) + " °/s")
+            )
         items.append(("at rest", "yes" if first.resting else "no"))
         stale = s.stale("attitude", names[0])
         return horizon_svg(*roll_pitch(first.q_nb), stale) + rows(items, stale)

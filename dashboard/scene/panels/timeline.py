@@ -1,4 +1,6 @@
-"""The panel at the bottom left: where the recording or the replay stands, the replay's controls, notes and marks."""
+"""The panel at the bottom left: where the recording or the replay stands, the replay's controls,
+notes and marks.
+"""
 
 import logging
 import time
@@ -9,7 +11,7 @@ import viser
 
 from dashboard.scene.palette import escape
 from dashboard.scene.store import Store
-from messages import gyrofree_pb2 as pb
+from messages.contract import gyrofree_pb2 as pb
 
 log = logging.getLogger(__name__)
 
@@ -20,10 +22,17 @@ HOLD_S = 1.0  # after a person's hand on the slider, the replay's position does 
 
 
 class Timeline:
-    """Live: time since the recording began, and what is noted. Replay: a slider, keys, speed, steps and a loop."""
+    """Live: time since the recording began, and what is noted. Replay: a slider, keys, speed, steps
+    and a loop.
+    """
 
     def __init__(
-        self, client: viser.ClientHandle, feed: Any, store: Store, chosen: Callable[[], str], dock: bool = True
+        self,
+        client: viser.ClientHandle,
+        feed: Any,
+        store: Store,
+        chosen: Callable[[], str],
+        dock: bool = True,
     ) -> None:
         """`chosen` names the device that this browser shows, which a note is about."""
         self._client, self._feed, self._store, self._chosen = client, feed, store, chosen
@@ -33,7 +42,13 @@ class Timeline:
         with panel.add_tab("Timeline", viser.Icon.PLAYER_PLAY):
             self._state = gui.add_html("")
             self._slider = gui.add_slider(
-                "Position, s", 0.0, 1.0, 0.1, 0.0, visible=False, hint="Seconds since the recording began"
+                "Position, s",
+                0.0,
+                1.0,
+                0.1,
+                0.0,
+                visible=False,
+                hint="Seconds since the recording began",
             )
             self._slider.on_update(lambda event: self._slid(event))
             moves = ("start", "−10 s", "◂ step", "play / pause", "step ▸", "+10 s")
@@ -77,7 +92,9 @@ class Timeline:
     # --- what is shown
 
     def _slide(self, m: pb.ReplayStatus) -> None:
-        """Bring the slider to the replay's position; its length first, which bounds the values it takes."""
+        """Bring the slider to the replay's position; its length first, which bounds the values it
+        takes.
+        """
         length = max(round(m.length_s, 1), 0.1)
         if self._slider.max != length:
             self._slider.max = length
@@ -87,13 +104,17 @@ class Timeline:
 
     @staticmethod
     def _replay_html(m: pb.ReplayStatus) -> str:
-        loop = f" · loop {clock(m.loop_from_s)} to {clock(m.loop_until_s)}" if m.loop_until_s > m.loop_from_s else ""
+        loop = (
+            f" · loop {clock(m.loop_from_s)} to {clock(m.loop_until_s)}"
+            if m.loop_until_s > m.loop_from_s
+            else ""
+        )
         state = "❚❚ paused" if m.paused else f"▶ {m.speed:g}×"
         position = clock(m.position_s, 3 if m.paused else 1)  # a step is one sample
         message = f" · <b>{escape(m.message)}</b>" if m.message else ""
         return (
-            f'<p class="gf-note"><b>Replay</b> {escape(m.session)} · {position} of {clock(m.length_s)} · '
-            f"{state}{loop}{message}</p>"
+            f'<p class="gf-note"><b>Replay</b> {escape(m.session)} · {position} of'
+            f" {clock(m.length_s)} · {state}{loop}{message}</p>"
         )
 
     def _live_html(self, now: float) -> str:
@@ -102,13 +123,16 @@ class Timeline:
             return '<p class="gf-note"><b>Live</b> · the recorder is not running</p>'
         m = latest.message
         if not m.recording:
-            return '<p class="gf-note"><b>Live</b> · not being recorded: notes are shown, but not kept</p>'
+            return (
+                '<p class="gf-note"><b>Live</b> · not being recorded: notes are shown, but not'
+                " kept</p>"
+            )
         repaired = sum(m.repaired.values())
         filled = f" · {repaired} messages filled in after a loss" if repaired else ""
         holding = f" · filling a gap, {m.repairing} messages wait" if m.repairing else ""
         return (
-            f'<p class="gf-note"><b>Live</b> <b class="gf-rec">●</b> {escape(m.session)} · {clock(m.seconds)}'
-            f"{filled}{holding}</p>"
+            f'<p class="gf-note"><b>Live</b> <b class="gf-rec">●</b> {escape(m.session)} ·'
+            f" {clock(m.seconds)}{filled}{holding}</p>"
         )
 
     def _marks_html(self) -> str:
@@ -136,7 +160,9 @@ class Timeline:
         try:
             self._feed.replay(pb.ReplayCommand(action=action, value=value, until=until))
         except ConnectionError as error:
-            self._client.add_notification("The replay did not do it", str(error), color="red", auto_close_seconds=6.0)
+            self._client.add_notification(
+                "The replay did not do it", str(error), color="red", auto_close_seconds=6.0
+            )
 
     def _slid(self, event: Any) -> None:
         if event.client is None:
@@ -178,14 +204,25 @@ class Timeline:
             return
         with self._store.lock:
             device = self._store.device(name)
-            at_ns = device.utc0_ns + int(device.t_newest * 1e9) if device is not None else time.time_ns()
+            at_ns = (
+                device.utc0_ns + int(device.t_newest * 1e9)
+                if device is not None
+                else time.time_ns()
+            )
         kind = pb.Note.KIND_MARK if mark else pb.Note.KIND_NOTE
-        note = pb.Note(header=pb.Header(device=name, utc_ns=at_ns), text=text[:2000], kind=kind, at_utc_ns=at_ns)
+        note = pb.Note(
+            header=pb.Header(device=name, utc_ns=at_ns),
+            text=text[:2000],
+            kind=kind,
+            at_utc_ns=at_ns,
+        )
         try:
             self._feed.note(name, note)
             self._note.value = ""
         except ConnectionError as error:
-            self._client.add_notification("The note was not kept", str(error), color="red", auto_close_seconds=6.0)
+            self._client.add_notification(
+                "The note was not kept", str(error), color="red", auto_close_seconds=6.0
+            )
 
 
 def clock(seconds: float, digits: int = 1) -> str:

@@ -1,4 +1,6 @@
-"""Guided detection of axes and signs: which way to turn the board next, what was found. Orders are for operators."""
+"""Guided detection of axes and signs: which way to turn the board next, what was found. Orders are
+for operators.
+"""
 
 import numpy as np
 import viser
@@ -7,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from dashboard.scene.palette import AXES, GREEN, VERMILLION, escape, number, rgba, rows
 from dashboard.scene.panels.base import DEG, Snapshot
 from dashboard.scene.panels.guided import Guided, guidance, head, silent
-from messages import gyrofree_pb2 as pb
+from messages.contract import gyrofree_pb2 as pb
 
 ACTION = pb.EstimatorCommand
 STATUS = pb.WiringStatus
@@ -19,12 +21,19 @@ STATES = {
     STATUS.STATE_SAVED: "saved and in use",
 }
 BUTTONS = (  # label, order, icon, colour
-    ("Find axes and signs", ACTION.ACTION_WIRING_START, viser.Icon.ROTATE_RECTANGLE, (30, 110, 165)),
+    (
+        "Find axes and signs",
+        ACTION.ACTION_WIRING_START,
+        viser.Icon.ROTATE_RECTANGLE,
+        (30, 110, 165),
+    ),
     ("Save map and use it", ACTION.ACTION_WIRING_SAVE, viser.Icon.DEVICE_FLOPPY, (0, 120, 90)),
     ("Cancel", ACTION.ACTION_WIRING_CANCEL, viser.Icon.X, "gray"),
     ("Use the board's own axes again", ACTION.ACTION_USE_MAP, viser.Icon.ARROW_BACK_UP, "gray"),
 )
-CAMERA = np.array([-0.78, 0.42, -0.47])  # from behind, right, above; n north-east-down, the nose points north
+CAMERA = np.array(
+    [-0.78, 0.42, -0.47]
+)  # from behind, right, above; n north-east-down, the nose points north
 QUARTER = np.pi / 2.0
 TURNS = {  # rotation vector of each pose against level, b
     STATUS.POSE_LEVEL: (0.0, 0.0, 0.0),
@@ -35,7 +44,9 @@ TURNS = {  # rotation vector of each pose against level, b
 
 
 class Wiring(Guided):
-    """Status, two pictures (level, and the pose wanted) and four buttons; the estimator of the device does the rest."""
+    """Status, two pictures (level, and the pose wanted) and four buttons; the estimator of the
+    device does the rest.
+    """
 
     title = "Wiring"
     buttons = BUTTONS
@@ -63,12 +74,19 @@ def content(m: pb.WiringStatus, gone: bool, dark: bool) -> str:
     used = [("axis map in use", escape(m.map) if m.map else "none: the board's own axes")]
     if m.state == STATUS.STATE_IDLE:
         text = (
-            "Which input is which axis, and with which sign: tip the board nose up, right side down and turn it to the "
-            "right, each time from level; this page says when. What is found can be saved and is used at once."
+            "Which input is which axis, and with which sign: tip the board nose up, right side down"
+            " and turn it to the right, each time from level; this page says when. What is found"
+            " can be saved and is used at once."
         )
         return f'<p class="gf-note">{text}</p>' + rows(used)
-    first = head(STATES.get(m.state, ""), f"{len(m.turns)} turns · {_found(m)} of {len(m.inputs)} inputs known", gone)
-    drawing = picture(m.pose, dark) if m.state in (STATUS.STATE_WAITING, STATUS.STATE_MOVING) else ""
+    first = head(
+        STATES.get(m.state, ""),
+        f"{len(m.turns)} turns · {_found(m)} of {len(m.inputs)} inputs known",
+        gone,
+    )
+    drawing = (
+        picture(m.pose, dark) if m.state in (STATUS.STATE_WAITING, STATUS.STATE_MOVING) else ""
+    )
     saved = m.state == STATUS.STATE_SAVED
     todo = "" if saved else guidance(m.instruction, drawing, m.progress, m.message)
     return first + todo + _inputs(m, gone) + _turns(m) + rows(used)
@@ -86,7 +104,9 @@ def _inputs(m: pb.WiringStatus, stale: bool) -> str:
         found = '<span style="opacity:.6">unused</span>' if one.unused else "–"
         if one.axis:
             colour = AXES["xyz".index(one.axis[-1])]
-            found = f'<b style="color:{colour}">■</b> {"−" if one.inverted else "+"} {escape(one.axis)}'
+            found = (
+                f'<b style="color:{colour}">■</b> {"−" if one.inverted else "+"} {escape(one.axis)}'
+            )
         items.append((escape(one.name), f"{number(one.reading, digits, one.unit)} &nbsp; {found}"))
     return rows(items, stale)
 
@@ -95,10 +115,18 @@ def _turns(m: pb.WiringStatus) -> str:
     """The same angle by both sensors: a wrong sensitivity is seen here."""
     items = []
     for turn in m.turns:
-        by_rate, by_force = number(turn.by_rate_rad * DEG, 1, "°"), number(turn.by_force_rad * DEG, 1, "°")
-        off = turn.by_force_rad == turn.by_force_rad and abs(turn.by_rate_rad / (turn.by_force_rad or 1.0) - 1.0) > 0.15
+        by_rate, by_force = (
+            number(turn.by_rate_rad * DEG, 1, "°"),
+            number(turn.by_force_rad * DEG, 1, "°"),
+        )
+        off = (
+            turn.by_force_rad == turn.by_force_rad
+            and abs(turn.by_rate_rad / (turn.by_force_rad or 1.0) - 1.0) > 0.15
+        )
         mark = f' <b style="color:{VERMILLION}">≠</b> ' if off else " · "
-        items.append((f"turn about {escape(turn.about)}: gyro · accelerometer", by_rate + mark + by_force))
+        items.append(
+            (f"turn about {escape(turn.about)}: gyro · accelerometer", by_rate + mark + by_force)
+        )
     return rows(items) if items else ""
 
 
@@ -109,20 +137,24 @@ def picture(pose: int, dark: bool) -> str:
         inner = _board(np.eye(3), 170.0, line)
     else:
         arrow = (
-            f'<path d="M152,82 H184 M174,72 L186,82 L174,92" fill="none" stroke="{line}" stroke-width="3" '
-            'stroke-linecap="round"/>'
+            f'<path d="M152,82 H184 M174,72 L186,82 L174,92" fill="none" stroke="{line}"'
+            ' stroke-width="3" stroke-linecap="round"/>'
         )
         inner = (
-            _board(np.eye(3), 78.0, line) + arrow + _board(Rotation.from_rotvec(TURNS[pose]).as_matrix(), 264.0, line)
+            _board(np.eye(3), 78.0, line)
+            + arrow
+            + _board(Rotation.from_rotvec(TURNS[pose]).as_matrix(), 264.0, line)
         )
     return (
-        '<svg class="gf-pose" viewBox="0 0 352 160" width="100%" role="img" aria-label="the board as it should lie" '
-        f'style="display:block;margin:.2em auto;max-width:420px">{inner}</svg>'
+        '<svg class="gf-pose" viewBox="0 0 352 160" width="100%" role="img" aria-label="the board'
+        f' as it should lie" style="display:block;margin:.2em auto;max-width:420px">{inner}</svg>'
     )
 
 
 def _board(R: np.ndarray, middle: float, line: str) -> str:
-    """A flat board with its nose marked, at the horizontal place `middle` of the picture; R turns b into n."""
+    """A flat board with its nose marked, at the horizontal place `middle` of the picture; R turns b
+    into n.
+    """
     camera = CAMERA / np.linalg.norm(CAMERA)
     right = np.cross([0.0, 0.0, -1.0], -camera)
     right /= -np.linalg.norm(right)
@@ -140,7 +172,10 @@ def _board(R: np.ndarray, middle: float, line: str) -> str:
             if float((R @ normal) @ camera) <= 0.02:
                 continue
             a, b = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
-            corners = [screen(R @ (half * (normal + p * a + q * b))) for p, q in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+            corners = [
+                screen(R @ (half * (normal + p * a + q * b)))
+                for p, q in ((1, 1), (1, -1), (-1, -1), (-1, 1))
+            ]
             points = " ".join(f"{u:.1f},{v:.1f}" for u, v in corners)
             shade = {(2, -1.0): rgba(GREEN, 0.85), (2, 1.0): "rgba(128,128,128,.85)"}.get(
                 (axis, sign), rgba(GREEN, 0.5)
@@ -148,7 +183,12 @@ def _board(R: np.ndarray, middle: float, line: str) -> str:
             edge = f'stroke="{line}" stroke-width="1.5" stroke-linejoin="round"'
             parts.append(f'<polygon points="{points}" fill="{shade}" {edge}/>')
     nose = [screen(R @ np.array(p)) for p in ((1.6, 0.0, 0.0), (1.2, 0.28, 0.0), (1.2, -0.28, 0.0))]
-    parts.append(f'<polygon points="{" ".join(f"{u:.1f},{v:.1f}" for u, v in nose)}" fill="{AXES[0]}"/>')
+    parts.append(
+        f'<polygon points="{" ".join(f"{u:.1f},{v:.1f}" for u, v in nose)}" fill="{AXES[0]}"/>'
+    )
     u, v = screen(R @ np.array([1.75, 0.0, 0.0]))
-    parts.append(f'<text x="{u:.0f}" y="{v:.0f}" text-anchor="middle" font-size="12" fill="{line}">nose</text>')
+    parts.append(
+        f'<text x="{u:.0f}" y="{v:.0f}" text-anchor="middle" font-size="12"'
+        f' fill="{line}">nose</text>'
+    )
     return "".join(parts)

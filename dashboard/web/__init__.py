@@ -1,0 +1,1 @@
+"""The front door: pages, API, users, the proxy to the scene."""

@@ -1,0 +1,222 @@
+"""Sign-in: server-side sessions, waiting times for wrong passwords, and the rule who may do what.
+
+The cookie holds a random id only; everything else stays here, so that signing out or removing a
+user takes effect at once. Ids are kept hashed, in memory and in a private file: a restarted
+dashboard still knows who is signed in.
+"""
+
+import asyncio
+import hashlib
+import hmac
+import ipaddress
+import json
+import logging
+import secrets
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+from starlette.requests import HTTPConnection
+
+from dashboard.settings import DashboardSettings
+from dashboard.web.users import (
+    Role,
+    User,
+    UserStore,
+    add_user,
+    issue_link_token,
+    redeem_link_token,
+    write_private,
+)
+
+__all__ = [
+    "Gate",
+    "Role",
+    "Session",
+    "User",
+    "UserStore",
+    "WaitError",
+    "add_user",
+    "issue_link_token",
+]
+
+log = logging.getLogger(__name__)
+
+ADDRESSES = 4096  # addresses whose failures are remembered; the oldest go first
+SESSIONS = 1024  # sign-ins at a time
+PARALLEL = 2  # passwords verified at once: each takes 32 MiB and a core
+
+
+@dataclass
+class Session:
+    """One sign-in; times in s since 1970."""
+
+    user: str
+    csrf: str
+    created: float
+    seen: float
+
+
+class WaitError(Exception):
+    """Too many wrong passwords from this address."""
+
+    def __init__(self, seconds: float) -> None:
+        super().__init__(f"too many wrong passwords from this address: wait {seconds:.0f} s")
+        self.seconds = seconds
+
+
+class Backoff:
+    """Waiting time per address: none for the first failures, then 1, 2, 4 ... s up to a limit."""
+
+    def __init__(self, free: int, longest_s: float, clock: Callable[[], float]) -> None:
+        self._free, self._longest, self._clock = free, longest_s, clock
+        self._failures: dict[
+            str, tuple[int, float]
+        ] = {}  # network -> failures, time of the next attempt
+
+    @staticmethod
+    def network(address: str) -> str:
+        """An IPv6 host owns a /64: count that as one address."""
+        try:
+            parsed = ipaddress.ip_address(address)
+        except ValueError:
+            return address
+        return (
+            str(ipaddress.ip_network((parsed, 64), strict=False))
+            if parsed.version == 6
+            else address
+        )
+
+    def attempt(self, address: str) -> None:
+        """Count an attempt as failed before it is verified, so that parallel ones gain nothing;
+        raises WaitError.
+        """
+        key, now = self.network(address), self._clock()
+        count, allowed = self._failures.pop(key, (0, 0.0))
+        if now > allowed + self._longest:
+            count = 0
+        if now < allowed:
+            self._failures[key] = (count, allowed)
+            raise WaitError(allowed - now)
+        over = count + 1 - self._free
+        wait = min(2.0 ** min(over, 30), self._longest) if over >= 0 else 0.0
+        self._failures[key] = (count + 1, now + wait)
+        while len(self._failures) > ADDRESSES:
+            self._failures.pop(next(iter(self._failures)))
+
+    def forgive(self, address: str) -> None:
+        """The password was right after all."""
+        self._failures.pop(self.network(address), None)
+
+
+class Gate:
+    """All of sign-in behind four verbs: sign_in, redeem, session_of, sign_out."""
+
+    def __init__(
+        self, settings: DashboardSettings, users: UserStore, clock: Callable[[], float] = time.time
+    ) -> None:
+        self.settings, self.users, self._clock = settings, users, clock
+        self.backoff = Backoff(settings.free_attempts, settings.longest_wait_s, clock)
+        self._file = settings.users.with_name(settings.users.name + ".signed-in")
+        self._lock = threading.Lock()
+        self._sessions: dict[str, Session] = self._load()
+        self._verifying = asyncio.Semaphore(PARALLEL)
+
+    async def sign_in(self, name: str, password: str, address: str) -> str | None:
+        """A new session id, or None for a wrong name or password; raises WaitError and
+        UsersError.
+        """
+        self.backoff.attempt(address)
+        async with self._verifying:
+            user = await asyncio.to_thread(self.users.verify, name, password)
+        if user is None:
+            log.warning("sign-in refused for %r from %s", name[:64], address)
+            return None
+        self.backoff.forgive(address)
+        return self._begin(user.name, address, "password")
+
+    def redeem(self, token: str, address: str) -> str | None:
+        """A new session id for a one-time link, or None when it is used, expired or unknown; raises
+        WaitError.
+        """
+        self.backoff.attempt(address)
+        name = redeem_link_token(self.settings.users, token, self._clock())
+        if name is None or self.users.get(name) is None:
+            log.warning("sign-in link refused from %s: used, expired or unknown", address)
+            return None
+        self.backoff.forgive(address)
+        return self._begin(name, address, "one-time link")
+
+    def session_of(self, connection: HTTPConnection) -> tuple[Session, User] | None:
+        """Who sends this request or opens this WebSocket; None for nobody."""
+        token = connection.cookies.get(self.settings.cookie, "")
+        return self.look_up(_digest(token)) if token else None
+
+    def key_of(self, connection: HTTPConnection) -> str:
+        """What look_up takes: the hash of the cookie's id."""
+        return _digest(connection.cookies.get(self.settings.cookie, ""))
+
+    def look_up(self, key: str) -> tuple[Session, User] | None:
+        """The session and the user as the users file has him now; ends what is expired."""
+        session, now = self._sessions.get(key), self._clock()
+        if session is None:
+            return None
+        old = now - session.created > self.settings.session_hours * 3600
+        idle = now - session.seen > self.settings.idle_hours * 3600
+        user = self.users.get(session.user)
+        if (
+            old or idle or user is None or user.created > session.created + 1
+        ):  # a new password ends old sign-ins
+            self._end(key)
+            return None
+        session.seen = now
+        return session, user
+
+    def sign_out(self, connection: HTTPConnection) -> None:
+        """Forget the session of this request."""
+        self._end(self.key_of(connection))
+
+    def _begin(self, name: str, address: str, means: str) -> str:
+        token, now = secrets.token_urlsafe(32), self._clock()
+        with self._lock:
+            self._sessions[_digest(token)] = Session(name, secrets.token_urlsafe(24), now, now)
+            while len(self._sessions) > SESSIONS:
+                self._sessions.pop(next(iter(self._sessions)))
+            self._save()
+        log.info("%s signed in from %s by %s", name, address, means)
+        return token
+
+    def _end(self, key: str) -> None:
+        with self._lock:
+            if self._sessions.pop(key, None) is not None:
+                self._save()
+
+    def _load(self) -> dict[str, Session]:
+        try:
+            return {
+                key: Session(**entry) for key, entry in json.loads(self._file.read_text()).items()
+            }
+        except FileNotFoundError:
+            return {}
+        except (OSError, ValueError, TypeError, AttributeError) as error:
+            log.warning("%s: %s: everybody has to sign in again", self._file, error)
+            return {}
+
+    def _save(self) -> None:
+        try:
+            write_private(
+                self._file,
+                json.dumps({key: asdict(session) for key, session in self._sessions.items()}),
+            )
+        except OSError as error:
+            log.warning("%s: %s: a restart will sign everybody out", self._file, error.strerror)
+
+
+def _digest(token: str) -> str:
+    return hashlib.sha256(token.encode()).hexdigest()
+
+
+def same_token(given: str, wanted: str) -> bool:
+    """Compare two tokens in constant time."""
+    return hmac.compare_digest(given.encode(), wanted.encode())

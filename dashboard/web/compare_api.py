@@ -1,0 +1,128 @@
+"""REST and page for sessions over one another: rates, errors, angles, tracks on one axis of
+time.
+"""
+
+import math
+from typing import Annotated, Any
+
+from fastapi import APIRouter, HTTPException, Query, Request
+from fastapi.responses import HTMLResponse, JSONResponse, Response
+
+from dashboard.web import api
+from dashboard.web.api import SignedIn, file_of
+from dashboard.web.front import Front, front_of
+from dashboard.web.pages import render
+from sessions.library.annotations import read_annotations
+from sessions.library.compare import METHODS, MOST, CompareError, Comparison, as_dict, compare
+from sessions.library.overlay import POINTS, drawing
+from sessions.recording.manifest import SessionError
+
+routes = APIRouter()
+Ids = Annotated[
+    str, Query(max_length=400, description="ids of one to four sessions, separated by commas")
+]
+Offsets = Annotated[
+    str, Query(max_length=400, description="offsets by hand, as ID:seconds, separated by commas")
+]
+
+
+@routes.get("/compare", include_in_schema=False)
+def compare_page(request: Request, who: SignedIn, ids: Ids = "") -> HTMLResponse:
+    front = front_of(request)
+    chosen = _ids(ids)
+    if not chosen:
+        raise HTTPException(422, "choose two to four sessions in the list of sessions")
+    rows = [api.session_out(api.find_session(front, session)) for session in chosen]
+    return render(request, "compare.html", who, rows=rows, methods=METHODS)
+
+
+@routes.get(
+    "/api/compare", summary="Up to four sessions aligned, their differences, and lines to draw"
+)
+def comparison(
+    request: Request,
+    who: SignedIn,
+    ids: Ids,
+    align: Annotated[str, Query(max_length=10)] = "auto",
+    offsets: Offsets = "",
+    estimator: Annotated[str, Query(max_length=32)] = "",
+    begin: Annotated[
+        float | None, Query(description="of the window, s on the first session's time")
+    ] = None,
+    end: float | None = None,
+    points: Annotated[int, Query(ge=100, le=2000, description="per line")] = POINTS,
+    everything: Annotated[
+        bool, Query(description="all estimators, not the leading ones only")
+    ] = False,
+) -> Response:
+    """202 with the share done while a recording is still being read; 409 for sessions that cannot
+    be compared.
+    """
+    front = front_of(request)
+    chosen = _ids(ids)
+    curves, done = [], []
+    for session in chosen:
+        try:
+            found, reading = front.readings.get(file_of(front, session))
+        except OSError as error:
+            raise HTTPException(409, f"session {session}: {error.strerror}") from None
+        if reading is not None and reading.fault:
+            raise HTTPException(409, f"session {session} cannot be drawn: {reading.fault}")
+        if reading is not None:
+            done.append(reading.done)
+        curves.append(found)
+    share = min(done, default=1.0)
+    ready = [one for one in curves if one is not None]
+    if len(ready) < len(chosen):
+        return JSONResponse({"state": "reading", "done": share}, 202)
+    try:
+        result = compare(ready, align, _offsets(offsets), estimator)
+    except CompareError as error:
+        raise HTTPException(409, str(error)) from None
+    window = [value if value is None or math.isfinite(value) else None for value in (begin, end)]
+    drawn = drawing(result, window[0], window[1], points, everything)
+    _add_notes(front, result, drawn)
+    facts = as_dict(result)
+    table = {name: facts[name] for name in ("bin_s", "differences", "track_differences")}
+    errors = [one["errors"] for one in facts["sessions"]]
+    return JSONResponse(
+        {"state": "reading" if done else "done", "done": share, "errors": errors} | table | drawn
+    )
+
+
+def _ids(text: str) -> list[str]:
+    chosen = [part.strip() for part in text.split(",") if part.strip()]
+    if len(chosen) > MOST:
+        raise HTTPException(
+            422, f"{len(chosen)} sessions: at most {MOST} are drawn over one another"
+        )
+    if len(set(chosen)) < len(chosen):
+        raise HTTPException(422, "the same session twice")
+    return chosen
+
+
+def _offsets(text: str) -> dict[str, float]:
+    found = {}
+    for part in filter(None, text.split(",")):
+        session, _, seconds = part.rpartition(":")
+        try:
+            found[session] = float(seconds)
+        except ValueError:
+            found[session] = math.nan
+        if not session or not math.isfinite(found[session]):
+            raise HTTPException(422, f"offset {part[:60]!r}: want ID:seconds")
+    return found
+
+
+def _add_notes(front: Front, result: Comparison, drawn: dict[str, Any]) -> None:
+    """Remarks that were added later stand beside the recorded ones."""
+    for one, out in zip(result.sessions, drawn["sessions"], strict=True):
+        try:
+            notes = read_annotations(front.catalogue.root / one.curves.session).notes
+        except SessionError:
+            continue
+        out["marks"] += [
+            {"t": note.at_s + one.offset_s, "text": note.text, "author": note.author}
+            for note in notes
+            if note.at_s is not None
+        ]

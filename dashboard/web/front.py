@@ -1,0 +1,97 @@
+"""What the pages and the REST interface share: the services behind them, and who is asking."""
+
+import logging
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field
+
+from fastapi import HTTPException, Request
+
+from dashboard.settings import DashboardSettings
+from dashboard.web.auth import Gate, Role, Session, User, same_token
+from dashboard.web.control import BusWatch, RecorderControl, Replay
+from dashboard.web.jobs import Jobs
+from dashboard.web.readings import Readings
+from dashboard.web.uploads import Uploads
+from sessions.library.catalogue import Catalogue
+
+audit = logging.getLogger("dashboard.audit")
+
+
+@dataclass
+class Front:
+    """Everything the web side talks to. Without bus (watch, recorder) or replay the pages say that
+    it is not there.
+    """
+
+    settings: DashboardSettings
+    gate: Gate
+    catalogue: Catalogue
+    scene_port: Callable[[], int]
+    watch: BusWatch | None = None
+    recorder: RecorderControl | None = None
+    replay: Replay | None = None
+    jobs: Jobs | None = None
+    readings: Readings = field(default_factory=Readings)
+    uploads: Uploads = field(default_factory=Uploads)
+    open_widgets: Callable[[], Collection[str]] = field(default=lambda: ())
+
+
+@dataclass(frozen=True)
+class Asker:
+    """The signed-in user of a request."""
+
+    session: Session
+    user: User
+
+    @property
+    def name(self) -> str:
+        return self.user.name
+
+    @property
+    def role(self) -> Role:
+        return self.user.role
+
+
+def front_of(request: Request) -> Front:
+    """The Front of the application this request came to."""
+    return request.app.state.front
+
+
+def address_of(request: Request) -> str:
+    """Address of the client, for waiting times and the log."""
+    return request.client.host if request.client else "unknown"
+
+
+def asker(request: Request) -> Asker:
+    """Who asks; HTTP 401 for nobody."""
+    found = front_of(request).gate.session_of(request)
+    if found is None:
+        raise HTTPException(401, "sign in first")
+    return Asker(*found)
+
+
+def needs(role: Role) -> Callable[[Request], Asker]:
+    """A dependency for orders by REST: that role at least, and the session's token in
+    X-CSRF-Token.
+    """
+
+    def check(request: Request) -> Asker:
+        who = asker(request)
+        if not same_token(request.headers.get("x-csrf-token", ""), who.session.csrf):
+            raise HTTPException(
+                403,
+                "the header X-CSRF-Token is missing or is not this session's; GET /api/me has it",
+            )
+        check_role(who, role, request)
+        return who
+
+    return check
+
+
+def check_role(who: Asker, role: Role, request: Request) -> None:
+    """HTTP 403 unless this user has the role; both outcomes stand in the audit log."""
+    act = f"{request.method} {request.url.path}"
+    if who.role < role:
+        audit.warning("%s (%s) refused: %s", who.name, who.role.name, act)
+        raise HTTPException(403, f"{who.name} is {who.role.name}; this takes {role.name}")
+    audit.info("%s (%s): %s", who.name, who.role.name, act)

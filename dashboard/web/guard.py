@@ -1,0 +1,194 @@
+"""What every request passes before any other code of ours: host, origin, body limits; and headers
+on every answer.
+
+One ASGI layer around the whole application, HTTP and WebSocket alike.
+"""
+
+import asyncio
+import ipaddress
+import json
+from collections.abc import Iterator
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from dashboard.settings import DashboardSettings
+
+SAFE_METHODS = {"GET", "HEAD", "OPTIONS"}
+PAGE_CSP = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src"
+    " 'self'; frame-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
+)
+
+
+class Refused(Exception):
+    """This request goes no further."""
+
+    def __init__(self, status: int, text: str) -> None:
+        super().__init__(text)
+        self.status, self.text = status, text
+
+
+def host_name(host: str) -> str:
+    """The name or address in a Host header, without port and brackets; raises ValueError for what
+    is none.
+    """
+    parts = urlsplit(f"//{host}")
+    if (
+        not parts.hostname
+        or parts.netloc != host
+        or "@" in host
+        or "/" in host
+        or "?" in host
+        or "#" in host
+    ):
+        raise ValueError(f"{host!r} is no host")
+    parts.port  # noqa: B018 - raises ValueError for a port that is no number
+    return parts.hostname.lower()
+
+
+def same_origin(origin: str, host: str, secure: bool) -> bool:
+    """True when a browser's Origin is this server as the browser sees it (host: the Host
+    header).
+    """
+    try:
+        parts = urlsplit(origin)
+    except ValueError:
+        return False
+    schemes = {"https"} if secure else {"http", "https"}  # https too: TLS may end in front of us
+    return parts.scheme in schemes and parts.netloc.lower() == host.lower() != ""
+
+
+class Guard:
+    """The layer. Bodies are read here as a whole, so that a chunked one cannot pass the limit
+    either.
+    """
+
+    def __init__(self, app: ASGIApp, settings: DashboardSettings) -> None:
+        self._app, self._settings = app, settings
+        self._hosts = {"localhost", *settings.allowed_hosts}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        with_headers = self._add_headers(send)
+        try:
+            self._check(scope)
+            if scope["type"] == "http":
+                receive = replay_body(await self._body(scope, receive), receive)
+        except Refused as refused:
+            await refuse(scope, with_headers if scope["type"] == "http" else send, refused)
+            return
+        await self._app(scope, receive, with_headers if scope["type"] == "http" else send)
+
+    def _check(self, scope: Scope) -> None:
+        headers = Headers(scope=scope)
+        host = headers.get("host", "")
+        try:
+            name = host_name(host)
+        except ValueError:
+            raise Refused(400, "the Host header is missing or is no host name") from None
+        if name not in self._hosts and not _is_address(
+            name
+        ):  # a rebound DNS name is never a bare address
+            raise Refused(
+                400, f"host {name[:100]!r} is not served here: add it to [dashboard] allowed_hosts"
+            )
+        origin = headers.get("origin")
+        if scope["type"] == "websocket":
+            if origin is None or not same_origin(origin, host, self._settings.secure_cookies):
+                raise Refused(403, "WebSocket from another site refused")
+        elif scope["method"] not in SAFE_METHODS:
+            foreign = headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none")
+            if foreign or (
+                origin is not None and not same_origin(origin, host, self._settings.secure_cookies)
+            ):
+                raise Refused(403, "request from another site refused")
+
+    async def _body(self, scope: Scope, receive: Receive) -> bytes:
+        limit = self._settings.body_limit
+        length = Headers(scope=scope).get("content-length", "0")
+        if not length.isdigit() or int(length) > limit:
+            raise Refused(413, f"body larger than {limit} bytes")
+        body = bytearray()
+        try:
+            async with asyncio.timeout(self._settings.body_timeout_s):
+                while True:
+                    message = await receive()
+                    if message["type"] == "http.disconnect":
+                        return bytes(body)
+                    body += message.get("body", b"")
+                    if len(body) > limit:
+                        raise Refused(413, f"body larger than {limit} bytes")
+                    if not message.get("more_body", False):
+                        return bytes(body)
+        except TimeoutError:
+            raise Refused(
+                408, f"body not complete within {self._settings.body_timeout_s:g} s"
+            ) from None
+
+    def _add_headers(self, send: Send) -> Send:
+        async def wrapped(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                for name, value in security_headers(self._settings.secure_cookies):
+                    headers.setdefault(name, value)
+            await send(message)
+
+        return wrapped
+
+
+def security_headers(secure: bool) -> Iterator[tuple[str, str]]:
+    """Headers of every answer that did not set its own."""
+    yield "content-security-policy", PAGE_CSP
+    yield "x-content-type-options", "nosniff"
+    yield "x-frame-options", "DENY"
+    yield (
+        "referrer-policy",
+        "same-origin",
+    )  # not no-referrer: that would make the Origin of our own forms "null"
+    yield "cross-origin-opener-policy", "same-origin"
+    yield "cross-origin-resource-policy", "same-origin"
+    yield "permissions-policy", "camera=(), microphone=(), geolocation=(), payment=(), usb=()"
+    yield "cache-control", "no-store"
+    if secure:
+        yield "strict-transport-security", "max-age=31536000"
+
+
+def replay_body(body: bytes, receive: Receive) -> Receive:
+    """A receive that gives the body again, in one piece, and then waits for the disconnect."""
+    given = False
+
+    async def again() -> Message:
+        nonlocal given
+        if given:
+            return await receive()
+        given = True
+        return {"type": "http.request", "body": body, "more_body": False}
+
+    return again
+
+
+async def refuse(scope: Scope, send: Send, refused: Refused) -> None:
+    """Answer and close: a client that sends too much is not read any further."""
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.close", "code": 1008, "reason": refused.text[:120]})
+        return
+    body = json.dumps({"error": refused.text}).encode()
+    headers = [
+        (b"content-type", b"application/json"),
+        (b"content-length", b"%d" % len(body)),
+        (b"connection", b"close"),
+    ]
+    await send({"type": "http.response.start", "status": refused.status, "headers": headers})
+    await send({"type": "http.response.body", "body": body})
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True

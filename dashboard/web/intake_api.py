@@ -1,0 +1,141 @@
+"""REST for sessions that are made from the page: a log sent in pieces and imported, a session
+estimated again.
+"""
+
+import re
+from typing import Annotated
+
+from fastapi import APIRouter, HTTPException, Query, Request
+from pydantic import BaseModel, Field
+
+from dashboard.web.api import Operator, SignedIn, Strict, file_of
+from dashboard.web.front import Front, front_of
+from dashboard.web.session_api import JobOut, start_job
+from dashboard.web.uploads import Upload
+
+routes = APIRouter(prefix="/api")
+
+FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,80}\.csv", re.IGNORECASE)
+LARGEST = 1 << 30  # bytes of one log
+NAMED = r"^[a-z][a-z0-9_-]{0,31}$"
+ADDED = r"^[a-z0-9][a-z0-9_-]{0,24}$"
+
+
+class UploadOut(BaseModel):
+    upload: int
+    piece_bytes: int = Field(description="largest piece that is taken at once")
+
+
+class PieceOut(BaseModel):
+    bytes: int = Field(description="of this file so far")
+
+
+class ImportOrder(Strict):
+    device: str = Field(default="log", pattern=NAMED)
+    name: str = Field(default="import", pattern=ADDED, description="added to the session's id")
+
+
+class RerunOrder(Strict):
+    estimators: list[str] = Field(
+        default=[], max_length=8, description="rate estimators; none: as configured"
+    )
+    navigators: list[str] = Field(
+        default=[], max_length=8, description="navigation filters; none: as configured"
+    )
+    settings: dict[str, str] = Field(
+        default={}, max_length=20, description="key of [estimator] -> value, as in TOML"
+    )
+    name: str = Field(
+        default="new", pattern=ADDED, description="added to the names of session and estimators"
+    )
+    beside: bool = Field(default=True, description="keep the old estimates beside")
+
+
+@routes.post("/imports", summary="Begin to send a log (operator)")
+def begin_import(request: Request, who: Operator) -> UploadOut:
+    front = front_of(request)
+    return UploadOut(upload=front.uploads.begin(who.name), piece_bytes=front.settings.body_limit)
+
+
+@routes.post(
+    "/imports/{upload}/files/{file}", summary="The next piece of a CSV file, as it is (operator)"
+)
+async def take_piece(
+    request: Request, upload: int, file: str, who: Operator, at: Annotated[int, Query(ge=0)] = 0
+) -> PieceOut:
+    """Pieces come in order: `at` is the number of bytes that went before; HTTP 409 says what is
+    wanted instead.
+    """
+    found = _upload(front_of(request), upload, who.name)
+    if not FILE_NAME.fullmatch(file):
+        raise HTTPException(422, f"file {file[:80]!r}: want a CSV file, like imu.csv")
+    body = await request.body()
+    with found.lock:
+        path = found.folder / file
+        have = path.stat().st_size if path.exists() else 0
+        if at != have:
+            raise HTTPException(
+                409, f"{file}: {have} bytes are here, so the next piece begins there, not at {at}"
+            )
+        if have + len(body) > LARGEST:
+            raise HTTPException(
+                413, f"{file}: larger than {LARGEST >> 20} MB: use `gyrofree import`"
+            )
+        try:
+            with path.open("ab") as stream:
+                stream.write(body)
+        except OSError as error:
+            raise HTTPException(507, f"{file} cannot be kept: {error.strerror}") from None
+        return PieceOut(bytes=have + len(body))
+
+
+@routes.post("/imports/{upload}/finish", summary="Make a session of the files sent (operator)")
+def finish_import(request: Request, upload: int, body: ImportOrder, who: Operator) -> JobOut:
+    front = front_of(request)
+    found = _upload(front, upload, who.name)
+    files = sorted(found.folder.iterdir())
+    if not files:
+        raise HTTPException(409, "no file was sent")
+    fixes = [file for file in files if "gnss" in file.name.lower() or "gps" in file.name.lower()]
+    samples = [file for file in files if file not in fixes]
+    if len(samples) != 1 or len(fixes) > 1:
+        raise HTTPException(
+            409, "want one CSV of samples and, for a drive, one of fixes with gnss in its name"
+        )
+    order = ["import", str(samples[0]), "--device", body.device, "--name", body.name]
+    order += ["--gnss", str(fixes[0])] if fixes else []
+    return start_job(front, "import", samples[0].name, order, who.name, makes="session")
+
+
+def _upload(front: Front, number: int, user: str) -> Upload:
+    found = front.uploads.open.get(number)
+    if found is None or found.user != user:
+        raise HTTPException(404, f"no upload {number}: begin anew")
+    return found
+
+
+class ChoicesOut(BaseModel):
+    rate: list[str]
+    navigators: list[str]
+
+
+@routes.get("/estimators", summary="Names that a session can be estimated again with")
+def choices(request: Request, who: SignedIn) -> ChoicesOut:
+    from inertial.navigation.navigation import (
+        NAVIGATORS,
+    )  # here: compiled code that no page waits for
+    from inertial.rate.estimators import VARIANTS
+
+    return ChoicesOut(rate=sorted(VARIANTS), navigators=sorted(NAVIGATORS))
+
+
+@routes.post("/sessions/{session}/rerun", summary="Estimate it again, as a new session (operator)")
+def rerun(request: Request, session: str, body: RerunOrder, who: Operator) -> JobOut:
+    front = front_of(request)
+    order = ["rerun", str(file_of(front, session)), "--name", body.name]
+    order += ["--estimators", ",".join(body.estimators)] if body.estimators else []
+    order += ["--navigators", ",".join(body.navigators)] if body.navigators else []
+    for key, value in body.settings.items():
+        order += ["--set", f"{key}={value}"]
+    order += [] if body.beside else ["--instead"]
+    return start_job(front, "rerun", session, order, who.name, makes="session")

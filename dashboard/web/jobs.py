@@ -1,0 +1,137 @@
+"""Work that would keep the page waiting (reports, exports) in processes of its own, one at a time,
+lowest priority.
+
+The dashboard's process must stay idle: a busy one gives blank scenes. A job is a command of the
+composition root that writes into a folder; its files are served when it has ended well.
+"""
+
+import itertools
+import shutil
+import subprocess
+import tempfile
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from dashboard.web.control import ControlError
+
+KEPT = 20  # ended jobs; the files of older ones go
+LONGEST_S = 3600.0
+
+
+@dataclass
+class Job:
+    """One piece of work."""
+
+    number: int
+    kind: str  # report, export
+    session: str
+    user: str
+    out: Path  # folder of its files
+    begun: float = field(default_factory=time.monotonic)
+    ended: float | None = None
+    state: str = "waiting"  # waiting, running, done, failed
+    message: str = ""  # why it failed
+    made: str = ""  # id of the session it made
+
+    @property
+    def seconds(self) -> float:
+        """Since it was asked for, s."""
+        return (self.ended or time.monotonic()) - self.begun
+
+    @property
+    def files(self) -> list[Path]:
+        """What it has written."""
+        return (
+            sorted(path for path in self.out.rglob("*") if path.is_file())
+            if self.out.is_dir()
+            else []
+        )
+
+    @property
+    def bytes(self) -> int:
+        """Size of what it has written so far."""
+        return sum(path.stat().st_size for path in self.files)
+
+
+class Jobs:
+    """The queue; `command` stands before a job's own arguments, as [python, -m, gyrofree],
+    `options` behind them.
+    """
+
+    def __init__(self, command: Sequence[str], options: Sequence[str] = ()) -> None:
+        self._options = list(options)
+        self._command = [*(["nice", "-n", "15"] if shutil.which("nice") else []), *command]
+        self._scratch = Path(tempfile.mkdtemp(prefix="gyrofree-jobs-"))
+        self._numbers = itertools.count(1)
+        self._jobs: OrderedDict[int, Job] = OrderedDict()
+        self._lock = threading.Lock()
+        self._turn = threading.Lock()  # one at a time
+        self._process: subprocess.Popen[str] | None = None
+        self._closed = False
+
+    def start(
+        self,
+        kind: str,
+        session: str,
+        arguments: Sequence[str],
+        user: str,
+        accept: tuple[int, ...] = (0,),
+        makes: str = "files",
+    ) -> Job:
+        """Queue `<command> <arguments>`; exit codes in `accept` are well. Raises ControlError.
+
+        One that makes `files` gets `--out <folder>`; one that makes a `session` prints its id.
+        """
+        with self._lock:
+            if sum(job.ended is None for job in self._jobs.values()) >= 8:
+                raise ControlError("eight jobs wait already: try again when some are done")
+            number = next(self._numbers)
+            job = Job(number, kind, session, user, self._scratch / str(number))
+            self._jobs[number] = job
+            while len(self._jobs) > KEPT and next(iter(self._jobs.values())).ended is not None:
+                shutil.rmtree(self._jobs.popitem(last=False)[1].out, ignore_errors=True)
+        work = (job, list(arguments), accept, makes)
+        threading.Thread(target=self._run, args=work, name=f"job {number}", daemon=True).start()
+        return job
+
+    def get(self, number: int) -> Job | None:
+        """A job that is remembered."""
+        return self._jobs.get(number)
+
+    def close(self) -> None:
+        """End what runs and forget all files."""
+        self._closed = True
+        if self._process is not None and self._process.poll() is None:
+            self._process.terminate()
+        shutil.rmtree(self._scratch, ignore_errors=True)
+
+    def _run(self, job: Job, arguments: list[str], accept: tuple[int, ...], makes: str) -> None:
+        with self._turn:
+            if self._closed:
+                return
+            job.state = "running"
+            job.out.mkdir(parents=True, exist_ok=True)
+            try:
+                out = ["--out", str(job.out)] if makes == "files" else []
+                self._process = subprocess.Popen(
+                    [*self._command, *arguments, *out, *self._options],
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.PIPE,
+                    text=True,
+                )
+                printed, said = self._process.communicate(timeout=LONGEST_S)
+                well = self._process.returncode in accept
+                if well and makes == "session":
+                    job.made = (printed.split() or [""])[-1]
+                job.message = (
+                    "" if well else (said.strip().splitlines() or ["it ended without a word"])[-1]
+                )
+            except (OSError, subprocess.TimeoutExpired) as error:
+                well, job.message = False, str(error)
+            job.ended = time.monotonic()
+            job.state = "done" if well else "failed"

@@ -1,0 +1,283 @@
+"""The plain pages: sign-in, the main page around the scene, sessions, users."""
+
+import importlib.metadata
+import logging
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+from urllib.parse import parse_qs
+
+import jinja2
+from fastapi import APIRouter, Depends, HTTPException, Query, Request
+from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
+
+from dashboard.web import api
+from dashboard.web.auth import Role, WaitError, same_token
+from dashboard.web.front import Asker, address_of, asker, check_role, front_of
+from dashboard.web.users import UsersError, add_user, remove_user
+
+log = logging.getLogger(__name__)
+
+routes = APIRouter(include_in_schema=False)
+SignedIn = Annotated[Asker, Depends(asker)]
+
+
+def version() -> str:
+    """Version of the installed package."""
+    try:
+        return importlib.metadata.version("gyrofree")
+    except importlib.metadata.PackageNotFoundError:
+        return "unknown"
+
+
+def _bytes(size: float) -> str:
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000:
+            return f"{size:.0f} {unit}" if unit == "B" or size >= 100 else f"{size:.1f} {unit}"
+        size /= 1000
+    return f"{size:.1f} TB"
+
+
+def _duration(seconds: float) -> str:
+    hours, rest = divmod(int(seconds), 3600)
+    minutes, rest = divmod(rest, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+def _utc(seconds: float) -> str:
+    return (
+        datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:%M:%S")
+        if seconds > 0
+        else "unknown"
+    )
+
+
+_templates = jinja2.Environment(
+    loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+    autoescape=True,
+    undefined=jinja2.StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+)
+_templates.filters |= {"bytes": _bytes, "duration": _duration, "utc": _utc}
+
+
+def render(
+    request: Request, template: str, who: Asker | None, status: int = 200, **values: object
+) -> HTMLResponse:
+    """A page of templates/; every page knows who looks at it and whether this is the demo."""
+    front = front_of(request)
+    common = {
+        "who": who,
+        "Role": Role,
+        "demo": front.settings.demo,
+        "version": version(),
+        "path": request.url.path,
+    }
+    return HTMLResponse(_templates.get_template(template).render(common | values), status)
+
+
+def error_page(request: Request, status: int, text: str) -> HTMLResponse:
+    """What went wrong, as a page."""
+    try:
+        found = front_of(request).gate.session_of(request)
+    except UsersError:
+        found = None
+    who = Asker(*found) if found else None
+    return render(
+        request,
+        "error.html",
+        who,
+        status,
+        title=_TITLES.get(status, "This did not work"),
+        text=text,
+    )
+
+
+_TITLES = {
+    403: "Not allowed",
+    404: "Not found",
+    409: "Not now",
+    422: "Not understood",
+    503: "Not available",
+}
+
+
+async def _form(request: Request) -> dict[str, str]:
+    """Fields of a URL-encoded form, the first of each name; the guard has limited its size."""
+    try:
+        fields = parse_qs(
+            (await request.body()).decode(), keep_blank_values=True, max_num_fields=20
+        )
+    except ValueError:
+        raise HTTPException(422, "this is no form") from None
+    return {name: values[0] for name, values in fields.items()}
+
+
+async def _signed_form(request: Request) -> tuple[Asker, dict[str, str]]:
+    """A form of a signed-in user; HTTP 401 and 403 when it is not."""
+    who, fields = asker(request), await _form(request)
+    if not same_token(fields.get("csrf", ""), who.session.csrf):
+        raise HTTPException(
+            403, "this form is not from the page you are signed in to: load it again"
+        )
+    return who, fields
+
+
+def _enter(request: Request, token: str) -> RedirectResponse:
+    """Set the cookie and go to the main page."""
+    settings = front_of(request).settings
+    answer = RedirectResponse("/", 303)
+    answer.set_cookie(
+        settings.cookie,
+        token,
+        max_age=int(settings.session_hours * 3600),
+        path="/",
+        secure=settings.secure_cookies,
+        httponly=True,
+        samesite="strict",
+    )
+    return answer
+
+
+@routes.get("/")
+def main_page(request: Request, who: SignedIn) -> HTMLResponse:
+    return render(request, "main.html", who)
+
+
+@routes.get("/login")
+def login_page(request: Request) -> Response:
+    front = front_of(request)
+    if front.gate.session_of(request) is not None:
+        return RedirectResponse("/", 303)
+    return render(request, "login.html", None, name="", fault="", empty=not front.gate.users.all())
+
+
+@routes.post("/login")
+async def login(request: Request) -> Response:
+    gate, fields = front_of(request).gate, await _form(request)
+    name, status, headers = fields.get("name", ""), 401, {}
+    try:
+        token = await gate.sign_in(name, fields.get("password", ""), address_of(request))
+        if token is not None:
+            return _enter(request, token)
+        fault = "Name or password is wrong."
+    except WaitError as wait:
+        seconds = max(1, round(wait.seconds))
+        fault, status = f"Too many wrong passwords from here. Try again in {seconds} s.", 429
+        headers = {"retry-after": str(seconds)}
+    page = render(
+        request, "login.html", None, status, name=name[:64], fault=fault, empty=not gate.users.all()
+    )
+    page.headers.update(headers)
+    return page
+
+
+@routes.get("/login/link")
+def link_page(request: Request, token: Annotated[str, Query(max_length=200)] = "") -> Response:
+    """A page with a button that posts: what only looks at a link (mail scanners, prefetch) does not
+    use it up.
+    """
+    if front_of(request).gate.session_of(request) is not None:
+        return RedirectResponse("/", 303)
+    return render(request, "link.html", None, token=token)
+
+
+@routes.post("/login/link")
+async def link(request: Request) -> Response:
+    fields = await _form(request)
+    try:
+        token = front_of(request).gate.redeem(fields.get("token", ""), address_of(request))
+    except WaitError as wait:
+        raise HTTPException(
+            429, str(wait), {"retry-after": str(max(1, round(wait.seconds)))}
+        ) from None
+    if token is None:
+        raise HTTPException(
+            403,
+            "this sign-in link was used already, is too old, or is not complete: ask for a new one",
+        )
+    return _enter(request, token)
+
+
+@routes.post("/logout")
+async def logout(request: Request) -> Response:
+    await _signed_form(request)
+    front = front_of(request)
+    front.gate.sign_out(request)
+    answer = RedirectResponse("/login", 303)
+    answer.delete_cookie(
+        front.settings.cookie,
+        path="/",
+        secure=front.settings.secure_cookies,
+        httponly=True,
+        samesite="strict",
+    )
+    return answer
+
+
+@routes.get("/sessions")
+def sessions_page(
+    request: Request, who: SignedIn, q: Annotated[str, Query(max_length=200)] = ""
+) -> HTMLResponse:
+    front = front_of(request)
+    rows = api.list_sessions(front, q)
+    can_replay = front.replay is not None and who.role >= Role.operator
+    can_import = front.jobs is not None and who.role >= Role.operator
+    return render(
+        request, "sessions.html", who, rows=rows, q=q, can_replay=can_replay, can_import=can_import
+    )
+
+
+@routes.get("/users")
+def users_page(request: Request, who: SignedIn) -> HTMLResponse:
+    check_role(who, Role.admin, request)
+    return _users(request, who)
+
+
+def _users(request: Request, who: Asker, fault: str = "", status: int = 200) -> HTMLResponse:
+    users = sorted(front_of(request).gate.users.all().values(), key=lambda user: user.name)
+    return render(
+        request,
+        "users.html",
+        who,
+        status,
+        users=users,
+        roles=[role.name for role in Role],
+        fault=fault,
+    )
+
+
+@routes.post("/users")
+async def change_users(request: Request) -> Response:
+    """Add a user, change his role and password, or (field `remove`) remove him."""
+    who, fields = await _signed_form(request)
+    check_role(who, Role.admin, request)
+    settings, name = front_of(request).settings, fields.get("name", "")
+    try:
+        if "remove" in fields:
+            if name == who.name:
+                raise UsersError("you cannot remove yourself: another admin can")
+            remove_user(settings.users, name)
+        else:
+            add_user(settings.users, name, fields.get("password", ""), fields.get("role", ""))
+    except UsersError as error:
+        return _users(request, who, str(error), 422)
+    return RedirectResponse("/users", 303)
+
+
+@routes.get("/api/openapi.json")
+def openapi(request: Request, who: SignedIn) -> JSONResponse:
+    return JSONResponse(request.app.openapi())
+
+
+@routes.get("/api/docs")
+def docs(request: Request, who: SignedIn) -> HTMLResponse:
+    """The REST interface as a page, from the same description."""
+    paths = request.app.openapi()["paths"]
+    rows = [
+        (verb.upper(), path, what.get("summary", ""))
+        for path, verbs in paths.items()
+        for verb, what in verbs.items()
+    ]
+    return render(request, "docs.html", who, rows=rows)

@@ -1,0 +1,289 @@
+"""The scene behind sign-in: viser's page, and its WebSocket with the messages each role may send.
+
+viser 1.1 has no login and no roles: any client can drive any widget and can ask the server to open
+a public tunnel. So it listens on the loopback only and every message of a browser is looked at
+here. A message is one msgpack map with its class name under "type" (viser/infra/_messages.py,
+Message.deserialize); there are no batches towards the server.
+"""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Collection
+from pathlib import Path
+from urllib.parse import parse_qsl, urlencode
+
+import msgspec
+import viser
+import websockets
+from fastapi import APIRouter, Request, WebSocket
+from fastapi.responses import HTMLResponse, RedirectResponse, Response
+from starlette.websockets import WebSocketDisconnect
+
+from dashboard.settings import DashboardSettings
+from dashboard.web.auth import Gate, Role
+
+log = logging.getLogger(__name__)
+
+VIEWER_MAY = frozenset(
+    {"ViewerCameraMessage", "FileTransferPartAck"}
+)  # the second only counts a download's progress
+OPERATOR_MAY = VIEWER_MAY | {
+    "GuiUpdateMessage",
+    "GuiButtonHoldMessage",
+    "GuiFormSubmitMessage",
+    "GuiFormDirtyMessage",
+    "CommandTriggerMessage",
+    "ScenePointerMessage",
+    "SceneNodeClickMessage",
+    "SceneNodeDragMessage",
+    "TransformControlsUpdateMessage",
+    "TransformControlsDragStartMessage",
+    "TransformControlsDragEndMessage",
+}
+DROPPED_QUIETLY = frozenset({"GetRenderResponseMessage", "LocalStorageGetItemResponseMessage"})
+FOREIGN_PARAMETERS = {
+    "websocket",
+    "playbackPath",
+}  # they point viser's page at other servers and files
+
+_decode = msgspec.msgpack.Decoder(dict)
+
+# viser's page is one file that unpacks itself: inline script and style, WebAssembly with generated
+# glue code (eval), workers from blobs. What this policy is for: nothing is fetched from and no
+# socket opened to another server.
+SCENE_CSP = (
+    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob:; style-src 'unsafe-inline';"
+    " img-src 'self' data: blob:; font-src data:; worker-src blob:; connect-src data: blob:"
+    " ws://{host} wss://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+)
+
+
+class BadMessage(ValueError):
+    """Bytes from a browser that are no message of viser's."""
+
+
+def message_type(data: bytes) -> tuple[str, dict]:
+    """Class name and fields of a browser's message; raises BadMessage. Nesting is bounded by
+    msgspec.
+    """
+    try:
+        fields = _decode.decode(data)
+    except (
+        msgspec.DecodeError,
+        msgspec.ValidationError,
+        RecursionError,
+        UnicodeDecodeError,
+    ) as error:
+        raise BadMessage(f"{len(data)} bytes are no msgpack map: {error}") from None
+    name = fields.get("type")
+    if not isinstance(name, str):
+        raise BadMessage("a map without a text under 'type'")
+    return name, fields
+
+
+def may_send(role: Role, name: str, fields: dict, open_widgets: Collection[str] = ()) -> bool:
+    """True when this role may send this message.
+
+    A widget update may only carry "value": viser would set any property of the widget, for all
+    browsers. open_widgets are uuids of widgets that change nothing for others (pause of one's own
+    view); viewers may use those.
+    """
+    if name == "GuiUpdateMessage":
+        updates = fields.get("updates")
+        if not isinstance(updates, dict) or set(updates) != {"value"}:
+            return False
+        uuid = fields.get("uuid")
+        return role >= Role.operator or (isinstance(uuid, str) and uuid in open_widgets)
+    return name in (OPERATOR_MAY if role >= Role.operator else VIEWER_MAY)
+
+
+class Rate:
+    """Allows `rate` messages per second with a burst of two seconds' worth."""
+
+    def __init__(self, rate: float) -> None:
+        self._rate, self._level, self._last = rate, 2 * rate, time.monotonic()
+
+    def take(self) -> bool:
+        """False when this message is one too many."""
+        now = time.monotonic()
+        self._level = min(2 * self._rate, self._level + (now - self._last) * self._rate)
+        self._last = now
+        self._level -= 1
+        return self._level >= 0
+
+
+def scene_page() -> tuple[bytes, str]:
+    """viser's page and its version tag; one file, read once."""
+    page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_bytes()
+    return page, viser.__version__
+
+
+def router(
+    settings: DashboardSettings,
+    gate: Gate,
+    scene_port: Callable[[], int],
+    open_widgets: Callable[[], Collection[str]],
+) -> APIRouter:
+    """GET /scene/ and the WebSocket /scene/; scene_port gives viser's port on the loopback."""
+    routes = APIRouter(include_in_schema=False)
+    page, version = scene_page()
+
+    @routes.get("/scene/")
+    def scene(request: Request) -> Response:
+        if gate.session_of(request) is None:
+            return RedirectResponse("/login", 303)
+        query = parse_qsl(request.url.query, keep_blank_values=True)
+        clean = [(key, value) for key, value in query if key not in FOREIGN_PARAMETERS]
+        if clean != query:
+            return RedirectResponse("/scene/" + (f"?{urlencode(clean)}" if clean else ""), 303)
+        headers = {
+            "content-security-policy": SCENE_CSP.format(host=request.headers["host"]),
+            "x-frame-options": "SAMEORIGIN",
+            "cache-control": "private, max-age=3600",
+            "etag": f'"viser-{version}"',
+        }
+        return HTMLResponse(page, headers=headers)
+
+    @routes.websocket("/scene")  # viser's page drops the last slash of its own address
+    @routes.websocket("/scene/")
+    async def scene_socket(socket: WebSocket) -> None:
+        if gate.session_of(socket) is None:
+            await socket.close(1008, "sign in first")
+            return
+        await Relay(settings, gate, socket, open_widgets).run(scene_port())
+
+    return routes
+
+
+class Relay:
+    """One browser's WebSocket joined to viser's.
+
+    Nothing is queued here: a browser that reads slowly makes this side stop reading from viser, and
+    viser then skips to the newest values. One that reads nothing for stall_s is dropped.
+    """
+
+    def __init__(
+        self,
+        settings: DashboardSettings,
+        gate: Gate,
+        socket: WebSocket,
+        open_widgets: Callable[[], Collection[str]],
+    ) -> None:
+        self._settings, self._gate, self._socket, self._open = settings, gate, socket, open_widgets
+        self._key = gate.key_of(socket)
+        self._rate = Rate(settings.message_rate)
+        self._refused: set[str] = set()  # names said already
+        self._who = "nobody"
+
+    async def run(self, port: int) -> None:
+        """Until either side ends."""
+        wanted = self._socket.headers.get("sec-websocket-protocol", "")
+        protocol = next(
+            (name.strip() for name in wanted.split(",") if name.strip().startswith("viser-v")), None
+        )
+        if protocol is None:
+            await self._socket.close(1002, "want the subprotocol viser-v...")
+            return
+        try:
+            scene = await websockets.connect(
+                f"ws://127.0.0.1:{port}/",
+                subprotocols=[websockets.Subprotocol(protocol)],
+                compression=None,
+                max_size=None,  # what viser sends is ours
+                max_queue=2,  # so that a slow browser is felt by viser
+                ping_interval=None,
+                proxy=None,
+            )
+        except (OSError, websockets.WebSocketException) as error:
+            log.error("scene at 127.0.0.1:%d does not answer: %s", port, error)
+            await self._socket.close(1013, "the scene does not answer; try again")
+            return
+        async with scene:
+            await self._socket.accept(protocol)
+            await self._join(scene)
+
+    async def _join(self, scene: websockets.ClientConnection) -> None:
+        tasks = [
+            asyncio.create_task(self._to_browser(scene)),
+            asyncio.create_task(self._to_scene(scene)),
+            asyncio.create_task(self._watch()),
+        ]
+        done, pending = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in pending:
+            task.cancel()
+        await asyncio.gather(*pending, return_exceptions=True)
+        code, reason = 1011, "the scene ended"
+        for task in done:
+            error = task.exception()
+            if error is None:
+                code, reason = task.result()
+            elif not isinstance(
+                error, websockets.ConnectionClosed | WebSocketDisconnect | RuntimeError
+            ):
+                log.error("scene of %s: %s: %s", self._who, type(error).__name__, error)
+        try:
+            async with asyncio.timeout(1.0):
+                await self._socket.close(code, reason)
+        except (RuntimeError, TimeoutError, WebSocketDisconnect):
+            pass  # it is closed already, or takes nothing any more
+
+    async def _to_browser(self, scene: websockets.ClientConnection) -> tuple[int, str]:
+        async for message in scene:
+            try:
+                async with asyncio.timeout(self._settings.stall_s):
+                    await self._socket.send_bytes(
+                        message if isinstance(message, bytes) else message.encode()
+                    )
+            except TimeoutError:
+                log.warning(
+                    "browser of %s took nothing for %g s: dropped",
+                    self._who,
+                    self._settings.stall_s,
+                )
+                return 1013, "this browser is too slow"
+        return 1012, "the scene restarts"
+
+    async def _to_scene(self, scene: websockets.ClientConnection) -> tuple[int, str]:
+        while True:
+            message = await self._socket.receive()
+            if message["type"] == "websocket.disconnect":
+                return 1000, ""
+            data = message.get("bytes")
+            if data is None or len(data) > self._settings.message_limit:
+                return 1009, f"want binary messages of at most {self._settings.message_limit} bytes"
+            found = self._gate.look_up(self._key)
+            if found is None:
+                return 1008, "signed out"
+            if not self._rate.take():
+                log.warning(
+                    "browser of %s sends more than %g messages/s: dropped",
+                    self._who,
+                    self._settings.message_rate,
+                )
+                return 1008, "too many messages"
+            self._who, role = found[1].name, found[1].role
+            try:
+                name, fields = message_type(data)
+            except BadMessage as error:
+                log.warning("browser of %s: %s", self._who, error)
+                return 1007, "not a message of viser's"
+            if may_send(role, name, fields, self._open()):
+                await scene.send(data)
+            else:
+                self._note(role, name)
+
+    def _note(self, role: Role, name: str) -> None:
+        """Say each refused kind once per connection: a browser may repeat it at any rate."""
+        if name not in self._refused and name not in DROPPED_QUIETLY and len(self._refused) < 20:
+            self._refused.add(name)
+            log.warning("refused %r of %s (%s) to the scene", name[:64], self._who, role.name)
+
+    async def _watch(self) -> tuple[int, str]:
+        """Ends the connection of a browser that was signed out, also when it sends nothing."""
+        while True:
+            found = self._gate.look_up(self._key)
+            if found is None:
+                return 1008, "signed out"
+            self._who = found[1].name
+            await asyncio.sleep(2.0)

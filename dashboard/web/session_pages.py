@@ -1,0 +1,127 @@
+"""Pages of one recorded session, and of one device over its sessions."""
+
+import json
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse
+
+from dashboard.web import api
+from dashboard.web.auth import Role
+from dashboard.web.front import Front, front_of
+from dashboard.web.pages import SignedIn, render
+from dashboard.web.session_api import REPORT_FOLDER, find_session
+from dashboard.web.trend import Point, Trend, draw
+from sessions.export.export import FORMATS
+from sessions.library.annotations import Annotations, read_annotations
+from sessions.recording.manifest import Manifest, SessionError
+
+routes = APIRouter(include_in_schema=False)
+
+TRENDS = (
+    ("accel_bias_x_mg", "equivalent bias x, mg"),
+    ("accel_bias_y_mg", "equivalent bias y, mg"),
+    ("accel_bias_z_mg", "equivalent bias z, mg"),
+    ("scale_factor_error_ppm", "scale factor error, ppm"),
+    ("rate_rms_z_dps", "RMS of ω_z, deg/s"),
+    ("angle_error_deg", "angle error at the end, deg"),
+)
+
+
+@dataclass(frozen=True)
+class Completeness:
+    """One topic's line of the certificate."""
+
+    topic: str
+    expected: int
+    received: int
+    repaired: int
+    lost: int
+
+
+@routes.get("/sessions/{session}")
+def session_page(request: Request, session: str, who: SignedIn) -> HTMLResponse:
+    front = front_of(request)
+    info = find_session(front, session)
+    now = api.recording_out(front)
+    row = api.session_out(info, now.session if now.recording else "")
+    manifest = _manifest(front, session)
+    report = _report(front, session)
+    return render(
+        request,
+        "session.html",
+        who,
+        row=row,
+        manifest=manifest,
+        annotations=_annotations(front, session),
+        report=report,
+        completeness=_completeness(manifest),
+        formats=list(FORMATS),
+        can_replay=front.replay is not None and who.role >= Role.operator,
+        can_change=who.role >= Role.operator,
+        can_delete=who.role >= Role.admin,
+    )
+
+
+@routes.get("/trend")
+def trend_page(
+    request: Request, who: SignedIn, device: Annotated[str, Query(max_length=64)] = ""
+) -> HTMLResponse:
+    front = front_of(request)
+    reports = [
+        (row, report)
+        for row in api.list_sessions(front)
+        if (report := _report(front, row.id)) is not None
+    ]
+    devices = sorted({report["device"] for _, report in reports})
+    device = device if device in devices else (devices[0] if devices else "")
+    mine = sorted((r for r in reports if r[1]["device"] == device), key=lambda r: r[0].start_s)
+    trends = []
+    for name, label in TRENDS:
+        points = [
+            Point(row.id, row.start_s, value)
+            for row, report in mine
+            if (value := report.get("figures", {}).get(name)) is not None
+        ]
+        if points:
+            trends.append(Trend(label, points, draw(points)))
+    return render(
+        request, "trend.html", who, device=device, devices=devices, trends=trends, reports=len(mine)
+    )
+
+
+def _manifest(front: Front, session: str) -> Manifest | None:
+    try:
+        return front.catalogue.manifest(session)
+    except SessionError:
+        return None
+
+
+def _annotations(front: Front, session: str) -> Annotations:
+    try:
+        return read_annotations(front.catalogue.root / session)
+    except SessionError:
+        return Annotations()
+
+
+def _report(front: Front, session: str) -> dict | None:
+    """The session's report as data; None when there is none, or none that can be read."""
+    try:
+        found = json.loads(
+            (front.catalogue.root / session / REPORT_FOLDER / "report.json").read_text(
+                encoding="utf-8"
+            )
+        )
+    except (OSError, ValueError):
+        return None
+    return found if isinstance(found, dict) and "device" in found else None
+
+
+def _completeness(manifest: Manifest | None) -> list[Completeness]:
+    rows = []
+    for key, count in sorted(manifest.keys.items() if manifest else ()):
+        received = count.messages - count.repeated
+        name = "/".join(key.split("/")[1:])
+        rows.append(Completeness(name, count.expected, received, count.repaired, count.lost))
+    return rows

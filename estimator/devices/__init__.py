@@ -1,0 +1,1 @@
+"""All estimators of one device, side by side on the same samples."""

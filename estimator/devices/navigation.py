@@ -1,0 +1,114 @@
+"""All navigation filters of one six-axis board, side by side on the same samples and fixes."""
+
+import logging
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.stream import Stream, every, worth_a_line
+from inertial.navigation.fix import Fix
+from inertial.navigation.mute import Mute, Mutes, order_for
+from inertial.navigation.navigation import NAVIGATORS, Correction, NavigatorConfig, Solution
+
+log = logging.getLogger(__name__)
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class NavOutput:
+    """What one filter has to say after the sample of this index."""
+
+    row: int  # of the batch
+    index: int
+    estimator: str
+    what: Solution | Correction
+
+
+class NavBoard:
+    """Feeds batches and fixes to every filter; starts them anew after a reboot."""
+
+    def __init__(
+        self, device: str, config: NavigatorConfig, names: list[str], limit_hz: float
+    ) -> None:
+        """Names are keys of NAVIGATORS."""
+        self.device = device
+        self.stream = Stream()
+        self.navigators: dict[str, Any] = {}
+        self.config, self._names = (
+            config,
+            names,
+        )  # no closures: a process that goes on after a crash pickles this
+        self._limit = limit_hz
+        self.mutes = Mutes()
+        self._newest = -math.inf  # s, time of the newest sample or fix
+        self._epoch = 0
+
+    def make(self, name: str) -> Any:
+        """A new navigator of one of the names."""
+        return NAVIGATORS[name](self.config)
+
+    def feed(
+        self, epoch: int, first_index: int, period_s: float, t_s: Array, f_b: Array, omega_b: Array
+    ) -> list[NavOutput]:
+        """Step through a batch: times (n,) in s of the board's clock, force and rate (n, 3) in
+        m/s^2 and rad/s.
+        """
+        admission = self.stream.admit(epoch, first_index, len(t_s))
+        if admission.restart or not self.navigators:
+            if admission.reason:
+                log.warning("%s: %s: navigation starts anew", self.device, admission.reason)
+            self.navigators = {name: self.make(name) for name in self._names}
+        elif admission.missing and worth_a_line(self.stream.gaps):
+            log.warning(
+                "%s: %d samples missing before %d (gap %d)",
+                self.device,
+                admission.missing,
+                first_index,
+                self.stream.gaps,
+            )
+        step = every(period_s, self._limit)
+        self._newest = float(t_s[-1]) if epoch != self._epoch else max(self._newest, float(t_s[-1]))
+        self._epoch = epoch
+        out = []
+        for row in range(len(t_s)):
+            index = first_index + row
+            for name, navigator in self.navigators.items():
+                for correction in navigator.imu(float(t_s[row]), f_b[row], omega_b[row]):
+                    if (
+                        correction.reason
+                        and not correction.fix.withheld
+                        and not correction.accepted
+                    ):
+                        log.info("%s: %s: fix refused: %s", self.device, name, correction.reason)
+                    out.append(NavOutput(row, index, name, correction))
+                if index % step == step - 1:
+                    out.append(NavOutput(row, index, name, navigator.solution()))
+        return out
+
+    def fix(self, fix: Fix) -> None:
+        """Hand a fix to every filter; one that comes before the first sample has nothing to
+        correct.
+        """
+        self._newest = max(self._newest, fix.t)
+        if self.muted(fix.t):
+            fix = replace(fix, withheld=True, muted=True)
+        for navigator in self.navigators.values():
+            navigator.fix(fix)
+
+    def muted(self, t: float) -> bool:
+        """Whether fixes of time t, s, are held back."""
+        return self.mutes.held(self._epoch, t)
+
+    def mute(self, seconds: float) -> Mute:
+        """Hold the fixes of the next seconds back, to see how the filters do without; 0 ends it.
+        Gives the order.
+
+        The filters are still scored on them. Raises ValueError for a length that makes no sense.
+        """
+        order = order_for(seconds, self._epoch, self._newest)
+        self.mutes.add(order)
+        return order

@@ -1,0 +1,187 @@
+"""All gyro-free rate estimators of one accelerometer board, side by side on the same samples."""
+
+import logging
+import time
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.stream import Stream, every, worth_a_line
+from inertial.layouts.layout import GeometryError
+from inertial.rate.beliefs import Beliefs, make
+
+log = logging.getLogger(__name__)
+
+Array = NDArray[np.float64]
+
+
+class WrongAxes(ValueError):
+    """Batches that the layout of their device does not describe."""
+
+
+class RateOutput(NamedTuple):
+    """State of one estimator after the sample of this index."""
+
+    row: int  # of the batch
+    index: int
+    estimator: str
+    state: Any  # inertial.rate.RateState
+
+
+class RateBoard:
+    """Feeds batches to every estimator; tells them of gaps, starts them anew after a reboot."""
+
+    def __init__(
+        self,
+        device: str,
+        layout: Any,
+        names: list[str],
+        rate_limit_hz: float,
+        card: Any | None = None,
+        beliefs: Beliefs = Beliefs(),
+    ) -> None:
+        """Names are keys of inertial.rate.estimators.VARIANTS; card: calibration card of the
+        device, or None.
+
+        Raises CardError for the card of another layout.
+        """
+        from inertial.rate.estimators import VARIANTS  # here: loads only where accelerometers are
+
+        self.device = device
+        self.card, self._beliefs = card, beliefs
+        self.wiring = layout  # which column of the board is which axis
+        self.layout = layout if card is None else card.layout(layout)
+        self.stream = Stream()
+        self.last: dict[str, Any] = {}  # newest RateState by estimator
+        self._make = {name: VARIANTS[name] for name in names}
+        self.cost_ns = dict.fromkeys(names, 0)  # spent in each estimator, and for how many samples
+        self.cost_samples = dict.fromkeys(names, 0)
+        self._limit = rate_limit_hz
+        self._estimators: dict[str, Any] = {}
+        self._last_t: float | None = None
+        self._period_s = 0.01
+        self.health: Any = None  # inertial.rate.health.HealthMonitor
+        self._mask = 0  # axes that the estimators were told to leave out
+
+    def _start(self, reason: str) -> None:
+        from inertial.rate.health import HealthMonitor  # here: it compiles
+
+        if reason:
+            log.warning("%s: %s: rate estimators start anew", self.device, reason)
+        self._estimators = {
+            name: make(kind, self.layout, self.card, self._beliefs)
+            for name, kind in self._make.items()
+        }
+        self.health, self._mask = HealthMonitor(self.layout, self._period_s), 0
+
+    def feed(
+        self,
+        epoch: int,
+        first_index: int,
+        period_s: float,
+        t_s: Array,
+        f_axis: Array,
+        stale: int = 0,
+    ) -> list[RateOutput]:
+        """Step through a batch: times (n,) in s of the board's clock, its columns (n, columns) in
+        m/s^2.
+
+        Bit k of `stale`: column k was not fresh. Raises WrongAxes.
+        """
+        axes = self.wiring.columns
+        if f_axis.shape[1] != axes:
+            raise WrongAxes(
+                f"{self.device}: batches of {f_axis.shape[1]} axes, layout {self.layout.name} has"
+                f" {axes}: name the right one in [estimator] layouts"
+            )
+        f_axis = self.wiring.read(f_axis)
+        stale = (
+            sum((stale >> column & 1) << k for k, column in enumerate(self.wiring.channels))
+            if stale
+            else 0
+        )
+        if self.card is not None:
+            f_axis = self.card.correct(f_axis)
+        self._period_s = period_s
+        admission = self.stream.admit(epoch, first_index, len(t_s))
+        if admission.restart or not self._estimators:
+            self._start(admission.reason)
+            self._last_t = None
+        elif admission.missing:
+            if worth_a_line(self.stream.gaps):
+                log.warning(
+                    "%s: %d samples missing before %d (gap %d)",
+                    self.device,
+                    admission.missing,
+                    first_index,
+                    self.stream.gaps,
+                )
+            for estimator in self._estimators.values():
+                estimator.skip(admission.missing)
+            self.health.skip(admission.missing)
+        if self._last_t is not None and not t_s[0] > self._last_t:
+            self._start(f"board clock went from {self._last_t:.6f} s to {t_s[0]:.6f} s")
+        self._last_t = float(t_s[-1])
+        f_axis = np.ascontiguousarray(f_axis, dtype=np.float64)
+        out, begin = [], 0
+        for end, mask in self.health.feed(t_s, f_axis, stale):
+            self._exclude(mask)
+            out += self._run(
+                first_index, begin, t_s[begin:end], f_axis[begin:end], every(period_s, self._limit)
+            )
+            begin = end
+        return out
+
+    def _run(
+        self, first_index: int, begin: int, t_s: Array, f_axis: Array, step: int
+    ) -> list[RateOutput]:
+        """Every estimator over one part of a batch; outputs sample by sample, as if fed so."""
+        n, first = len(t_s), first_index + begin
+        wanted = list(range((step - 1 - first) % step, n, step))
+        asked = (
+            wanted if wanted and wanted[-1] == n - 1 else [*wanted, n - 1]
+        )  # the newest state is always known
+        by_name = []
+        for name, estimator in self._estimators.items():
+            began = time.perf_counter_ns()  # told by EstimatorStatus, touches no estimate
+            states = estimator.feed(t_s, f_axis, asked)
+            self.last[name] = states[-1]
+            self.cost_ns[name] += time.perf_counter_ns() - began
+            self.cost_samples[name] += n
+            by_name.append((name, states))
+        return [
+            RateOutput(begin + row, first + row, name, states[k])
+            for k, row in enumerate(wanted)
+            for name, states in by_name
+        ]
+
+    def tacho(self, t_s: float, rate: float, sigma: float, signed: bool) -> None:
+        """A tachometer's report to all estimators (RateEstimator.tacho)."""
+        for estimator in self._estimators.values():
+            estimator.tacho(t_s, rate, sigma, signed)
+
+    def cost_us(self, name: str) -> float:
+        """Time of one sample in this estimator, us, since it was last asked for."""
+        cost = self.cost_ns[name] / max(1, self.cost_samples[name]) / 1000.0
+        self.cost_ns[name] = self.cost_samples[name] = 0
+        return cost
+
+    def _exclude(self, mask: int) -> None:
+        """Tell the estimators when the axes they may use have changed; one that cannot do without
+        says so itself.
+        """
+        if mask == self._mask:
+            return
+        names = [name for k, name in enumerate(self.wiring.axis_names) if mask >> k & 1]
+        log.warning(
+            "%s: axes not used: %s", self.device, ", ".join(names) or "none, all are good again"
+        )
+        self._mask = mask
+        for estimator in self._estimators.values():
+            try:
+                estimator.exclude(mask)
+            except GeometryError as error:
+                log.warning(
+                    "%s: %s goes on with the axes it had: %s", self.device, estimator.name, error
+                )

@@ -1,0 +1,1 @@
+"""What a person may order of the estimator: calibration, wiring, GNSS outages."""

@@ -1,1 +1,0 @@
-"""Rotation from accelerometers alone: field, standstill, and every rate estimator behind one protocol."""

@@ -1,0 +1,1 @@
+"""Receiver bytes become fixes."""

@@ -1,0 +1,118 @@
+"""GNSS epochs as the UBX bytes a receiver would send: NAV-PVT and NAV-HPPOSLLH.
+
+Payloads are packed here from integers (u-blox F9 interface description, UBX-18010854) and wrapped
+by pyubx2: its own scaling of floats truncates, which would move a position by 0.1 mm to 1 cm.
+"""
+
+import math
+import struct
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+
+from pyubx2 import GET, UBXMessage
+
+GPS_EPOCH = datetime(1980, 1, 6, tzinfo=UTC)
+LEAP_SECONDS = 18  # GPS - UTC since 2017
+WEEK_MS = 7 * 86400 * 1000
+SPEED_ACCURACY = 0.05  # m/s per axis, where the log has none
+PVT = struct.Struct("<IHBBBBBBIiBBBBiiiiIIiiiiiIIHH4xihH")
+HPPOSLLH = struct.Struct("<B2xBIiiiibbbbII")
+
+
+@dataclass(frozen=True)
+class Epoch:
+    """One GNSS epoch at base_s + t_s seconds since 1970 UTC; quality as RTKLIB counts."""
+
+    base_s: int
+    t_s: float
+    latitude_deg: float
+    longitude_deg: float
+    height_m: float
+    quality: int
+    sigma_ned_m: tuple[float, float, float]
+    v_n: tuple[float, float, float]
+
+
+def ubx_bytes(epoch: Epoch) -> bytes:
+    """The two messages. Sea level is not known in a log: hMSL repeats the height above the
+    ellipsoid.
+    """
+    utc = datetime.fromtimestamp(epoch.base_s, UTC) + timedelta(microseconds=round(epoch.t_s * 1e6))
+    i_tow = (
+        round((utc - GPS_EPOCH + timedelta(seconds=LEAP_SECONDS)) / timedelta(milliseconds=1))
+        % WEEK_MS
+    )
+    pvt = UBXMessage("NAV", "NAV-PVT", GET, payload=_pvt(epoch, utc, i_tow))
+    hppos = UBXMessage("NAV", "NAV-HPPOSLLH", GET, payload=_hpposllh(epoch, i_tow))
+    return pvt.serialize() + hppos.serialize()
+
+
+def _pvt(epoch: Epoch, utc: datetime, i_tow: int) -> bytes:
+    flags = 0x01 if epoch.quality else 0x00
+    if epoch.quality in (1, 2, 3, 4):
+        flags |= 0x02  # differential corrections
+    flags |= {1: 2, 2: 1}.get(epoch.quality, 0) << 6
+    vn, ve, vd = epoch.v_n
+    s_n, s_e, s_d = epoch.sigma_ned_m
+    mm = [round(v * 1e3) for v in (vn, ve, vd, math.hypot(vn, ve))]
+    course = round((math.degrees(math.atan2(ve, vn)) % 360.0) * 1e5)
+    return PVT.pack(
+        i_tow,
+        utc.year,
+        utc.month,
+        utc.day,
+        utc.hour,
+        utc.minute,
+        utc.second,
+        0x07,
+        50,
+        utc.microsecond * 1000,
+        3 if epoch.quality else 0,
+        flags,
+        0,
+        0,
+        round(epoch.longitude_deg * 1e7),
+        round(epoch.latitude_deg * 1e7),
+        round(epoch.height_m * 1e3),
+        round(epoch.height_m * 1e3),
+        round(math.hypot(s_n, s_e) * 1e3),
+        round(s_d * 1e3),
+        *mm,
+        course,
+        round(SPEED_ACCURACY * math.sqrt(3.0) * 1e3),
+        500_000,
+        100,
+        0,
+        0,
+        0,
+        0,
+    )
+
+
+def _hpposllh(epoch: Epoch, i_tow: int) -> bytes:
+    lon7, lon9 = _split(epoch.longitude_deg * 1e9)
+    lat7, lat9 = _split(epoch.latitude_deg * 1e9)
+    height_mm, height4 = divmod(round(epoch.height_m * 1e4), 10)
+    s_n, s_e, s_d = epoch.sigma_ned_m
+    return HPPOSLLH.pack(
+        0,
+        0,
+        i_tow,
+        lon7,
+        lat7,
+        height_mm,
+        height_mm,
+        lon9,
+        lat9,
+        height4,
+        height4,
+        round(math.hypot(s_n, s_e) * 1e4),
+        round(s_d * 1e4),
+    )
+
+
+def _split(value: float) -> tuple[int, int]:
+    """1e-9 degrees as 1e-7 degrees and a remainder of -50 to 50."""
+    whole = round(value)
+    coarse = round(whole / 100)
+    return coarse, whole - coarse * 100

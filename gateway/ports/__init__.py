@@ -1,0 +1,1 @@
+"""Bytes come in: serial ports, sockets, files, and who keeps them open."""

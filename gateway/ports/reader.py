@@ -1,0 +1,142 @@
+"""The thread between a port and the queue: read, journal, hand on; reopen what was lost.
+
+It sleeps in poll() until bytes come, so an idle line costs nothing and a byte is never older than
+the scheduler makes it.
+"""
+
+import logging
+import os
+import queue
+import select
+import threading
+import time
+from dataclasses import dataclass
+
+from gateway.ports.keeper import Keeper
+from gateway.ports.ports import Port, PortEnd, PortError, adopt_port, open_port
+from messages.history.journal import Journal
+
+log = logging.getLogger(__name__)
+
+FIRST_RETRY_S = 0.1
+LAST_RETRY_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """One read. monotonic_ns: just after the last byte was read."""
+
+    channel: int
+    data: bytes
+    monotonic_ns: int
+
+
+class Reader:
+    """Reads one port on its own thread into `out`; journals first."""
+
+    def __init__(
+        self,
+        url: str,
+        baud: int,
+        channel: int,
+        journal: Journal,
+        out: "queue.SimpleQueue[Chunk | None]",
+        keeper: Keeper,
+    ) -> None:
+        self.url = url
+        self.baud = baud
+        self.connected = False
+        self.message = f"{url}: not opened yet"
+        self.reconnects = 0
+        self._opened = 0
+        self._channel = channel
+        self._journal = journal
+        self._keeper = keeper
+        self._out = out
+        self._port: Port | None = None
+        self._stop = threading.Event()
+        self._wake_out, self._wake_in = os.pipe()
+        self._thread = threading.Thread(target=self._run, name=f"reader-{url}", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop and wait for the thread."""
+        self._stop.set()
+        os.write(self._wake_in, b"x")
+        self._thread.join()
+        os.close(self._wake_in)
+        os.close(self._wake_out)
+
+    def write(self, data: bytes) -> None:
+        """Send to the board; raises PortError when the port is not open or does not take it."""
+        port = self._port
+        if port is None:
+            raise PortError(self.message or f"{self.url}: not open")
+        port.write(data)
+
+    def _run(self) -> None:
+        retry_s = FIRST_RETRY_S
+        while not self._stop.is_set():
+            try:
+                port = self._open()
+            except (PortError, ValueError) as error:
+                self._say(str(error))
+                self._stop.wait(retry_s)
+                retry_s = min(2 * retry_s, LAST_RETRY_S)
+                continue
+            retry_s = FIRST_RETRY_S
+            self._opened += 1
+            self.reconnects = self._opened - 1
+            self.connected, self.message = True, ""
+            self._port = port
+            self._out.put(Chunk(self._channel, b"", time.monotonic_ns()))  # says that it is open
+            log.info("%s: open", self.url)
+            try:
+                self._read_until_lost(port)
+            except PortEnd as end:
+                self._say(str(end))
+                self._stop.wait()
+            except PortError as error:
+                self._say(str(error))
+                self._stop.wait(FIRST_RETRY_S)  # a port that opens and closes at once must not spin
+            finally:
+                self.connected, self._port = False, None
+                self._keeper.drop(self.url)
+                port.close()
+
+    def _open(self) -> Port:
+        """The port, as an earlier life of this gateway left it or newly opened. Raises PortError,
+        ValueError.
+        """
+        left = self._keeper.take(self.url)
+        if left is None:
+            port = open_port(self.url, self.baud)
+            if port.keepable:
+                self._keeper.keep(self.url, port.fileno())
+            return port
+        offset_ns = time.time_ns() - time.monotonic_ns()
+        for data, monotonic_ns in left.read:
+            self._take(data, monotonic_ns, monotonic_ns + offset_ns)
+        return adopt_port(self.url, left.fd)
+
+    def _take(self, data: bytes, monotonic_ns: int, utc_ns: int) -> None:
+        self._journal.append(self._channel, data, monotonic_ns, utc_ns)
+        self._out.put(Chunk(self._channel, data, monotonic_ns))
+
+    def _read_until_lost(self, port: Port) -> None:
+        poller = select.poll()
+        poller.register(port.fileno(), select.POLLIN)
+        poller.register(self._wake_out, select.POLLIN)
+        while not self._stop.is_set():
+            poller.poll()
+            if self._stop.is_set():
+                return
+            data = port.read()
+            if not data:
+                continue
+            self._take(data, time.monotonic_ns(), time.time_ns())
+
+    def _say(self, message: str) -> None:
+        if message != self.message:
+            log.warning("%s", message)
+        self.connected, self.message = False, message

@@ -1,0 +1,1 @@
+"""Boards that are no hardware: played and simulated ones."""

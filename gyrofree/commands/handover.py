@@ -1,0 +1,300 @@
+"""`gyrofree export`, `report`, `import`, `rerun`, `reprocess`: sessions handed on, judged, made
+again.
+"""
+
+import functools
+import json
+import tomllib
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from pydantic import ValidationError
+
+from estimator.settings import EstimatorSettings
+from gyrofree.commands.options import AsJson, Config, settings_of
+from gyrofree.commands.run import progress_bar
+from gyrofree.commands.sessions import AnySession, catalogue_of, file_of
+from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
+from sessions.recording.manifest import SessionError, name_of
+
+
+def export(
+    session: AnySession,
+    form: Annotated[
+        str, typer.Option("--format", "-f", help="csv, parquet, mat, kml, gpx or mcap.")
+    ] = "csv",
+    out: Annotated[Path, typer.Option(help="Folder for the files; made when absent.")] = Path(
+        "export"
+    ),
+    topics: Annotated[
+        str, typer.Option(help="Only these topics, separated by commas, as accel,rate.")
+    ] = "",
+    start: Annotated[
+        float, typer.Option("--from", min=0, help="s from the session's start.")
+    ] = 0.0,
+    end: Annotated[float, typer.Option("--to", min=0, help="s from the session's start.")] = float(
+        "inf"
+    ),
+    as_json: AsJson = False,
+    config: Config = None,
+) -> None:
+    """Write a session in another program's format. Column names carry the units, all SI; big
+    sessions stream.
+    """
+    from sessions.export.export import ExportError
+    from sessions.export.export import export as write
+    from sessions.export.table import Selection
+
+    path = file_of(settings_of(config), session)
+    wanted = frozenset(name.strip() for name in topics.split(",") if name.strip())
+    try:
+        with progress_bar() as progress:
+            files = write(path, form, out, Selection(wanted, start, end), progress)
+    except ExportError as error:
+        raise fail(str(error), EXIT_CONFIG) from None
+    except OSError as error:
+        raise fail(str(error)) from None
+    print(
+        json.dumps([str(file) for file in files], indent=2)
+        if as_json
+        else "\n".join(map(str, files))
+    )
+
+
+def report(
+    session: AnySession,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for HTML, PDF and JSON; default ./report-<session>.")
+    ] = None,
+    spec: Annotated[
+        Path | None, typer.Option(help="Limits in TOML; default the ones that come with gyrofree.")
+    ] = None,
+    device: Annotated[str, typer.Option(help="Device; default the one with most samples.")] = "",
+    boot: Annotated[
+        int | None, typer.Option(help="Boot counter of the board; default the longest run.")
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the report as JSON, write no files.")
+    ] = False,
+    config: Config = None,
+) -> None:
+    """The test report of a session: HTML, PDF and JSON. The same recording gives the same bytes.
+
+    Exit code 1 when a limit of the specification is broken.
+    """
+    from sessions.report.build import build
+    from sessions.report.verdict import load_spec
+
+    path = file_of(settings_of(config), session)
+    try:
+        with progress_bar() as progress:
+            made = build(path, load_spec(spec), device, boot, progress)
+        if as_json:
+            print(made.json, end="")
+        else:
+            for file in made.write(out or Path(f"report-{name_of(path)}")):
+                print(file)
+            print(f"verdict: {made.verdict}")
+    except (ValueError, OSError) as error:
+        raise fail(str(error), EXIT_CONFIG) from None
+    if made.verdict == "fail":
+        raise typer.Exit(EXIT_FAILED)
+
+
+def import_log(
+    log: Annotated[
+        Path, typer.Argument(help="CSV file, or a folder with imu.csv and gnss.csv; docs/logs.md.")
+    ],
+    gnss: Annotated[
+        Path | None, typer.Option(help="CSV of GNSS epochs beside a single CSV of samples.")
+    ] = None,
+    device: Annotated[str, typer.Option(help="Device name for the samples.")] = "log",
+    name: Annotated[str, typer.Option(help="Added to the session's id.")] = "import",
+    as_json: AsJson = False,
+    config: Config = None,
+) -> None:
+    """Make a session of a log: its samples, and the estimates of the configured estimators on
+    them.
+    """
+    from gateway.virtual.player import PlayError
+    from gyrofree.running import importer
+
+    settings = settings_of(config)
+    try:
+        rows = list(importer.rows_of(log, gnss, settings.bus.prefix, device))
+        folder = _estimated(
+            settings, rows, f"20240101-000000-{name}", f"made of {log.name}", settings.recorder.root
+        )
+    except (PlayError, SessionError, OSError) as error:
+        raise fail(str(error), EXIT_CONFIG) from None
+    print(json.dumps({"session": folder.name}) if as_json else folder.name)
+
+
+def _estimated(settings, rows, session: str, note: str, root: Path) -> Path:
+    """A session of the rows with the estimates on them."""
+    import tempfile
+
+    from estimator.service import Pipeline
+    from sessions.replay.rerun import estimates_again, write_session
+
+    configuration = settings.model_dump(mode="json")
+    with tempfile.TemporaryDirectory() as scratch, progress_bar() as progress:
+        inputs = write_session(Path(scratch), session, rows, note, configuration)
+        again = estimates_again(
+            inputs / "recording.mcap", Pipeline(settings.estimator), "", progress
+        )
+        return write_session(Path(root), session, again, note, configuration)
+
+
+def rerun(
+    session: AnySession,
+    estimators: Annotated[
+        str, typer.Option(help="Rate estimators to run, separated by commas.")
+    ] = "",
+    navigators: Annotated[
+        str, typer.Option(help="Navigation filters to run, separated by commas.")
+    ] = "",
+    name: Annotated[
+        str, typer.Option(help="Added to the new session's id and to the new estimators' names.")
+    ] = "new",
+    beside: Annotated[
+        bool, typer.Option("--beside/--instead", help="Keep the old estimates beside.")
+    ] = True,
+    changed: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            help="KEY=VALUE of [estimator] for this run, as layout.half_side_m=0.0493; repeatable.",
+        ),
+    ] = None,
+    as_json: AsJson = False,
+    config: Config = None,
+) -> None:
+    """Run a session's inputs through other estimators or another configuration, as a new session.
+
+    The new estimates stand beside the old ones under their own names, so that live view, report and
+    export compare them on one time axis.
+    """
+    from estimator.service import Pipeline, UnknownEstimator
+    from sessions.replay.rerun import estimates_again, rerun_id, write_session
+
+    settings = settings_of(config)
+    path = file_of(settings, session)
+    chosen = {"rate": estimators, "navigators": navigators}
+    changes = {
+        key: [one.strip() for one in text.split(",")] for key, text in chosen.items() if text
+    }
+    try:
+        estimator = with_changes(settings.estimator.model_copy(update=changes), changed or [])
+        settings = settings.model_copy(update={"estimator": estimator})
+        pipeline = Pipeline(estimator)
+        with progress_bar() as progress:
+            rows = estimates_again(path, pipeline, name if beside else "", progress)
+            what = ", ".join([*sum(changes.values(), []), *(changed or [])]) or "this configuration"
+            note = f"{path.parent.name} again: {what}"
+            folder = write_session(
+                catalogue_of(settings).root,
+                rerun_id(path, name),
+                rows,
+                note,
+                settings.model_dump(mode="json"),
+            )
+    except (UnknownEstimator, SessionError, ValueError, OSError) as error:
+        raise fail(str(error), EXIT_CONFIG) from None
+    print(json.dumps({"session": folder.name}) if as_json else folder.name)
+
+
+def with_changes(settings: EstimatorSettings, changes: list[str]) -> EstimatorSettings:
+    """Settings with `key=value` texts applied, values as in TOML (a bare word is a string); raises
+    ValueError.
+    """
+    data = settings.model_dump()
+    for text in changes:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        try:
+            parsed = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            parsed = value
+        place, *inner = key.split(".")
+        table, name = data, place
+        for part in inner:
+            table, name = table.get(name) if isinstance(table, dict) else None, part
+        if not equals or not isinstance(table, dict) or name not in table:
+            raise ValueError(
+                f"--set {text!r}: want KEY=VALUE with a key of [estimator], like"
+                " layout.half_side_m=0.0493"
+            )
+        table[name] = parsed
+    try:
+        return EstimatorSettings.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise ValueError(f"--set {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+
+
+def reprocess(
+    folder: Annotated[
+        Path | None, typer.Argument(help="Folder of sessions; default the configured one.")
+    ] = None,
+    out: Annotated[
+        Path, typer.Option(help="Parquet table, one row per session, boot and estimator.")
+    ] = Path("reprocessed.parquet"),
+    estimators: Annotated[
+        str, typer.Option(help="Rate estimators, separated by commas; default as configured.")
+    ] = "",
+    jobs: Annotated[int, typer.Option(min=0, help="Processes; 0: one per core.")] = 0,
+    scheduler: Annotated[
+        str, typer.Option(help="Address of a Dask scheduler, as tcp://10.0.0.1:8786.")
+    ] = "",
+    as_json: AsJson = False,
+    config: Config = None,
+) -> None:
+    """Run every session of a folder through the estimators again and tabulate how well they did.
+
+    On one machine in parallel, or on a Dask cluster by the same command. DuckDB and pandas read the
+    table.
+    """
+    from gyrofree.running.reprocess import score_session
+    from sessions.library.catalogue import Catalogue
+    from sessions.replay.reprocess import SchedulerError, run_all, write_table
+
+    settings = settings_of(config)
+    root = (folder or Path(settings.recorder.root)).absolute()
+    rate = [one.strip() for one in estimators.split(",") if one.strip()] or settings.estimator.rate
+    chosen = settings.estimator.model_copy(update={"rate": rate})
+    try:
+        paths = [
+            info.path
+            for info in Catalogue(root).list()
+            if info.path is not None and info.state != "open"
+        ]
+        if not paths:
+            raise fail(f"{root}: no closed or recovered session there", EXIT_CONFIG)
+        rows = []
+        with progress_bar() as progress:
+            for count, more in enumerate(
+                run_all(paths, functools.partial(score_session, chosen), jobs, scheduler), 1
+            ):
+                rows += more
+                progress(count / len(paths), f"{count} of {len(paths)} sessions")
+        write_table(out, rows)
+    except (SchedulerError, SessionError, OSError) as error:
+        raise fail(str(error), EXIT_CONFIG) from None
+    bad = sum(bool(row.get("problem")) for row in rows)
+    if as_json:
+        print(json.dumps(rows, indent=2))
+    else:
+        print(f"{out}: {len(rows)} rows of {len(paths)} sessions, {bad} with a problem")
+
+
+def mount(app: typer.Typer) -> None:
+    """Add the commands to the one command line."""
+    for name, command in (
+        ("export", export),
+        ("report", report),
+        ("import", import_log),
+        ("rerun", rerun),
+        ("reprocess", reprocess),
+    ):
+        app.command(name)(command)

@@ -1,0 +1,63 @@
+"""Options that several commands share."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from gyrofree.config import ConfigError, Settings, load_or_default
+from gyrofree.running.process import EXIT_CONFIG, fail
+
+Config = Annotated[
+    Path | None,
+    typer.Option(
+        "--config", "-c", help="Configuration file; default ./gyrofree.toml if it is there."
+    ),
+]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Log details too.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON on standard output.")]
+Speed = Annotated[float, typer.Option(min=0.1, max=100.0, help="Seconds of the log per second.")]
+
+
+def settings_of(path: Path | None) -> Settings:
+    """The configuration a command was given; ends the command with one line per fault."""
+    try:
+        return load_or_default(path)
+    except ConfigError as error:
+        raise fail(str(error), EXIT_CONFIG) from None
+
+
+def console_of(width: int = 160) -> Console:
+    """Standard output; `width` characters where that is a file or a pipe, which has no width of its
+    own.
+    """
+    return Console(file=sys.stdout, width=None if sys.stdout.isatty() else width)
+
+
+def show_table(table: Table, width: int = 160) -> None:
+    """On standard output."""
+    console_of(width).print(table)
+
+
+Fault = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Spoil an axis of the simulated cube, as a21:stuck@12 or a13:swapped=a21@12-20."
+    ),
+]
+
+
+def faults_of(texts: list[str] | None) -> tuple:
+    """Faults of the simulated cube's axes; one that cannot be ends the command."""
+    if not texts:
+        return ()
+    from inertial.layouts.layout import CUBE
+    from inertial.simulation.faults import FaultError, parse
+
+    try:
+        return tuple(parse(text, CUBE(0.05).axis_names) for text in texts)
+    except FaultError as error:
+        raise fail(str(error), EXIT_CONFIG) from None

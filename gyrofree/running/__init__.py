@@ -1,0 +1,1 @@
+"""Processes: demo, supervisor, simulated boards, replays."""

@@ -1,0 +1,147 @@
+"""`gyrofree demo`: all services on this machine, fed by a simulated table or a played log, behind
+one printed URL.
+
+The configuration that the demo runs with is written to <folder>/gyrofree.toml, so that every
+process can also be started by hand.
+"""
+
+import secrets
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from dashboard.web.users import add_user, issue_link_token
+from gyrofree.config import Settings, load
+from gyrofree.running.doctor import health, port_taken
+from gyrofree.running.process import EXIT_FAILED, EXIT_TAKEN, fail, start_logging, stop_on_signals
+from gyrofree.running.supervisor import Supervisor
+
+TICK = 0.1  # s between two looks at the children
+WAIT_FOR_PAGE = 60.0  # s; a cold compile cache needs most of it
+USER = "demo"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a demo run consists of."""
+
+    folder: Path  # journal, recordings, users and the written configuration
+    board: list[str]  # arguments of `gyrofree` that play the board
+    device: str
+    layout: str
+    port: int  # of the dashboard
+    bus_port: int
+    host: str = "127.0.0.1"
+    record: bool = True
+    time_scale: float = 1.0  # seconds of the log per second
+    estimator: str = ""  # further lines of [estimator]
+
+
+SIMULATED = {  # boards of `gyrofree simulate` besides the table: its arguments, device, layout
+    "arm": (["simulate", "--arm", "3"], "cube", "cube"),
+    "tilt": (["simulate", "--tilt", "--device", "tilt-board"], "tilt-board", "analogue"),
+}
+ESTIMATOR = {
+    "arm": (
+        'rate = ["products-free", "least-squares"]\ngyro_free_rate = "products-free"\n'
+        'gyro_free_navigation = ["huber", "kf"]\nuse_every_fix = 2\n'
+    ),
+    "tilt": "navigators = []\n",
+}
+
+
+def write_configuration(plan: Plan) -> Path:
+    """The demo's gyrofree.toml."""
+    path = plan.folder / "gyrofree.toml"
+    plan.folder.mkdir(parents=True, exist_ok=True)
+    path.write_text(
+        f"""# Written by `gyrofree demo`; start any of its services by hand with --config on this file.
+[bus]
+router = "tcp/127.0.0.1:{plan.bus_port}"
+listen = ["tcp/127.0.0.1:{plan.bus_port}"]
+
+[gateway]
+journal = "{plan.folder / "journal"}"
+
+[[gateway.devices]]
+name = "{plan.device}"
+port = "{plan.folder / "board"}"
+layout = "{plan.layout}"
+time_scale = {plan.time_scale}
+
+[estimator]
+journal = "{plan.folder / "estimates"}"
+axes = "{plan.folder / "axes"}"
+cards = "{plan.folder / "cards"}"
+{plan.estimator}
+[recorder]
+root = "{plan.folder / "sessions"}"
+auto_start = {str(plan.record).lower()}
+
+[dashboard]
+host = "{plan.host}"
+port = {plan.port}
+users = "{plan.folder / "users.json"}"
+sessions_root = "{plan.folder / "sessions"}"
+demo = true
+"""
+    )
+    return path
+
+
+def run(plan: Plan) -> None:
+    """Run until Ctrl-C; raises typer.Exit with a code when it cannot."""
+    start_logging()
+    stop = stop_on_signals()
+    for what, port, option in (
+        ("bus", plan.bus_port, "--bus-port"),
+        ("dashboard", plan.port, "--port"),
+    ):
+        if port_taken("127.0.0.1", port):
+            raise fail(
+                f"{what} port {port} is taken: end what uses it (`ss -ltnp`), or choose {option}",
+                EXIT_TAKEN,
+            )
+    config = write_configuration(plan)
+    settings = load(config)
+    supervisor = _supervise(plan, config)
+    url = _sign_in_link(settings)
+    supervisor.say(f"starting; configuration and data in {plan.folder}")
+    supervisor.start()
+    said, deadline = False, time.monotonic() + WAIT_FOR_PAGE
+    try:
+        while not stop.wait(TICK) and supervisor.fatal is None:
+            supervisor.step()
+            if not said and health("dashboard", settings).state == "ok":
+                said = True
+                supervisor.say(f"open  {url}", "bold green")
+            elif not said and time.monotonic() > deadline:
+                raise fail(
+                    f"the dashboard does not answer after {WAIT_FOR_PAGE:g} s; the log above"
+                    " says why"
+                )
+    finally:
+        supervisor.say("stopping")
+        clean = supervisor.stop()
+        supervisor.say("stopped cleanly" if clean else "stopped; a process had to be killed")
+    if supervisor.fatal is not None:
+        raise fail(f"{supervisor.fatal.name} could not go on", EXIT_FAILED)
+
+
+def _supervise(plan: Plan, config: Path) -> Supervisor:
+    supervisor = Supervisor()
+    for service in ("router", "gateway", "estimator", "record", "dashboard"):
+        supervisor.add(service, service, "--config", str(config))
+    # The board comes last: estimators that see its first standstill know its heading and biases
+    # from the start.
+    board = [*plan.board, "--config", str(config), "--link", str(plan.folder / "board")]
+    supervisor.add("board", *board, waits_for=("estimator", "estimating"))
+    return supervisor
+
+
+def _sign_in_link(settings: Settings) -> str:
+    """A fresh demo user with a password nobody knows, and the one-time link that signs in as it."""
+    users = Path(settings.dashboard.users)
+    add_user(users, USER, secrets.token_urlsafe(24), "operator")
+    token = issue_link_token(users, USER)
+    return f"{settings.dashboard.url}/login/link?token={token}"

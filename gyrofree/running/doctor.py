@@ -1,0 +1,194 @@
+"""`gyrofree doctor`: is this machine ready, and if not, what to do.
+
+Each check returns one Finding; none changes anything. `health` asks a running service for a sign of
+life and is what the containers' health checks call.
+"""
+
+import ctypes
+import grp
+import importlib.metadata
+import os
+import shutil
+import socket
+import struct
+import sys
+import urllib.error
+import urllib.request
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from queue import Empty, Queue
+from urllib.parse import urlsplit
+
+from gyrofree.config import Settings
+from messages.bus.session import BusUnavailable, open_client, subscribe
+from messages.contract.topics import ESTIMATOR, LINK, STATUS
+
+LEAST_FREE = 1 << 30  # bytes of disk below which recording is at risk
+STA_UNSYNC = 0x0040  # linux/timex.h
+HEALTH_WAIT = 4.0  # s; the slowest sign of life comes once a second
+SIGN_OF_LIFE = {"gateway": LINK, "estimator": ESTIMATOR, "recorder": STATUS}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The outcome of one check."""
+
+    check: str
+    state: str  # "ok", "warn" or "fail"
+    found: str
+    remedy: str = ""
+
+
+def examine(settings: Settings) -> list[Finding]:
+    """All checks, in the order the data flow."""
+    return [
+        _versions(),
+        *_ports(settings),
+        _clock(),
+        _endpoint("bus port", settings.bus.listen[0].removeprefix("tcp/"), "[bus] listen"),
+        _endpoint(
+            "dashboard port",
+            f"{settings.dashboard.host}:{settings.dashboard.port}",
+            "[dashboard] port",
+        ),
+        _folder("journal folder", Path(settings.gateway.journal)),
+        _folder("recordings folder", Path(settings.recorder.root)),
+        _compile_cache(),
+    ]
+
+
+def as_json(findings: list[Finding]) -> list[dict]:
+    """Findings as plain dictionaries."""
+    return [asdict(finding) for finding in findings]
+
+
+def _versions() -> Finding:
+    names = ("gyrofree", "eclipse-zenoh", "viser", "numpy", "fastapi", "pyserial")
+    found = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in names)
+    python = ".".join(map(str, sys.version_info[:3]))
+    return Finding("versions", "ok", f"Python {python}, {found}")
+
+
+def _ports(settings: Settings) -> list[Finding]:
+    by_id = (
+        sorted(Path("/dev/serial/by-id").glob("*")) if Path("/dev/serial/by-id").is_dir() else []
+    )
+    seen = ", ".join(path.name for path in by_id) or "no USB serial adapter is plugged in"
+    findings = [Finding("serial ports", "ok", seen)]
+    for device in settings.gateway.devices:
+        port, name = device.port, f"port of {device.name}"
+        if "://" in port:
+            findings.append(Finding(name, "ok", f"{port} (checked when it is opened)"))
+        elif not os.path.exists(port):
+            findings.append(
+                Finding(
+                    name, "warn", f"{port} is not there", "plug the board in; the gateway waits"
+                )
+            )
+        elif not os.access(port, os.R_OK | os.W_OK):
+            group = grp.getgrgid(os.stat(port).st_gid).gr_name
+            remedy = f"sudo usermod -aG {group} $USER, then sign in again"
+            findings.append(
+                Finding(name, "fail", f"{port}: no permission to read and write", remedy)
+            )
+        else:
+            findings.append(Finding(name, "ok", port))
+    return findings
+
+
+def _clock() -> Finding:
+    """The kernel's word on whether UTC is disciplined (adjtimex, read only)."""
+    buffer = ctypes.create_string_buffer(512)
+    if ctypes.CDLL(None).adjtimex(buffer) < 0:
+        return Finding("clock", "warn", "the kernel does not tell whether UTC is disciplined")
+    status = struct.unpack_from("i", buffer, 40)[
+        0
+    ]  # struct timex: modes, offset, freq, maxerror, esterror, status
+    if status & STA_UNSYNC:
+        remedy = "start chrony or systemd-timesyncd; rates are unaffected"
+        return Finding("clock", "warn", "UTC is not disciplined", remedy)
+    return Finding("clock", "ok", "UTC is disciplined")
+
+
+def port_taken(host: str, port: int) -> bool:
+    """True when nothing can listen there."""
+    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError:
+            return True
+    return False
+
+
+def _endpoint(check: str, address: str, key: str) -> Finding:
+    host, _, port = address.rpartition(":")
+    if port_taken(host.strip("[]"), int(port)):
+        return Finding(
+            check, "warn", f"{address} is taken", f"gyrofree runs already, or choose another {key}"
+        )
+    return Finding(check, "ok", f"{address} is free")
+
+
+def _folder(check: str, folder: Path) -> Finding:
+    there = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
+    if not os.access(there, os.W_OK):
+        return Finding(
+            check,
+            "fail",
+            f"{folder}: no permission to write in {there}",
+            f"sudo chown $USER {there}",
+        )
+    free = shutil.disk_usage(there).free
+    text = f"{folder}: {free / 2**30:.1f} GiB free"
+    if free < LEAST_FREE:
+        return Finding(check, "warn", text, "make room: 1 GiB at least")
+    return Finding(check, "ok", text)
+
+
+def _compile_cache() -> Finding:
+    folder = Path(os.environ.get("NUMBA_CACHE_DIR", Path(__file__).parents[2] / "inertial"))
+    if not any(folder.rglob("*.nbi")):
+        return Finding(
+            "compile cache",
+            "warn",
+            "empty: the first start compiles for some seconds",
+            "make setup",
+        )
+    return Finding("compile cache", "ok", str(folder))
+
+
+def health(service: str, settings: Settings) -> Finding:
+    """One sign of life of a running service; state "ok" or "fail"."""
+    if service == "dashboard":
+        return _dashboard_health(settings)
+    try:
+        session = open_client(settings.bus, timeout_s=HEALTH_WAIT)
+    except BusUnavailable as error:
+        return Finding(service, "fail", str(error))
+    with session:
+        if service == "router":
+            return Finding(service, "ok", f"{urlsplit(settings.bus.router).path} answers")
+        heard: Queue[str] = Queue()
+        topic = SIGN_OF_LIFE[service]
+        subscription = subscribe(session, topic, settings.bus.prefix, lambda key, _: heard.put(key))
+        try:
+            return Finding(service, "ok", f"speaks on {heard.get(timeout=HEALTH_WAIT)}")
+        except Empty:
+            return Finding(
+                service,
+                "fail",
+                f"nothing on {topic.pattern(settings.bus.prefix)} for {HEALTH_WAIT:g} s",
+            )
+        finally:
+            subscription.undeclare()
+
+
+def _dashboard_health(settings: Settings) -> Finding:
+    host = "127.0.0.1" if settings.dashboard.host in ("0.0.0.0", "::") else settings.dashboard.host
+    url = f"http://{host}:{settings.dashboard.port}/api/health"
+    try:
+        with urllib.request.urlopen(url, timeout=HEALTH_WAIT) as answer:
+            return Finding("dashboard", "ok", f"{url} answers {answer.status}")
+    except (urllib.error.URLError, OSError) as error:
+        return Finding("dashboard", "fail", f"{url}: {error}")

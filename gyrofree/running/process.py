@@ -1,0 +1,111 @@
+"""How a service process lives: its log, its signals, its exit code.
+
+Logs go to stderr, data to stdout. Exit codes: 0 ended as asked, 1 could not go on (the log says
+why), 2 wrong command line or configuration, 3 a port or device name is taken.
+"""
+
+import errno
+import gc
+import logging
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable
+
+import typer
+import zenoh
+
+from gyrofree.config import ConfigError
+from messages.bus.session import BusUnavailable
+
+EXIT_FAILED = 1
+EXIT_CONFIG = 2
+EXIT_TAKEN = 3
+
+SETTLED = 8.0  # s after the start: imports and compiled functions are loaded
+
+log = logging.getLogger(__name__)
+
+
+def start_logging(verbose: bool = False) -> None:
+    """One line per event on stderr; below a supervisor without time, which the supervisor writes
+    itself.
+    """
+    supervised = "GYROFREE_SUPERVISED" in os.environ
+    form = (
+        "%(levelname)s %(message)s"
+        if supervised
+        else "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
+    )
+    logging.basicConfig(
+        level=logging.DEBUG if verbose else logging.INFO, format=form, stream=sys.stderr, force=True
+    )
+    for noisy in ("websockets", "uvicorn.access", "httpx", "numba", "asyncio", "httpcore"):
+        logging.getLogger(noisy).setLevel(logging.WARNING)
+
+
+def stop_on_signals() -> threading.Event:
+    """An event that SIGTERM and Ctrl-C set. To be called in the main thread.
+
+    Not set by a handler in Python: that runs in the main thread once it wakes, and not at all while
+    it sleeps and the signal met another one; and awake, it may be inside stop.wait() and hold the
+    event's lock, for which set() would then wait for good. What the interpreter writes into a pipe
+    at once, in whichever thread, is read by one of ours.
+    """
+    stop = threading.Event()
+    told, tell = os.pipe2(os.O_CLOEXEC)
+    os.set_blocking(tell, False)
+
+    def listen() -> None:
+        os.read(told, 1)
+        stop.set()
+
+    threading.Thread(target=listen, name="signals", daemon=True).start()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: None)
+    signal.set_wakeup_fd(tell, warn_on_full_buffer=False)
+    return stop
+
+
+def fail(text: str, code: int = EXIT_FAILED) -> typer.Exit:
+    """Say why on stderr; raise what this returns."""
+    for line in text.splitlines():
+        print(f"gyrofree: {line}", file=sys.stderr)
+    return typer.Exit(code)
+
+
+def run_service(body: Callable[[threading.Event], None], verbose: bool = False) -> None:
+    """Run a service until it ends or is told to; faults become one line and an exit code."""
+    start_logging(verbose)
+    stop = stop_on_signals()
+    settled = threading.Timer(SETTLED, _spare_the_collector)
+    settled.daemon = True
+    settled.start()
+    try:
+        body(stop)
+    except ConfigError as error:
+        raise fail(str(error), EXIT_CONFIG) from None
+    except BusUnavailable as error:
+        if not stop.is_set():
+            raise fail(str(error)) from None
+    except zenoh.ZError as error:
+        raise fail(
+            _first_line(error), EXIT_TAKEN if "in use" in str(error) else EXIT_FAILED
+        ) from None
+    except OSError as error:
+        raise fail(
+            str(error), EXIT_TAKEN if error.errno == errno.EADDRINUSE else EXIT_FAILED
+        ) from None
+
+
+def _spare_the_collector() -> None:
+    """Keep what is loaded for good out of garbage collection, whose full passes stop a service for
+    tens of ms.
+    """
+    gc.collect()
+    gc.freeze()
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).split(" at /")[0].splitlines()[0]

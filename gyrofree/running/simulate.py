@@ -1,0 +1,297 @@
+"""`gyrofree simulate`: the simulated table as a board on a line, and its truth on the bus.
+
+Samples, pulses and GPS sentences go through the wire like those of any board; only the truth goes
+straight to the bus, under its own topic, marked simulated. The wire does not wait for the bus. Each
+run of the profile is a new boot of the board (same sensors, other noise), so that every estimator
+starts over with it.
+"""
+
+import datetime
+import heapq
+import itertools
+import logging
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import zenoh
+from pynmeagps import GET, NMEAMessage
+
+from gateway.virtual.board_link import PtyLink, TcpLink
+from gateway.virtual.virtual_board import (
+    SIMULATED,
+    BoardAccel,
+    BoardBytes,
+    BoardPulse,
+    Item,
+    VirtualBoard,
+)
+from inertial.simulation.arm import arm_test, centre
+from inertial.simulation.faults import AxisFault, Faults
+from inertial.simulation.table import BLOCK, TableTest, Truth
+from messages.bus.session import BusSettings, LateSession, Publishers
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import TRUTH
+
+log = logging.getLogger(__name__)
+
+PLACE = (
+    37.759,
+    45.978,
+    1468.0,
+)  # deg, deg, m above the ellipsoid: where the published test was made, roughly
+GEOID = 17.0  # m, ellipsoid above mean sea level there, rounded
+GPS_SIGMA = (0.8, 0.8, 1.6)  # m, north, east, up, white: a receiver at rest
+GPS_PERIOD = 1.0  # s
+KNOT = 1852.0 / 3600.0  # m/s
+ARM_GPS_PERIOD, ARM_SIGMA_P, ARM_SIGMA_V = 0.5, 0.3, 0.1  # s, m, m/s: a better receiver, on the arm
+METRES_PER_DEGREE = 111_195.0  # m of latitude
+
+
+@dataclass(frozen=True)
+class Options:
+    """What `gyrofree simulate` was asked for."""
+
+    link: Path | None
+    tcp: int | None
+    profile: str
+    seed: int
+    device: str
+    once: bool
+    faults: tuple[AxisFault, ...] = ()  # of single axes, in every run of the profile
+    # the cube rides at the end of an arm of this length, with the receiver; 0: in the table's
+    # centre
+    arm_m: float = 0.0
+
+
+class TruthPublisher:
+    """Publishes the truth once the bus is there; until then truth has nobody to hear it."""
+
+    def __init__(self, bus: BusSettings, device: str, source: int = pb.SOURCE_SIMULATED) -> None:
+        self._device, self._source = device, source
+        self._epoch = 0
+        self._publishers: Publishers | None = None
+        self._session = LateSession(bus, lambda session: self._attach(session, bus.prefix))
+
+    def _attach(self, session: zenoh.Session, prefix: str) -> None:
+        self._publishers = Publishers(session, prefix)
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._publishers = None
+        self._session.close()
+
+    def begin(self, epoch: int) -> None:
+        """A new boot of the board."""
+        self._epoch = epoch
+
+    def put(self, index: int, t_s: float, truth: Truth) -> None:
+        """Truth at sample `index`, t_s after boot."""
+        self._put(
+            pb.Truth(
+                header=self._header(t_s),
+                for_index=index,
+                q_nb=truth.q_nb,
+                omega_ib_b_radps=truth.omega_ib_b,
+                alpha_b_radps2=truth.alpha_b,
+                f_b_mps2=truth.f_b,
+                angle_z_rad=truth.angle_z,
+                profile_time_s=truth.profile_time_s,
+            )
+        )
+
+    def tilt(
+        self, index: int, t_s: float, q_nb: np.ndarray, f_b: np.ndarray, omega_b: np.ndarray
+    ) -> None:
+        """Attitude (4,), force (3,) and rate (3,) of a six-axis board at sample `index`, t_s after
+        boot.
+        """
+        self._put(
+            pb.Truth(
+                header=self._header(t_s),
+                for_index=index,
+                q_nb=q_nb,
+                f_b_mps2=f_b,
+                omega_ib_b_radps=omega_b,
+            )
+        )
+
+    def _header(self, t_s: float) -> pb.Header:
+        return pb.Header(
+            device=self._device,
+            epoch=self._epoch,
+            device_us=round(t_s * 1e6),
+            utc_ns=time.time_ns(),
+            source=self._source,
+        )
+
+    def _put(self, message: pb.Truth) -> None:
+        if self._publishers is not None:
+            self._publishers.put(TRUTH, self._device, message)
+
+
+def sentences(
+    place_noise: np.ndarray, utc: datetime.datetime, v_n: tuple[float, float] = (0.0, 0.0)
+) -> bytes:
+    """GGA, GST and RMC of a receiver at PLACE plus place_noise (3,), m north, east, up; v_n north,
+    east, m/s.
+    """
+    lat = PLACE[0] + place_noise[0] / METRES_PER_DEGREE
+    lon = PLACE[1] + place_noise[1] / (METRES_PER_DEGREE * np.cos(np.radians(PLACE[0])))
+    clock, day = utc.time(), utc.date()
+    gga = NMEAMessage(
+        "GP",
+        "GGA",
+        GET,
+        time=clock,
+        lat=lat,
+        NS="N",
+        lon=lon,
+        EW="E",
+        quality=1,
+        numSV=9,
+        HDOP=0.9,
+        alt=round(PLACE[2] + place_noise[2] - GEOID, 2),
+        altUnit="M",
+        sep=GEOID,
+        sepUnit="M",
+    )
+    north, east, up = GPS_SIGMA
+    gst = NMEAMessage(
+        "GP",
+        "GST",
+        GET,
+        time=clock,
+        rangeRms=1.0,
+        stdMajor=east,
+        stdMinor=north,
+        orient=0.0,
+        stdLat=north,
+        stdLong=east,
+        stdAlt=up,
+    )
+    rmc = NMEAMessage(
+        "GP",
+        "RMC",
+        GET,
+        time=clock,
+        status="A",
+        lat=lat,
+        NS="N",
+        lon=lon,
+        EW="E",
+        spd=round(float(np.hypot(*v_n)) / KNOT, 3),
+        cog=round(float(np.degrees(np.arctan2(v_n[1], v_n[0]))) % 360.0, 2),
+        date=day,
+        posMode="A",
+    )
+    return gga.serialize() + gst.serialize() + rmc.serialize()
+
+
+def _receiver(seed: int) -> Iterator[BoardBytes]:
+    """One epoch per second, for ever."""
+    draw = np.random.default_rng(
+        [seed, 2, time.time_ns() & 0xFFFFFFFF]
+    )  # the sky is another in each run
+    for number in itertools.count():
+        noise = draw.normal(0.0, 1.0, 3) * GPS_SIGMA
+        yield BoardBytes(
+            number * GPS_PERIOD + 0.005, sentences(noise, datetime.datetime.now(datetime.UTC))
+        )
+
+
+def _rider(test: TableTest, seed: int) -> Iterator[BoardBytes]:
+    """Two epochs a second of a receiver beside the cube at the end of the arm."""
+    draw = np.random.default_rng([seed, 3, time.time_ns() & 0xFFFFFFFF])
+    for number in itertools.count():
+        t = number * ARM_GPS_PERIOD
+        p, v = centre(test, t)
+        p, v = p + draw.normal(size=3) * ARM_SIGMA_P, v + draw.normal(size=3) * ARM_SIGMA_V
+        noise = np.array([p[0], p[1], -p[2]])
+        yield BoardBytes(
+            t + 0.005, sentences(noise, datetime.datetime.now(datetime.UTC), (v[0], v[1]))
+        )
+
+
+def _table(test: TableTest, truths: TruthPublisher, faults: Faults) -> Iterator[Item]:
+    """Samples and pulses in time order; the truth leaves as its sample does."""
+    for number in itertools.count():
+        block = faults.into(test.block(number))
+        end = block.t_s[-1] + test.period_s
+        pulses = iter(test.pulses(float(block.t_s[0]), float(end)))
+        pulse = next(pulses, None)
+        for row in range(BLOCK):
+            t = float(block.t_s[row])
+            while pulse is not None and pulse.t_s <= t:
+                yield BoardPulse(pulse.t_s, pulse.direction)
+                pulse = next(pulses, None)
+            truths.put(block.index + row, t, block.truth(row))
+            yield BoardAccel(t, tuple(block.counts[row].tolist()))
+        for late in itertools.chain([pulse] if pulse else [], pulses):
+            yield BoardPulse(late.t_s, late.direction)
+
+
+def _test(options: Options, run: int) -> TableTest:
+    if options.arm_m:
+        return arm_test(options.seed, options.arm_m, run=run)
+    return TableTest(seed=options.seed, profile=options.profile, run=run)
+
+
+def open_link(options: Options) -> tuple[PtyLink | TcpLink, str]:
+    """The line, and its name for people; raises OSError for a path or port in use."""
+    link = TcpLink(options.tcp) if options.tcp is not None else PtyLink(options.link)
+    return link, str(options.link or link.path)
+
+
+def run(options: Options, bus: BusSettings, stop: threading.Event) -> None:
+    """Be the board until `stop` is set; raises ValueError for an unknown profile, OSError for a
+    path or port in use.
+    """
+    test = _test(options, 0)  # before the link: an unknown profile is said at once
+    link, port = open_link(options)
+    truths = TruthPublisher(bus, options.device)
+    log.info("simulated cube, profile %s, seed %d, on %s", test.profile.name, options.seed, port)
+    first = int(time.time()) & 0xFF  # boot counters differ from those of the last process
+    try:
+        for run_number in itertools.count():
+            test = _test(options, run_number)
+            _one_run(test, link, truths, (first + run_number) & 0xFF, options, stop)
+            if options.once or stop.is_set():
+                return
+    finally:
+        truths.close()
+        link.close()
+
+
+def _one_run(
+    test: TableTest,
+    link: PtyLink | TcpLink,
+    truths: TruthPublisher,
+    epoch: int,
+    options: Options,
+    stop: threading.Event,
+) -> None:
+    """One test: the board boots on the still table, and the estimators begin as the published test
+    did.
+    """
+    truths.begin(epoch)
+    board = VirtualBoard(link, SIMULATED, epoch=epoch, firmware="simulated table")
+    table = _table(test, truths, Faults(options.faults))
+    receiver = _rider(test, options.seed) if options.arm_m else _receiver(options.seed)
+    items = heapq.merge(table, receiver, key=lambda item: item.t_s)
+    started = time.monotonic()
+    board.run(
+        itertools.takewhile(lambda item: item.t_s < test.profile.seconds, items),
+        stop,
+        wait_for_reader=True,
+    )
+    log.info(
+        "run ended: %d samples, %d frames built, %d dropped",
+        board.samples,
+        board.built,
+        board.dropped,
+    )
+    stop.wait(max(0.0, started + test.profile.seconds - time.monotonic()) if board.samples else 0.0)

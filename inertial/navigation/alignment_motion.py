@@ -1,0 +1,276 @@
+"""Alignment without a standstill: attitude and biases from a few seconds of fixes and samples under
+way.
+
+The gyros give the body's attitude relative to the window's first fix; the velocities of the fixes
+give what the accelerometers must have felt. Both together, and a course that is roughly the
+heading, are a least-squares problem of twelve unknowns, whose information matrix is the honest
+uncertainty at the start. Equations E-80 to E-84 of docs/equations-in-motion.md (inmotion-alignment,
+section 10.3, with every fix of the window instead of one TRIAD).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from inertial.navigation.strapdown import euler_to_dcm, exp, rotation, rotation_vector
+
+Array = NDArray[np.float64]
+
+UNKNOWNS = 12  # psi_n at the first fix, v_n at the first fix, accelerometer bias, gyro bias
+PSI, V0, BA, BG = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
+BIAS = slice(6, 12)
+STEP = np.concatenate([np.full(3, 1e-5), np.full(3, 1e-3), np.full(3, 1e-3), np.full(3, 1e-5)])
+
+
+@dataclass(frozen=True)
+class MotionSettings:
+    """What is assumed before the window, and when its answer is good enough."""
+
+    shortest: float = 5.0  # s of fixes
+    longest: float = 30.0  # s kept
+    fixes: int = 5  # at least
+    sigma_accel: float = (
+        0.2  # m/s^2, bias of an uncalibrated MEMS accelerometer, its scale error on 1 g included
+    )
+    sigma_gyro: float = math.radians(1.0)  # rad/s, bias of a gyro that has not been seen at rest
+    sigma_slip: float = math.radians(
+        6.0
+    )  # rad, of the course against x_b in one fix; inf: no such knowledge
+    sigma_mount: float = math.radians(
+        4.0
+    )  # rad, of the same in every fix: how straight the board was put in
+    walk: float = 0.1  # m/s/sqrt(s), of the integrated specific force: vibration, scale errors
+    floor_v: float = 0.1  # m/s: no fix's velocity is better
+    good_tilt: float = math.radians(3.0)  # rad, largest sigma of a start
+    good_yaw: float = math.radians(15.0)
+    worst_chi2: float = 3.0  # per degree of freedom; more: samples and fixes do not belong together
+
+
+@dataclass(frozen=True)
+class MotionFix:
+    """Velocity at one instant."""
+
+    t: float  # s
+    v_n: Array  # (3,) m/s
+    sigma_v: Array  # (3,) m/s
+
+
+@dataclass(frozen=True)
+class MotionStart:
+    """Attitude and biases at the window's last fix."""
+
+    C_nb: Array  # (3, 3)
+    bias_accel: Array  # (3,) m/s^2
+    bias_gyro: Array  # (3,) rad/s
+    P: Array  # (9, 9): psi_n, accelerometer bias, gyro bias, in the error state's sense
+    chi2_per_dof: float
+
+    @property
+    def sigma_tilt(self) -> float:
+        """rad, the worse of the two."""
+        return math.sqrt(max(self.P[0, 0], self.P[1, 1]))
+
+    @property
+    def sigma_yaw(self) -> float:
+        """rad."""
+        return math.sqrt(self.P[2, 2])
+
+
+@njit(cache=True)
+def integrate(t: Array, f: Array, w: Array, start: Array, bias: Array, C: Array, u: Array) -> None:
+    """C_0k (m, 3, 3) and u (m, 3) := attitude and specific-force integral in the body at start[0],
+    at start[1:] (E-80).
+
+    bias (6,): of the accelerometer, of the gyro. Sample i acts from t[i - 1] to t[i]; the times lie
+    inside the samples.
+    """
+    R, after, turn, s = np.eye(3), np.empty((3, 3)), np.empty((3, 3)), np.zeros(3)
+    now, k = start[0], 1
+    for i in range(len(t)):
+        while k < len(start) and now < t[i]:
+            dt = min(t[i], start[k]) - now
+            rotation(
+                (w[i, 0] - bias[3]) * dt, (w[i, 1] - bias[4]) * dt, (w[i, 2] - bias[5]) * dt, turn
+            )
+            for r in range(3):
+                for c in range(3):
+                    after[r, c] = R[r, 0] * turn[0, c] + R[r, 1] * turn[1, c] + R[r, 2] * turn[2, c]
+                for c in range(3):
+                    s[r] += 0.5 * (R[r, c] + after[r, c]) * (f[i, c] - bias[c]) * dt
+            R[:, :] = after
+            now += dt
+            if now < start[k] - 1e-9:
+                break
+            C[k - 1], u[k - 1] = R, s
+            now = start[k]
+            k += 1
+
+
+class MotionWindow:
+    """Keeps samples and fixes of the last seconds and solves them."""
+
+    def __init__(self, settings: MotionSettings, gravity: float = 9.80665) -> None:
+        """gravity in m/s^2, at the place."""
+        self.settings = settings
+        self._down = np.array([0.0, 0.0, gravity])
+        self._samples: list[tuple[float, Array, Array]] = []
+        self._fixes: list[MotionFix] = []
+
+    @property
+    def span(self) -> float:
+        """s between the oldest and the newest fix kept."""
+        return self._fixes[-1].t - self._fixes[0].t if self._fixes else 0.0
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._samples, self._fixes = [], []
+
+    def imu(self, t: float, f: Array, w: Array) -> None:
+        """Keep a sample: s, (3,) m/s^2, (3,) rad/s."""
+        self._samples.append((t, f, w))
+        if t - self._samples[0][0] > 2.0 * self.settings.longest + 4.0:
+            first = t - self.settings.longest - 4.0
+            self._samples = [s for s in self._samples if s[0] >= first]
+
+    def fix(self, t: float, v_n: Array, sigma_v: Array) -> None:
+        """Keep a velocity; one that is older than the newest kept is not."""
+        if (
+            not self._samples
+            or t <= self._samples[0][0]
+            or (self._fixes and t <= self._fixes[-1].t)
+        ):
+            return
+        self._fixes.append(
+            MotionFix(t, np.asarray(v_n), np.maximum(sigma_v, self.settings.floor_v))
+        )
+        self._fixes = [f for f in self._fixes if t - f.t <= self.settings.longest]
+
+    def drop_fixes(self) -> None:
+        """Begin the window of fixes again: the vehicle went too slowly for its course to be its
+        heading.
+        """
+        self._fixes = []
+
+    def solve(self) -> MotionStart | None:
+        """Attitude and biases at the newest fix (E-81 to E-84); None while the window is too
+        short.
+        """
+        s = self.settings
+        if (
+            len(self._fixes) < s.fixes
+            or self.span < s.shortest
+            or self._samples[-1][0] < self._fixes[-1].t
+        ):
+            return None
+        problem = _Problem(s, self._down, self._samples, self._fixes)
+        C0, theta = problem.first_guess()
+        for _ in range(6):
+            r, J = problem.residuals(C0, theta), problem.jacobian(C0, theta)
+            step = -np.linalg.lstsq(J, r, rcond=None)[0]
+            C0 = exp(step[PSI]) @ C0
+            theta = theta + np.concatenate([np.zeros(3), step[3:]])
+            if np.linalg.norm(step[PSI]) < 1e-6:
+                break
+        r, J = problem.residuals(C0, theta), problem.jacobian(C0, theta)
+        if not np.isfinite(r).all():
+            return None
+        chi2 = float(r @ r) / max(1, len(r) - UNKNOWNS)
+        return self._at_newest(problem, C0, theta, np.linalg.inv(J.T @ J), chi2)
+
+    def _at_newest(
+        self, problem: "_Problem", C0: Array, theta: Array, P: Array, chi2: float
+    ) -> MotionStart:
+        """Carry attitude and its covariance to the last fix: psi_n there = psi_n - C_n0 (d phi / d
+        bg) bg (E-84).
+        """
+        C_0k, _ = problem.motion(theta)
+        carry = np.zeros((9, UNKNOWNS))
+        carry[0:3, PSI] = carry[3:6, BA] = carry[6:9, BG] = np.eye(3)
+        for j in range(3):
+            d = theta.copy()
+            d[9 + j] += STEP[9]
+            phi = rotation_vector(problem.motion(d)[0][-1] @ C_0k[-1].T)
+            carry[0:3, 9 + j] = C0 @ phi / STEP[9]
+        P9 = carry @ P @ carry.T * max(1.0, chi2)
+        P9[2, 2] += self.settings.sigma_mount**2 if math.isfinite(self.settings.sigma_slip) else 0.0
+        return MotionStart(C0 @ C_0k[-1], theta[BA].copy(), theta[BG].copy(), P9, chi2)
+
+
+class _Problem:
+    """Whitened residuals of one window; theta (12,) with its attitude part always zero, C0 carries
+    it.
+    """
+
+    def __init__(
+        self, s: MotionSettings, down: Array, samples: list, fixes: list[MotionFix]
+    ) -> None:
+        self._s, self._down = s, down
+        keep = [x for x in samples if x[0] > fixes[0].t]
+        self._t = np.array([x[0] for x in keep])
+        self._f, self._w = np.array([x[1] for x in keep]), np.array([x[2] for x in keep])
+        self._times = np.array([fix.t for fix in fixes])
+        self._v = np.array([fix.v_n for fix in fixes])
+        passed = np.array([fix.t - fixes[0].t for fix in fixes])
+        self._passed = passed
+        self._sigma_v = np.sqrt(
+            np.array([fix.sigma_v for fix in fixes]) ** 2 + (s.walk**2 * passed)[:, None]
+        )
+
+    def motion(self, theta: Array) -> tuple[Array, Array]:
+        """C_0k (m, 3, 3) and u (m, 3), first row the window's start."""
+        m = len(self._times) - 1
+        C, u = np.empty((m, 3, 3)), np.empty((m, 3))
+        integrate(self._t, self._f, self._w, self._times, theta[BIAS], C, u)
+        return np.concatenate([np.eye(3)[None], C]), np.concatenate([np.zeros((1, 3)), u])
+
+    def first_guess(self) -> tuple[Array, Array]:
+        """C_n0 with heading along the mean course and tilt from the mean force; no biases."""
+        theta = np.zeros(UNKNOWNS)
+        theta[V0] = self._v[0]
+        C, u = self.motion(theta)
+        felt = (self._v[-1] - self._v[0]) - self._down * self._passed[-1]  # what u must be in n
+        course = math.atan2(self._v[0, 1], self._v[0, 0])
+        level = euler_to_dcm(0.0, 0.0, course).T @ felt
+        a, b = level / np.linalg.norm(level), u[-1] / np.linalg.norm(u[-1])
+        axis, cosine = np.cross(b, a), float(a @ b)
+        if np.linalg.norm(axis) < 1e-9:
+            tilt = np.eye(3) if cosine > 0 else np.diag([1.0, -1.0, -1.0])
+        else:
+            tilt = exp(
+                axis / np.linalg.norm(axis) * math.atan2(float(np.linalg.norm(axis)), cosine)
+            )
+        return euler_to_dcm(0.0, 0.0, course) @ tilt, theta
+
+    def residuals(self, C0: Array, theta: Array) -> Array:
+        """Velocities, courses and what is known of the biases, each over its sigma (E-81 to
+        E-83).
+        """
+        s = self._s
+        C, u = self.motion(theta)
+        v = theta[V0] + self._passed[:, None] * self._down + u @ C0.T
+        rows = [
+            ((v - self._v) / self._sigma_v).ravel(),
+            theta[BA] / s.sigma_accel,
+            theta[BG] / s.sigma_gyro,
+        ]
+        if math.isfinite(s.sigma_slip):
+            speed = np.linalg.norm(self._v[:, :2], axis=1)
+            x_n = np.einsum("ij,kj->ki", C0, C[:, :, 0])
+            angle = np.arctan2(x_n[:, 1], x_n[:, 0]) - np.arctan2(self._v[:, 1], self._v[:, 0])
+            sigma = np.hypot(s.sigma_slip, self._sigma_v[:, 0] / np.maximum(speed, 1e-3))
+            rows.append((np.mod(angle + math.pi, 2.0 * math.pi) - math.pi) / sigma)
+        return np.concatenate(rows)
+
+    def jacobian(self, C0: Array, theta: Array) -> Array:
+        """By central differences: twelve unknowns, a few thousand samples, compiled."""
+        columns = []
+        for j in range(UNKNOWNS):
+            d = np.zeros(UNKNOWNS)
+            d[j] = STEP[j]
+            plus = self.residuals(exp(d[PSI]) @ C0, theta + np.concatenate([np.zeros(3), d[3:]]))
+            minus = self.residuals(exp(-d[PSI]) @ C0, theta - np.concatenate([np.zeros(3), d[3:]]))
+            columns.append((plus - minus) / (2.0 * STEP[j]))
+        return np.column_stack(columns)

@@ -1,0 +1,183 @@
+"""The navigation filters by name: what each believes and what it makes of a fix. docs/navigation.md
+compares them.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.navigation import fuzzy
+from inertial.navigation.constraints import Rules
+from inertial.navigation.error_model import ImuNoise
+from inertial.navigation.estimate import Memory, Settings
+from inertial.navigation.fix import FixSettings
+from inertial.navigation.leg import Model, make_model, new_leg
+from inertial.navigation.window import ARRIVAL_KF, ARRIVAL_MEAN, ARRIVAL_P0, CAPACITY, new_window
+
+Array = NDArray[np.float64]
+
+ARRIVALS = {"p0": ARRIVAL_P0, "mean": ARRIVAL_MEAN, "kf": ARRIVAL_KF}
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """What the vehicle cannot do."""
+
+    car: bool = False  # wheels do not slide sideways and do not leave the ground
+    standstill: bool = False  # zero velocity and zero rate while it stands
+    every: float = 0.5  # s
+    sigma_side: float = 0.2  # m/s, correlated in time: so more than a single look would show
+    sigma_up: float = 0.2  # m/s
+    least_speed: float = 2.0  # m/s
+    most_turn: float = 0.7  # rad/s
+    still_v: float = 0.05  # m/s
+    still_w: float = math.radians(0.1)  # rad/s
+    still_speed: float = 0.5  # m/s
+    still_f_change: float = 0.12  # m/s^2, of means over 0.1 s
+    still_w_change: float = math.radians(0.4)  # rad/s
+    huber: float = 2.0
+    sigma_mount: float = math.radians(4.0)  # rad, of both mounting angles at the start
+    axle: float = 1.0  # m, the rear axle behind the IMU, at the start
+    sigma_axle: float = 1.0  # m
+
+
+@dataclass(frozen=True)
+class FilterConfig:
+    """One filter. Default: the plain error-state Kalman filter with 15 states."""
+
+    window: Literal["none", "predictive", "robust"] = "none"
+    horizon: int = 0  # fixes, 1 to 10; 0: fuzzy
+    arrival: Literal["p0", "mean", "kf"] = "mean"
+    kappa: float = 4.0  # on the mean covariance
+    mean_covariance: tuple[tuple[float, ...], ...] | None = (
+        None  # (n, n) of a calibration run; None: this one's
+    )
+    literal: bool = False  # fuzzy inputs as read, not conditioned
+    rules: fuzzy.FuzzyRules = fuzzy.RULES
+    huber: float = (
+        math.inf
+    )  # Mahalanobis distance of position or velocity from which a fix is weighted down
+    passes: int = 3  # of reweighting in a robust horizon
+    fading: float = 1.0  # forgetting factor on the covariance, 1.05 to 1.1 for sensors that jump
+    scale: bool = False  # six scale factors as states
+    sigma_scale: float = 0.01
+    latency: bool = False  # of the receiver's position and velocity, as states
+    sigma_latency: tuple[float, float] = (0.05, 0.1)  # s, position, velocity
+    constraints: Constraints = Constraints()
+    gated: bool = True  # refuse fixes beyond FixSettings.gate
+
+    def model(self, noise: ImuNoise) -> Model:
+        """The states of this filter."""
+        return make_model(noise, self.scale, self.latency, self.constraints.car)
+
+    def extra_sigma(self) -> list[float]:
+        """1-sigma of the states beyond 15 at the start, in their order."""
+        c = self.constraints
+        return (
+            [self.sigma_scale] * 6 * self.scale
+            + list(self.sigma_latency) * self.latency
+            + [c.sigma_mount, c.sigma_mount, c.sigma_axle] * c.car
+        )
+
+    def settings(self, fix: FixSettings, lever_arm_b: tuple[float, float, float]) -> Settings:
+        """As the compiled code takes it."""
+        gates = np.array(
+            [math.inf, *(fix.gate(dof) if self.gated else math.inf for dof in range(1, 8))]
+        )
+        c = self.constraints
+        every = c.every if c.car or c.standstill else math.inf
+        rules = Rules(
+            every,
+            c.sigma_side,
+            c.sigma_up,
+            c.least_speed,
+            c.most_turn,
+            c.still_v,
+            c.still_w,
+            c.still_speed if c.standstill else -1.0,
+            c.still_f_change,
+            c.still_w_change,
+            c.huber,
+        )
+        kind = ("none", "predictive", "robust").index(self.window)
+        return Settings(
+            gates,
+            fix.readmit_after,
+            self.fading,
+            self.huber,
+            kind,
+            self.horizon,
+            ARRIVALS[self.arrival],
+            self.kappa,
+            self.passes,
+            int(self.literal),
+            self.rules.vector(),
+            rules,
+            np.array(lever_arm_b, dtype=np.float64),
+        )
+
+    def memory(self, n: int, P0: Array, still_f: float) -> Memory:
+        """Everything the filter remembers besides its leg, at the start of navigation with
+        covariance P0 (n, n).
+        """
+        window = new_window(n, CAPACITY if self.window != "none" else 0)
+        window.P0[:] = P0
+        window.Pk[:] = P0
+        if self.mean_covariance is not None:
+            window.mean[:] = np.array(self.mean_covariance)
+            window.count[2] = -1  # given: nothing is summed up
+        return Memory(
+            window,
+            new_leg(n),
+            np.zeros(2, np.int64),
+            np.array([still_f]),
+            np.zeros((3, n, n)),
+            np.zeros(n),
+        )
+
+
+_CAR = Constraints(car=True, standstill=True)
+_ROBUST = FilterConfig(huber=2.5, latency=True)
+
+FILTERS: dict[str, FilterConfig] = {
+    "kf": FilterConfig(),
+    "kf-nhc": FilterConfig(latency=True, constraints=_CAR),
+    "kf-fading": FilterConfig(fading=1.05),
+    "kf-scale": FilterConfig(scale=True, latency=True),
+    "kf-latency": FilterConfig(latency=True),
+    "kf-still": FilterConfig(latency=True, constraints=Constraints(standstill=True)),
+    "huber": _ROBUST,
+    "huber-nhc": replace(_ROBUST, constraints=_CAR),
+    "mhe-robust": replace(_ROBUST, window="robust", horizon=10),
+    **{
+        f"fpe-p0-n{n}": FilterConfig(window="predictive", horizon=n, arrival="p0")
+        for n in range(1, 11)
+    },
+    **{
+        f"fpe-mean-n{n}": FilterConfig(window="predictive", horizon=n, kappa=1.0)
+        for n in range(1, 11)
+    },
+    **{
+        f"fpe-4mean-n{n}": FilterConfig(window="predictive", horizon=n, kappa=4.0)
+        for n in range(1, 11)
+    },
+    "fpe-p0-fuzzy": FilterConfig(window="predictive", arrival="p0"),
+    "fpe-mean-fuzzy": FilterConfig(window="predictive", kappa=1.0),
+    "fpe-fuzzy": FilterConfig(window="predictive", kappa=4.0),
+    "fpe-fuzzy-literal": FilterConfig(window="predictive", kappa=4.0, literal=True),
+}
+DEFAULT = "huber-nhc"
+
+
+class UnknownFilter(ValueError):
+    """A name that is not in the table."""
+
+
+def filter_of(name: str) -> FilterConfig:
+    """The filter of a name; raises UnknownFilter with the known ones."""
+    if name not in FILTERS:
+        raise UnknownFilter(f"no navigation filter {name!r}; want one of {', '.join(FILTERS)}")
+    return FILTERS[name]

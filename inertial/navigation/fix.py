@@ -1,0 +1,145 @@
+"""A GNSS fix as a navigation filter takes it: numbers, their trust, and the reasons to refuse
+it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from inertial.navigation.update import (
+    F_GEO,
+    F_HAS_V,
+    F_HAS_YAW,
+    F_SIGMA,
+    F_T,
+    F_TIMING,
+    F_V,
+    F_WITHHELD,
+    F_YAW,
+    FIX_COLUMNS,
+)
+
+Array = NDArray[np.float64]
+
+NONE, AUTONOMOUS, DIFFERENTIAL, RTK_FLOAT, RTK_FIXED, DEAD_RECKONING = range(
+    6
+)  # GnssFix.Quality of the bus
+
+# 1-sigma north, east, up (m) and of velocity (m/s) by quality, for receivers that do not give their
+# own
+TYPICAL = {
+    AUTONOMOUS: ((1.6, 1.6, 3.2), (0.1, 0.1, 0.2)),
+    DIFFERENTIAL: ((0.8, 0.8, 1.6), (0.1, 0.1, 0.2)),
+    RTK_FLOAT: ((0.3, 0.3, 0.6), (0.07, 0.07, 0.12)),
+    RTK_FIXED: ((0.02, 0.02, 0.03), (0.05, 0.05, 0.08)),
+}
+
+
+@dataclass(frozen=True)
+class Fix:
+    """One GNSS epoch on the samples' clock."""
+
+    t: float  # s, the instant it is for
+    arrival: float  # s, when its first byte came
+    latitude: float  # rad
+    longitude: float  # rad
+    height: float  # m above the ellipsoid
+    quality: int
+    sigma_p: Array  # (3,) m, north east up
+    v_n: Array | None = None  # (3,) m/s
+    sigma_v: Array | None = None  # (3,) m/s, with v_n
+    withheld: bool = False  # only to score the filter with
+    muted: bool = False  # withheld, because an operator asked for an outage
+    key: int = 0  # whatever the caller needs to know it by
+    yaw: float | None = None  # rad, heading by two antennas
+    sigma_yaw: float = 0.01  # rad, with yaw
+    # m/s, by which its position walks off its own velocity; then sigma_p is raised, see drag
+    drag: float = 0.0
+
+    def due(self, settle: float) -> float:
+        """When it is used, s."""
+        return max(self.t, self.arrival + settle)
+
+    def vector(self) -> Array:
+        """(6,) as fix_residual takes it."""
+        v = self.v_n if self.v_n is not None else np.zeros(3)
+        return np.array([self.latitude, self.longitude, self.height, *v])
+
+
+@dataclass(frozen=True)
+class FixSettings:
+    """How far a receiver is believed."""
+
+    floor_p: tuple[float, float, float] = (
+        0.02,
+        0.02,
+        0.03,
+    )  # m: no fix is better, whatever its receiver says
+    floor_v: tuple[float, float, float] = (
+        0.1,
+        0.1,
+        0.15,
+    )  # m/s: a receiver's velocity lags in turns
+    floor_yaw: float = 0.005  # rad, of a heading by two antennas
+    timing: float = 0.002  # s, of the fix's time against the samples' clock: counts with the speed
+    false_alarm: float = (
+        1e-6  # chance that the NIS gate refuses a good fix of a filter whose model is right
+    )
+    readmit_after: int = (
+        10  # rejections in a row after which the filter, not the receiver, is taken to be wrong
+    )
+
+    def gate(self, dof: int) -> float:
+        """Largest NIS that is accepted."""
+        return _gate(self.false_alarm, dof)
+
+    def objection(self, fix: Fix) -> str:
+        """Why this fix must not be used, in words; empty when it may."""
+        if fix.quality in (NONE, DEAD_RECKONING):
+            return "the receiver has no satellite fix"
+        numbers = np.concatenate(
+            [fix.vector(), fix.sigma_p, fix.sigma_v if fix.sigma_v is not None else []]
+        )
+        if not np.isfinite(numbers).all() or abs(fix.latitude) > np.pi / 2.0:
+            return "not a position"
+        return ""
+
+
+_GATES: dict[tuple[float, int], float] = {}
+
+
+def _gate(false_alarm: float, dof: int) -> float:
+    key = (false_alarm, dof)
+    if key not in _GATES:
+        _GATES[key] = float(chi2.isf(false_alarm, dof))
+    return _GATES[key]
+
+
+def typical_sigma(quality: int) -> tuple[Array, Array]:
+    """Position and velocity sigma, (3,) each, m and m/s, of a receiver that does not say."""
+    position, velocity = TYPICAL.get(quality, TYPICAL[AUTONOMOUS])
+    return np.array(position), np.array(velocity)
+
+
+def fix_row(fix: Fix, settings: FixSettings) -> Array:
+    """A row (FIX_COLUMNS,) of the compiled filters' table, see update: numbers and floored sigmas
+    (E-31).
+    """
+    row = np.zeros(FIX_COLUMNS)
+    row[F_T] = fix.t
+    row[F_GEO : F_GEO + 3] = fix.latitude, fix.longitude, fix.height
+    row[F_SIGMA : F_SIGMA + 3] = np.maximum(fix.sigma_p, settings.floor_p)
+    if fix.v_n is not None:
+        row[F_V : F_V + 3] = fix.v_n
+        row[F_SIGMA + 3 : F_SIGMA + 6] = np.maximum(fix.sigma_v, settings.floor_v)
+        row[F_HAS_V] = 1.0
+    if fix.yaw is not None:
+        row[F_YAW], row[F_SIGMA + 6], row[F_HAS_YAW] = (
+            fix.yaw,
+            max(fix.sigma_yaw, settings.floor_yaw),
+            1.0,
+        )
+    row[F_WITHHELD], row[F_TIMING] = float(fix.withheld), settings.timing
+    return row

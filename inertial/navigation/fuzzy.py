@@ -1,0 +1,134 @@
+"""The fuzzy horizon: how hard the vehicle moves decides how many fixes the predictive estimator
+looks back. E-48, E-49.
+
+Sets S, M, H on |f| and |w|, nine rules, singleton consequents. Break points and rules stand in
+fuzzy_horizon.toml beside this module, which people may edit; RULES is what it says.
+"""
+
+import math
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+DEFAULT_FILE = Path(__file__).with_name("fuzzy_horizon.toml")
+SETS = ("small", "medium", "high")
+MEMBERSHIPS = tuple(f"{what} {name}" for what in ("|f|", "|ω|") for name in SETS)
+
+
+class FuzzyError(ValueError):
+    """A file of rules that cannot be used."""
+
+
+@dataclass(frozen=True)
+class FuzzyRules:
+    """Break points of the sets and the consequents of the rules."""
+
+    force: tuple[float, float, float] = (
+        9.9,
+        10.2,
+        10.8,
+    )  # m/s^2: S falls to 0 at the second, H is 1 from the third
+    rate: tuple[float, float, float] = (0.05, 0.20, 0.45)  # rad/s
+    table: tuple[tuple[float, float, float], ...] = (
+        (1.0, 2.0, 3.0),
+        (4.0, 5.0, 6.0),
+        (7.0, 8.0, 9.0),
+    )
+    minimum: bool = False  # combine the sets by their minimum instead of their product
+
+    def vector(self) -> Array:
+        """(16,) as the compiled code takes it."""
+        rules = [value for row in self.table for value in row]
+        return np.array([*self.force, *self.rate, *rules, float(self.minimum)])
+
+
+def read_rules(path: Path = DEFAULT_FILE) -> FuzzyRules:
+    """Rules from TOML; raises FuzzyError that names the file, the key and what is wanted."""
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, tomllib.TOMLDecodeError) as error:
+        raise FuzzyError(f"{path}: {error}") from None
+    known = {"force_mps2", "rate_radps", "combine", "rules"}
+    if unknown := data.keys() - known:
+        raise FuzzyError(
+            f"{path}: no such key {sorted(unknown)[0]!r}; want {', '.join(sorted(known))}"
+        )
+    points = [_points(path, key, data.get(key)) for key in ("force_mps2", "rate_radps")]
+    table = data.get("rules")
+    if not (
+        isinstance(table, list)
+        and len(table) == 3
+        and all(isinstance(r, list) and len(r) == 3 for r in table)
+    ):
+        raise FuzzyError(
+            f"{path}: rules: want three rows (|f| small, medium, high) of three numbers (|w|"
+            " likewise)"
+        )
+    if not all(isinstance(v, int | float) and 0.0 <= v <= 9.0 for row in table for v in row):
+        raise FuzzyError(f"{path}: rules: want numbers from 0 to 9, to which one fix is added")
+    combine = data.get("combine", "product")
+    if combine not in ("product", "minimum"):
+        raise FuzzyError(f"{path}: combine = {combine!r}: want 'product' or 'minimum'")
+    rows = tuple((float(a), float(b), float(c)) for a, b, c in table)
+    return FuzzyRules(points[0], points[1], rows, combine == "minimum")
+
+
+def _points(path: Path, key: str, value: object) -> tuple[float, float, float]:
+    if not (
+        isinstance(value, list)
+        and len(value) == 3
+        and all(isinstance(v, int | float) for v in value)
+    ):
+        raise FuzzyError(f"{path}: {key} = {value!r}: want three numbers")
+    a, b, c = (float(v) for v in value)
+    if not (math.isfinite(a) and math.isfinite(c) and a < b < c):
+        raise FuzzyError(f"{path}: {key} = {value!r}: want them rising")
+    return a, b, c
+
+
+@njit(cache=True)
+def membership(value: float, points: Array, out: Array) -> None:
+    """S, M, H (3,) of a value: a partition of unity over three break points."""
+    s = min(1.0, max(0.0, (points[1] - value) / (points[1] - points[0])))
+    h = min(1.0, max(0.0, (value - points[1]) / (points[2] - points[1])))
+    out[0], out[1], out[2] = s, 1.0 - s - h, h
+
+
+RULES = read_rules()
+
+
+def memberships(force: float, rate: float, rules: FuzzyRules = RULES) -> list[float]:
+    """Six numbers in the order of MEMBERSHIPS, for |f| in m/s^2 and |w| in rad/s."""
+    out = np.empty(6)
+    membership(force, np.array(rules.force), out[:3])
+    membership(rate, np.array(rules.rate), out[3:])
+    return out.tolist()
+
+
+@njit(cache=True)
+def horizon(force: float, rate: float, rules: Array) -> float:
+    """1 + No, not yet rounded, from |f| in m/s^2 and |w| in rad/s; rules as FuzzyRules.vector
+    (E-49).
+    """
+    a, b = np.empty(3), np.empty(3)
+    membership(force, rules[0:3], a)
+    membership(rate, rules[3:6], b)
+    total = weight = 0.0
+    for i in range(3):
+        for j in range(3):
+            w = min(a[i], b[j]) if rules[15] > 0.0 else a[i] * b[j]
+            weight += w
+            total += w * rules[6 + 3 * i + j]
+    return 1.0 + total / weight
+
+
+@njit(cache=True)
+def fixes(crisp: float) -> int:
+    """N: the horizon rounded half up, 2 to 10 fixes (E-49)."""
+    return int(min(10.0, max(2.0, math.floor(crisp + 0.5))))

@@ -1,0 +1,214 @@
+"""The products filters: settings, one sample or a whole log at a time, exclusion of axes.
+
+Four triads measure w_i w_j without integration (gyro-free-imu, section 6). The filter integrates
+omega' and corrects it by the products; the sign comes from the integral. Standstill gives zero rate
+and biases; gravity's direction adds omega_x and omega_y. Layouts that see fewer combinations of the
+products use those; the rest is integration.
+Model: products_model.py (E-30 to E-39). What one sample does is compiled: products_run.py.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.layouts.layout import Layout
+from inertial.rate import bound_live
+from inertial.rate import products_kernel as kernel
+from inertial.rate import products_run as frame
+from inertial.rate import products_track as track
+from inertial.rate import still as stillness
+from inertial.rate.bound import IN_USE, Along
+from inertial.rate.direct import Direct
+from inertial.rate.observed import carry_biases, sensor
+from inertial.rate.products_kernel import PP, Tuning
+from inertial.rate.products_model import BIASES, STATES
+from inertial.rate.products_track import Track
+
+Array = NDArray[np.float64]
+
+METHODS = {"ekf": kernel.EKF, "ukf": kernel.UKF, "forget": kernel.FORGET, "horizon": kernel.HORIZON}
+EARTH_RATE = 7.292115e-5  # rad/s, WGS-84
+
+
+@dataclass(frozen=True)
+class Config:
+    """What the filter believes of sensors and motion; sigmas."""
+
+    still: stillness.Config = field(
+        default_factory=stillness.Config
+    )  # its sigma_axis is the filter's noise too
+    bias: float = 0.4  # m/s^2, of one axis before the first standstill: 40 mg
+    scale: float = 0.007  # scale and cross-axis error left after calibration, of 1
+    drift: float = 3e-4  # m/s^2 per root second, bias instability of one axis
+    tilt: float = 0.05  # rad, of the first levelling
+    gravity: float = 0.01  # m/s^2, of local gravity
+    centre: float = 0.02  # m/s^2, white acceleration of the centre while it turns: vibration
+    pivot: float = 0.2  # m, of the centre from the point it turns about
+    pivot_drift: float = 1e-4  # m per root second
+    still_rate: float = 0.01  # rad/s, of a standstill over one window
+    force_gate: float = 30.0  # NIS, 3 degrees: above it the centre accelerates, gravity is not used
+    products_gate: float = 60.0  # NIS, 6 degrees: above it the sample is damaged
+    unseen_rate: float = 0.03  # rad/s, of a turn that has begun and is not noticed yet
+    unseen_alpha: float = 5.0  # rad/s^2, of a turn during a damaged sample
+    forget_s: float = 4.0  # s, memory of the filter with forgetting
+    start_turning: float = 2.0  # sigmas of bias that a product must exceed to start while turning
+    latitude: float | None = None  # rad; given, a standing body turns with the Earth
+    fixed_axis: bool = (
+        True  # omega keeps its direction in the body, as on a table, until omega' says otherwise
+    )
+    axis_wander: float = 4e-4  # rad/s per root second, of omega across a fixed axis
+    axis_from: float = 0.4  # rad/s; below it no axis is known
+    axis_limit: float = (
+        22.0  # chi-square, 2 degrees, of omega' across the axis over 16 and 64 samples
+    )
+    axis_lost: float = (
+        0.05  # rad/s, what omega across the axis may have become when that is noticed
+    )
+    gravity_aid: bool = True  # tilt from gravity where the centre's motion allows
+
+
+def tuning(config: Config, method: str = "ekf") -> Tuning:
+    """Config for compiled functions."""
+    c, g = config, kernel.GRAVITY
+    north = 0.0 if c.latitude is None else EARTH_RATE * float(np.cos(c.latitude))
+    down = 0.0 if c.latitude is None else -EARTH_RATE * float(np.sin(c.latitude))
+    values = {
+        "method": METHODS[method],
+        "scale": c.scale**2,
+        "drift": c.drift**2,
+        "centre": c.centre**2,
+        "pivot_drift": c.pivot_drift**2,
+        "still_rate": c.still.window * c.still_rate**2,
+        "products_gate": c.products_gate,
+        "force_gate": c.force_gate,
+        "unseen_alpha": c.unseen_alpha**2,
+        "forget": 1.0 / c.forget_s,
+        "bias": c.bias**2,
+        "tilt": (c.tilt * g) ** 2,
+        "gravity": c.gravity**2,
+        "pivot": c.pivot**2,
+        "centre_sees": c.gravity_aid,
+        "start_turning": c.start_turning**2,
+        "axis": c.axis_wander**2 if c.fixed_axis else 0.0,
+        "axis_from": c.axis_from**2,
+        "axis_limit": c.axis_limit,
+        "axis_lost": c.axis_lost**2,
+        "earth_north": north,
+        "earth_down": down,
+    }
+    out = np.zeros(1, kernel.TUNING)[0]
+    for name in kernel.TUNING.names:
+        out[name] = values[name]
+    return out
+
+
+_run = Direct(track.run)
+_UNBOUND = bound_live.memory(IN_USE)  # what a run takes that follows no bound
+
+
+class ProductsFilter:
+    """Memory and constants of one filter of one layout."""
+
+    def __init__(self, layout: Layout, config: Config = Config(), method: str = "ekf") -> None:
+        """Raises GeometryError for a layout that does not see angular acceleration and specific
+        force.
+        """
+        self.layout, self.config = layout, config
+        self.sensor = sensor(layout, config.still.sigma_axis)
+        self.tuning = tuning(config, method)
+        self.limits = stillness.limits(config.still)
+        self.memory, self.watch = frame.memory(), stillness.memory()
+        self.excluded = 0
+
+    @property
+    def refused(self) -> dict[str, int]:
+        """Corrections not used because their NIS was beyond its gate: by the products, by gravity
+        ("force").
+        """
+        marks = self.memory.marks
+        return {"products": int(marks[frame.REFUSED]), "force": int(marks[frame.REFUSED_FORCE])}
+
+    @property
+    def lost(self) -> int:
+        """How often the filter had to start anew: a rate beyond all bounds, or a covariance that is
+        none.
+        """
+        return int(self.memory.marks[frame.LOST])
+
+    def rows(self, t_s: Array, f_axis: Array, bound: Along | None = None) -> Array:
+        """Samples (n, N), m/s^2, at t_s (n,), s, both checked: a row of products_track (n, WIDTH)
+        after each.
+
+        bound follows the estimate; without one, nothing is said of it.
+        """
+        out = np.empty((len(t_s), track.WIDTH))
+        along, whole, follows = (
+            (_UNBOUND, self.sensor, False) if bound is None else (bound.memory, bound.sensor, True)
+        )
+        _run(
+            self.memory,
+            self.watch,
+            self.sensor,
+            self.tuning,
+            self.limits,
+            along,
+            whole,
+            follows,
+            t_s,
+            f_axis,
+            out,
+        )
+        return out
+
+    def gap(self) -> None:
+        """Samples are missing: the next step predicts across."""
+        frame.gap(self.memory, self.watch)
+
+    def run(self, t_s: Array, f_axis: Array) -> Track:
+        """All samples (n, N) at once; the same bits as in parts. Raises ValueError for unusable
+        input.
+        """
+        t_s, f_axis = (
+            np.ascontiguousarray(t_s, dtype=np.float64),
+            np.ascontiguousarray(f_axis, dtype=np.float64),
+        )
+        if f_axis.shape != (len(t_s), self.layout.axes):
+            raise ValueError(
+                f"readings {f_axis.shape}, want ({len(t_s)}, {self.layout.axes}) of"
+                f" {self.layout.name}"
+            )
+        if not (np.isfinite(f_axis).all() and (np.diff(t_s) > 0.0).all()):
+            raise ValueError(
+                "readings that are not finite, or times that do not grow: clean the log first"
+            )
+        return track.of(self.rows(t_s, f_axis))
+
+    def exclude(self, mask: int) -> None:
+        """Go on without the axes of the mask's bits; what the biases were is carried over (E-42).
+
+        Raises GeometryError, and changes nothing, when the rest does not see omega' and p.
+        """
+        if mask == self.excluded:
+            return
+        old, new = self.sensor, sensor(self.layout, self.config.still.sigma_axis, mask)
+        T, free = carry_biases(old, new, self.config.bias)
+        m, w = self.memory, self.watch
+        w.y[:] = 0.0
+        stillness.forget(w)
+        w.n[stillness.LEARNT] = 0
+        m.kept_at[:] = -1
+        m.marks[frame.FITTED] = 0
+        for core in (m.core, m.other):
+            x, P = core[:STATES], core[STATES:PP].reshape(STATES, STATES)
+            full = np.eye(STATES)
+            full[np.ix_(BIASES, BIASES)] = T
+            x[:] = full @ x
+            P[:] = full @ P @ full.T
+            P[np.ix_(BIASES, BIASES)] += free
+            core[kernel.REST_BIAS : kernel.REST_VARIANCE] = (
+                T @ core[kernel.REST_BIAS : kernel.REST_VARIANCE]
+            )
+            variance = P[BIASES, BIASES]
+            core[kernel.REST_VARIANCE : kernel.LEVEL] = core[kernel.LEVEL : kernel.REST] = variance
+        self.sensor, self.excluded = new, mask

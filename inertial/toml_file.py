@@ -1,0 +1,50 @@
+"""A versioned TOML file of ours: written whole or not at all, read with an error that says what is
+wrong with it.
+"""
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import tomli_w
+
+T = TypeVar("T")
+
+
+def write_whole(table: dict[str, Any], path: Path) -> None:
+    """Write a table; a file that is there stays as it was until the new one is complete. Raises
+    OSError.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(path.name + ".part")
+    draft.write_bytes(tomli_w.dumps(table).encode())
+    draft.replace(path)
+
+
+def read_versioned(
+    path: Path,
+    kind: str,
+    version: int,
+    parse: Callable[[dict[str, Any]], T],
+    error: type[ValueError],
+    remedy: str = "",
+) -> T:
+    """What `parse` makes of the table of a file with this `version`; `kind` in words, its last word
+    is its short name.
+
+    Raises `error` for a file that is none or is not whole, OSError for one that cannot be read.
+    `remedy` is what to do about another version.
+    """
+    try:
+        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
+        raise error(f"{path}: no {kind}: {fault}") from None
+    if table.get("version") != version:
+        found = f"{kind.split()[-1]} version {table.get('version')!r}"
+        raise error(f"{path}: {found}, this program reads {version}{remedy}")
+    try:
+        return parse(table)
+    except (KeyError, TypeError, ValueError) as fault:
+        raise error(f"{path}: not a whole {kind} ({type(fault).__name__}: {fault})") from None

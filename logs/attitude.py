@@ -1,0 +1,140 @@
+"""Attitude filters on logs with a reference: what `gyrofree run LOG --attitude` prints."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.attitude.filters import ATTITUDES
+from logs.attitude_log import LogError, Trial, read_trials
+
+Array = NDArray[np.float64]
+
+Progress = Callable[[float, str], None]
+
+
+def run_attitude(
+    log: Path,
+    *,
+    filters: list[str] | None = None,
+    plot: Path | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Run filters over one log, or every log of a folder, and score their inclination where the
+    reference is good.
+
+    filters: names of ATTITUDES; None: all. plot: an image file (.png, .svg, .pdf) of the errors
+    along time. Returns {"filters": {name: figures}, "default": name, "logs": {log: {"rate_hz",
+    "samples", "scored", "filters": {name: figures}}}}; figures are inclination_rms_rad,
+    inclination_max_rad and us_per_sample, at the top the mean over the logs (the largest of the
+    maxima). Raises LogError, a ValueError.
+    """
+    names = list(ATTITUDES) if filters is None else filters
+    for name in names:
+        if name not in ATTITUDES:
+            raise LogError(f"no attitude filter {name!r}; want some of {', '.join(ATTITUDES)}")
+    if not names:
+        raise LogError(f"no attitude filter named; want some of {', '.join(ATTITUDES)}")
+    trials = read_trials(Path(log))
+    logs, errors = {}, {}
+    for k, trial in enumerate(trials):
+        figures = {}
+        for j, name in enumerate(names):
+            if progress:
+                progress((k + j / len(names)) / len(trials), f"{trial.name}: {name}")
+            error, cost = run_filter(trial, name)
+            errors[trial.name, name] = error
+            figures[name] = _figures(error[trial.scored], cost)
+        logs[trial.name] = {
+            "rate_hz": 1.0 / trial.period,
+            "samples": len(trial.t),
+            "scored": int(trial.scored.sum()),
+            "filters": figures,
+        }
+    if progress:
+        progress(1.0, "done")
+    if plot is not None:
+        _draw(Path(plot), trials, names, errors)
+    return {
+        "filters": {name: _mean(logs, name) for name in names},
+        "default": next(iter(ATTITUDES)),
+        "logs": logs,
+    }
+
+
+def run_filter(trial: Trial, name: str) -> tuple[Array, float]:
+    """Inclination error (n,) rad of one filter, nan without a reference, and its time per sample,
+    us.
+    """
+    ATTITUDES[name](trial.period).batch(
+        trial.f_b[:2], trial.omega_b[:2]
+    )  # compile before the clock runs
+    attitude = ATTITUDES[name](trial.period)
+    started = time.perf_counter_ns()
+    q_nb = attitude.batch(trial.f_b, trial.omega_b)
+    cost = (time.perf_counter_ns() - started) / 1000.0 / len(trial.t)
+    return inclination_error(q_nb, trial.up_b), cost
+
+
+def inclination_error(q_nb: Array, up_b: Array) -> Array:
+    """Angle (n,) rad between up by q_nb (n, 4) and by the reference (n, 3): 2 acos(sqrt(w^2 + z^2))
+    of the error.
+    """
+    w, x, y, z = q_nb.T
+    up = -np.column_stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
+    return np.arctan2(np.linalg.norm(np.cross(up, up_b), axis=1), np.einsum("ij,ij->i", up, up_b))
+
+
+def _figures(error: Array, cost: float) -> dict[str, float]:
+    return {
+        "inclination_rms_rad": float(np.sqrt(np.mean(error**2))),
+        "inclination_max_rad": float(error.max()),
+        "us_per_sample": cost,
+    }
+
+
+def _mean(logs: dict[str, Any], name: str) -> dict[str, float]:
+    rows = [entry["filters"][name] for entry in logs.values()]
+    return {
+        "inclination_rms_rad": float(np.mean([r["inclination_rms_rad"] for r in rows])),
+        "inclination_max_rad": max(r["inclination_max_rad"] for r in rows),
+        "us_per_sample": float(np.mean([r["us_per_sample"] for r in rows])),
+    }
+
+
+def _draw(
+    file: Path, trials: list[Trial], names: list[str], errors: dict[tuple[str, str], Array]
+) -> None:
+    import matplotlib  # here: slow to load, and only pictures need it
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(
+        len(trials), 1, figsize=(10, 1.0 + 2.4 * len(trials)), squeeze=False
+    )
+    for axis, trial in zip(axes[:, 0], trials, strict=True):
+        step = max(1, len(trial.t) // 3000)
+        for name, colour in zip(
+            names, ("#0072b2", "#e69f00", "#cc79a7", "#009e73", "#56b4e9"), strict=False
+        ):
+            error = np.degrees(np.where(trial.scored, errors[trial.name, name], np.nan))
+            rms = np.sqrt(np.nanmean(error**2))
+            axis.semilogy(
+                trial.t[::step],
+                error[::step],
+                lw=0.8,
+                color=colour,
+                label=f"{name}: {rms:.2f}° RMS",
+            )
+        axis.set_title(trial.name, fontsize=9, loc="left")
+        axis.set_ylabel("inclination error, °")
+        axis.grid(True, which="major", alpha=0.3)
+        axis.legend(fontsize=8, loc="upper right")
+    axes[-1, 0].set_xlabel("time, s (gaps: standing still or without reference)")
+    figure.tight_layout()
+    figure.savefig(file, dpi=120)
+    plt.close(figure)

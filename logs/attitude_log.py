@@ -1,0 +1,119 @@
+"""Attitude trials on disk: the documented CSV, and the MATLAB files of the BROAD benchmark."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.io import loadmat
+from scipy.spatial.transform import Rotation
+
+Array = NDArray[np.float64]
+
+SAMPLES = ("t_s", "fx_mps2", "fy_mps2", "fz_mps2", "wx_radps", "wy_radps", "wz_radps")
+TRUTH = ("true_qw", "true_qx", "true_qy", "true_qz")
+SCORED = "scored"  # optional CSV column: 0 where a row is not to be scored
+MAT = ("imu_acc", "imu_gyr", "opt_quat", "movement", "sampling_rate")
+
+
+class LogError(ValueError):
+    """A log that cannot be read, and what it would need."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One log: uniform samples and the reference attitude."""
+
+    name: str
+    t: Array  # (n,) s
+    f_b: Array  # (n, 3) m/s^2
+    omega_b: Array  # (n, 3) rad/s
+    up_b: Array  # (n, 3) unit vector up by the reference; nan where there is none
+    scored: NDArray[np.bool_]  # (n,)
+
+    @property
+    def period(self) -> float:
+        """s between samples."""
+        return float((self.t[-1] - self.t[0]) / (len(self.t) - 1))
+
+
+def read_trials(log: Path) -> list[Trial]:
+    """A .csv or .mat, or every one of a folder. Raises LogError with the file and what it lacks."""
+    if log.is_dir():
+        files = sorted(f for f in log.iterdir() if f.suffix in (".csv", ".mat"))
+        if not files:
+            raise LogError(f"{log}: no .csv or .mat files in this folder")
+        return [_read(file) for file in files]
+    return [_read(log)]
+
+
+def _read(file: Path) -> Trial:
+    if not file.is_file():
+        raise LogError(f"{file}: no such file")
+    if file.suffix == ".mat":
+        return _read_mat(file)
+    if file.suffix == ".csv":
+        return _read_csv(file)
+    raise LogError(f"{file}: want .csv (columns {', '.join(SAMPLES + TRUTH)}) or BROAD's .mat")
+
+
+def _read_mat(file: Path) -> Trial:
+    try:
+        content = loadmat(file)
+    except (ValueError, OSError, NotImplementedError) as error:
+        raise LogError(f"{file}: not a MATLAB 5 file: {error}") from None
+    missing = [name for name in MAT if name not in content]
+    if missing:
+        raise LogError(f"{file}: no variable {missing[0]!r}; BROAD's files have {', '.join(MAT)}")
+    q = np.asarray(content["opt_quat"], dtype=np.float64)
+    t = np.arange(len(q)) / float(content["sampling_rate"].ravel()[0])
+    moving = content["movement"].ravel() > 0
+    return _trial(file, t, content["imu_acc"], content["imu_gyr"], q, moving)
+
+
+def _read_csv(file: Path) -> Trial:
+    with open(file, encoding="utf-8") as lines:
+        names = lines.readline().strip().split(",")
+        missing = [name for name in SAMPLES + TRUTH if name not in names]
+        if missing:
+            raise LogError(f"{file}: no column {missing[0]!r}; want {', '.join(SAMPLES + TRUTH)}")
+        try:
+            table = np.loadtxt(lines, delimiter=",", ndmin=2)
+        except ValueError as error:
+            raise LogError(f"{file}: {error}") from None
+    at = {name: table[:, k] for k, name in enumerate(names)}
+    q = np.column_stack([at[name] for name in TRUTH])
+    f, w = (np.column_stack([at[name] for name in SAMPLES[a:b]]) for a, b in ((1, 4), (4, 7)))
+    return _trial(
+        file, at["t_s"], f, w, q, at[SCORED] > 0 if SCORED in at else np.ones(len(q), dtype=bool)
+    )
+
+
+def _trial(file: Path, t: Array, f: Array, w: Array, q: Array, scored: NDArray[np.bool_]) -> Trial:
+    f, w = (np.ascontiguousarray(a, dtype=np.float64) for a in (f, w))
+    if len(t) < 2 or not np.all(np.diff(t) > 0.0):
+        raise LogError(f"{file}: times must grow; {len(t)} rows")
+    if not (np.isfinite(f).all() and np.isfinite(w).all()):
+        row = int(np.flatnonzero(~np.isfinite(np.hstack([f, w])).all(axis=1))[0])
+        raise LogError(f"{file}: row {row + 1}: a sample that is not a number")
+    steps = np.diff(t)
+    if steps.max() > 3.0 * np.median(steps):
+        row = int(steps.argmax())
+        raise LogError(
+            f"{file}: {steps.max():.3f} s between rows {row + 1} and {row + 2}; the filters want"
+            " even samples"
+        )
+    known = np.isfinite(q).all(axis=1) & (np.linalg.norm(np.nan_to_num(q), axis=1) > 0.5)
+    if not (known & scored).any():
+        raise LogError(f"{file}: no row has a reference attitude to score against")
+    up = np.full((len(q), 3), np.nan)
+    up[known] = _up(Rotation.from_quat(q[known][:, [1, 2, 3, 0]]), f[known])
+    return Trial(file.stem, np.asarray(t, dtype=np.float64), f, w, up, known & scored)
+
+
+def _up(attitude: Rotation, f_b: Array) -> Array:
+    """Up in b. A reference to north-east-down has its z down, one to east-north-up has it up: the
+    mean specific force, which points up whatever the frame is called, decides.
+    """
+    sign = np.sign(attitude.apply(f_b).mean(axis=0)[2])
+    return attitude.inv().apply([0.0, 0.0, sign if sign else 1.0])

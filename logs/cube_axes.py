@@ -1,0 +1,68 @@
+"""What a log says of each of its axes, before any estimator: noise, stuck and saturated samples."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.layouts.layout import Layout
+from logs.cube_log import CubeLog
+
+STUCK_S = 1.0  # s of exactly the same reading ; at rest, coarse counts may repeat for long
+SATURATED = (-4096, 4095)  # counts, ADXL345 in full resolution, +-16 g
+NOISELESS = 1e-3  # m/s^2; no accelerometer is quieter
+MOVING = (
+    0.5  # m/s^2, standard deviation of the other axes over a stretch that tells turning from rest
+)
+
+
+def examine(data: CubeLog, shape: Layout) -> dict[str, dict[str, Any]]:
+    """By axis: state "good", "stuck" or "saturated", noise (m/s^2, one sample), samples lost to
+    either.
+    """
+    moving = _moving(data)
+    steps = np.diff(data.f_axis, axis=0)
+    spread = np.median(np.abs(steps - np.median(steps, axis=0)), axis=0)
+    noises = 1.4826 * spread / np.sqrt(2.0)  # robust against motion
+    usual = float(np.median(noises))
+    if usual < NOISELESS:
+        moving[:] = False  # a computed log: axes along the table's axis stand still in it
+    elif usual > 0.4 * data.lsb_mps2:
+        moving[:] = True  # so much noise never reads the same for a second, at rest or not
+    found = {}
+    for k, name in enumerate(data.names):
+        column, noise = data.f_axis[:, k], float(noises[k])
+        stuck = _longest_run(column, moving) * data.period_s
+        saturated = 0
+        if data.counts is not None:
+            saturated = int(
+                np.count_nonzero(
+                    (data.counts[:, k] <= SATURATED[0]) | (data.counts[:, k] >= SATURATED[1])
+                )
+            )
+        state = "stuck" if stuck >= STUCK_S else "saturated" if saturated else "good"
+        found[name] = {
+            "state": state,
+            "noise_mps2": noise,
+            "mean_mps2": float(column.mean()),
+            "longest_stuck_s": float(stuck),
+            "saturated_samples": saturated,
+        }
+    return found
+
+
+def _moving(data: CubeLog) -> NDArray[np.bool_]:
+    """(n,), True in stretches of a second in which at least a third of the axes scatter."""
+    n = max(8, int(round(1.0 / data.period_s)))
+    moving = np.zeros(len(data.t_s), dtype=bool)
+    for first in range(0, len(moving), n):
+        stretch = data.f_axis[first : first + n]
+        moving[first : first + n] = np.mean(stretch.std(axis=0) > MOVING) > 1.0 / 3.0
+    return moving
+
+
+def _longest_run(column: NDArray[np.float64], moving: NDArray[np.bool_]) -> int:
+    """Samples of the longest run of equal readings while the body moves."""
+    same = np.concatenate([[False], (np.diff(column) == 0.0)]) & moving
+    ends = np.nonzero(np.diff(np.concatenate([[0], same.astype(int), [0]])))[0].reshape(-1, 2)
+    return int((ends[:, 1] - ends[:, 0]).max(initial=-1)) + 1

@@ -1,0 +1,110 @@
+"""Picture of a drive: the way with its fixes, errors with the 3-sigma that the filter claims,
+horizon, scores.
+"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib
+import numpy as np
+
+from inertial.navigation.earth import ned_between
+from inertial.navigation.filters import DEFAULT
+
+if TYPE_CHECKING:
+    from logs.drive import Result
+    from logs.drive_log import DriveLog
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt  # noqa: E402
+
+COLOURS = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#CC79A7",
+    "#E69F00",
+    "#56B4E9",
+    "#8C8C8C",
+    "#000000",
+    "#F0E442",
+)
+
+
+def draw(
+    path: Path, log: "DriveLog", results: "dict[str, Result]", scores: dict[str, dict[str, Any]]
+) -> None:
+    """Write the picture, PNG by the name's end."""
+    lead = results.get(DEFAULT) or next(iter(results.values()), None)
+    figure, axes = plt.subplots(2, 2, figsize=(14, 10), constrained_layout=True)
+    if lead is not None:
+        _way(axes[0, 0], log, lead)
+        _errors(axes[0, 1], lead)
+        _bars(axes[1, 0], scores, "position_h_rms_m", "horizontal RMS on unseen fixes, m")
+        if any(score["outage_end_m"] for score in scores.values()):
+            _outages(axes[1, 1], scores)
+        else:
+            _bars(
+                axes[1, 1],
+                scores,
+                "velocity_h_rms_mps",
+                "horizontal velocity RMS on unseen fixes, m/s",
+            )
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def _way(ax: Any, log: "DriveLog", lead: "Result") -> None:
+    first = log.fixes[0]
+    origin = first.latitude, first.longitude, first.height
+    fixes = np.array([ned_between(*origin, f.latitude, f.longitude, f.height) for f in log.fixes])
+    way = np.array([ned_between(*origin, *row[:3]) for row in lead.x])
+    ax.plot(fixes[:, 1], fixes[:, 0], ".", ms=2, color="#E69F00", label="fixes")
+    ax.plot(way[:, 1], way[:, 0], lw=1.2, color=COLOURS[0], label="solution")
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.set(xlabel="east, m", ylabel="north, m", title="the way")
+    ax.legend()
+
+
+def _errors(ax: Any, lead: "Result") -> None:
+    chosen = lead.scored
+    t = lead.t[chosen] - lead.t[0]
+    for k, name in enumerate(("north", "east")):
+        ax.plot(t, lead.y[chosen, k], lw=0.8, color=COLOURS[k], label=name)
+    half = 3.0 * np.sqrt(lead.P[chosen][:, 6, 6])
+    ax.fill_between(t, -half, half, color="#8C8C8C", alpha=0.25, lw=0, label="3 sigma of north")
+    ax.set(xlabel="s", ylabel="m", title=f"error on unseen fixes, {DEFAULT}")
+    ax.legend()
+
+
+def _bars(ax: Any, scores: dict[str, dict[str, Any]], key: str, title: str) -> None:
+    names = [name for name in scores if scores[name][key] is not None]
+    values = [scores[name][key] for name in names]
+    bars = ax.barh(
+        names, values, color=[COLOURS[2] if name == DEFAULT else COLOURS[0] for name in names]
+    )
+    ax.bar_label(bars, fmt="%.3f", padding=3)
+    ax.invert_yaxis()
+    ax.margins(x=0.15)
+    ax.set_title(title)
+
+
+def _outages(ax: Any, scores: dict[str, dict[str, Any]]) -> None:
+    names = [name for name in scores if any(v is not None for v in scores[name]["outage_end_m"])]
+    width = 0.8 / max(1, len(names))
+    for i, name in enumerate(names):
+        values = [v if v is not None else 0.0 for v in scores[name]["outage_end_m"]]
+        ax.bar(
+            np.arange(len(values)) + i * width,
+            values,
+            width,
+            label=name,
+            color=COLOURS[i % len(COLOURS)],
+        )
+    ax.set(
+        yscale="log",
+        ylabel="m",
+        xlabel="outage",
+        title="horizontal error at the end of each outage",
+    )
+    ax.legend(fontsize=8)

@@ -1,0 +1,291 @@
+"""One Zenoh session, opened the same way by every process.
+
+Clients connect to explicit endpoints in client mode; scouting is off, so nothing is found or
+announced on the network by itself. A client may start before its router: open_client keeps trying,
+and once open a session finds a router that comes back by itself. (Zenoh 1.10 has no background
+first connect in client mode: zenoh.open blocks or raises.)
+"""
+
+import json
+import logging
+import threading
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+import zenoh
+from google.protobuf.message import DecodeError, Message
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from messages.contract.topics import NAME, REPLAY_SUFFIX, Topic
+from messages.history.spool import Spool
+
+CLOSING_S = 5.0
+
+log = logging.getLogger(__name__)
+
+M = TypeVar("M", bound=Message)
+
+
+class BusSettings(BaseModel):
+    """[bus] of gyrofree.toml."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    prefix: str = (
+        "gyrofree"  # first part of every key; two installations on one router differ in it
+    )
+    router: str = "tcp/127.0.0.1:7447"  # endpoint of the router that clients connect to
+    listen: list[str] = Field(
+        default_factory=lambda: ["tcp/127.0.0.1:7447"]
+    )  # endpoints the router listens on
+    # A peer that shows no life for so long is cut off. 2 s noticed a frozen process sooner, but on
+    # a machine busy with drawing in software it also cut off live ones, and lost 3 % of all
+    # messages.
+    lease_ms: int = Field(default=10_000, ge=200, le=60_000)
+
+    @field_validator("prefix")
+    @classmethod
+    def _prefix_is_a_name(cls, value: str) -> str:
+        if not NAME.fullmatch(value):
+            raise ValueError(
+                f"{value!r}: want a-z, 0-9, _ and - after a first letter, at most 32 characters"
+            )
+        return value
+
+
+def _config(settings: BusSettings, mode: str) -> zenoh.Config:
+    config = zenoh.Config()
+    patience_us = 100_000
+    values = {
+        "mode": mode,
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "timestamping/enabled": True,
+        # A pool of 16 MiB in every process for messages above 3 kB, left in /dev/shm by every one
+        # that is killed.
+        "transport/shared_memory/enabled": False,
+        "transport/link/tx/lease": settings.lease_ms,
+        # A process that gets no processor for a while must not lose messages: room for 16 batches
+        # of 64 KiB, and some patience before DROP drops. Express publishing would be no faster at
+        # these rates (measured), but takes a batch for each message: bursts of 17 were cut off.
+        "transport/link/tx/queue/size/data": 16,
+        "transport/link/tx/queue/congestion_control/drop/wait_before_drop": patience_us,
+    }
+    if mode == "router":
+        values["listen/endpoints"] = settings.listen
+    else:
+        values["connect/endpoints"] = [settings.router]
+        values["connect/timeout_ms"] = 1000
+        values["listen/endpoints"] = []
+        # Look for a router that went away every second: what was missed shall be on the screen
+        # within five.
+        values["connect/retry"] = {
+            "period_init_ms": 500,
+            "period_max_ms": 1000,
+            "period_increase_factor": 1.5,
+        }
+    for key, value in values.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+def open_router(settings: BusSettings) -> zenoh.Session:
+    """A session that routes for all others; raises zenoh.ZError when an endpoint cannot be
+    bound.
+    """
+    return zenoh.open(_config(settings, "router"))
+
+
+class BusUnavailable(ConnectionError):
+    """No router answered in the time given."""
+
+
+def open_client(
+    settings: BusSettings, stop: threading.Event | None = None, timeout_s: float | None = None
+) -> zenoh.Session:
+    """A connected client session; waits for the router, for ever by default.
+
+    Raises BusUnavailable after timeout_s or when `stop` is set first.
+    """
+    stop = stop or threading.Event()
+    end = None if timeout_s is None else time.monotonic() + timeout_s
+    said = False
+    while True:
+        try:
+            return zenoh.open(_config(settings, "client"))
+        except zenoh.ZError:
+            if stop.is_set() or (end is not None and time.monotonic() > end):
+                raise BusUnavailable(
+                    f"[bus] router {settings.router}: nobody answers; start one with `gyrofree"
+                    " router`"
+                ) from None
+        if not said:
+            log.warning("router %s does not answer yet: trying on", settings.router)
+            said = True
+        stop.wait(0.25)
+
+
+def connected(session: zenoh.Session) -> bool:
+    """True when the session has a router."""
+    return bool(list(session.info.routers_zid()))
+
+
+def wait_connected(session: zenoh.Session, timeout_s: float) -> bool:
+    """Wait for the router; False when it did not come in time."""
+    end = time.monotonic() + timeout_s
+    while not connected(session):
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.02)
+    return True
+
+
+class LateSession:
+    """A client session that comes when the router does; until then what would be said has nobody to
+    hear it.
+    """
+
+    def __init__(self, settings: BusSettings, opened: Callable[[zenoh.Session], object]) -> None:
+        """`opened` gets the session, on a thread of its own; what it returns is kept as long as
+        this is.
+        """
+        self._settings, self._opened = settings, opened
+        self._session: zenoh.Session | None = None
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._open, name="late session", daemon=True)
+        self._thread.start()
+
+    def _open(self) -> None:
+        try:
+            self._session = open_client(self._settings, self._closing)
+        except BusUnavailable:
+            return
+        self._kept = self._opened(self._session)
+
+    def close(self) -> None:
+        """Leave the bus, before the process ends: no thread may be inside Zenoh when the
+        interpreter goes.
+        """
+        self._closing.set()
+        self._thread.join(CLOSING_S)
+        if self._session is not None:
+            self._session.close()
+
+
+class Publishers:
+    """Declared publishers of one session, made at first use. DROP: a slow link never stalls the
+    caller.
+
+    With a spool, every message is kept there before it goes out, and its sequences go on where the
+    spool's end; a session may then come later (`attach`): until it does, messages are only kept.
+    """
+
+    def __init__(
+        self, session: zenoh.Session | None, prefix: str, spool: Spool | None = None
+    ) -> None:
+        self._session = session
+        self._prefix = prefix
+        self._keys: dict[tuple[str, str, str], str] = {}  # checked names cost more than the message
+        self._spool = spool
+        self._by_key: dict[str, zenoh.Publisher] = {}
+        self._sequence: dict[str, int] = {}
+        self._published: dict[str, int] = {}  # by an earlier life of this process
+
+    def resume(self) -> None:
+        """Count on from what the spool holds, for a publisher whose run goes on over its
+        restarts.
+        """
+        for (topic, device), sequence in (
+            self._spool.last_sequences() if self._spool else {}
+        ).items():
+            self._sequence["/".join((self._prefix, device, topic))] = sequence
+
+    def repeat(self, sequences: dict[str, int]) -> None:
+        """The publisher goes back to an earlier state: what it published since then comes again and
+        is passed over.
+        """
+        self._published = dict(self._sequence)
+        self._sequence.update(sequences)
+
+    def sequences(self) -> dict[str, int]:
+        """Newest sequence of each key, for `repeat`."""
+        return dict(self._sequence)
+
+    def attach(self, session: zenoh.Session) -> None:
+        """Publish from now on."""
+        self._session = session
+
+    def put(self, topic: Topic[M], device: str, message: M, estimator: str = "") -> None:
+        """Publish; a message with a header gets this key's next sequence unless the caller set
+        one.
+        """
+        key = self._keys.get((topic.name, device, estimator))
+        if key is None:
+            key = self._keys[topic.name, device, estimator] = topic.key(
+                self._prefix, device, estimator
+            )
+        header = message.header if "header" in message.DESCRIPTOR.fields_by_name else None
+        if header is None or not header.sequence:
+            self._sequence[key] = self._sequence.get(key, 0) + 1
+            if header is not None:
+                header.sequence = self._sequence[key]
+            if self._sequence[key] <= self._published.get(key, 0):
+                return
+        payload = message.SerializeToString()
+        if self._spool is not None and not device.endswith(REPLAY_SUFFIX):
+            name = key.split("/", 2)[2]
+            if header is not None:
+                self._spool.append(
+                    name, device, header.run, header.sequence, header.utc_ns, payload
+                )
+            else:
+                self._spool.append(
+                    name, device, 0, self._sequence[key], message.timestamp.ToNanoseconds(), payload
+                )
+        session = self._session
+        if session is None:
+            return
+        if key not in self._by_key:
+            self._by_key[key] = session.declare_publisher(
+                key, congestion_control=zenoh.CongestionControl.DROP
+            )
+        self._by_key[key].put(payload)
+
+
+def decode(topic: Topic[M], payload: bytes) -> M | None:
+    """The message, or None (and a log line) for bytes that are not one: a foreign publisher must
+    not stop a service.
+    """
+    message = topic.type()
+    try:
+        message.ParseFromString(payload)
+    except DecodeError as error:
+        log.warning(
+            "%s: %d bytes are no %s (%s): ignored",
+            topic.name,
+            len(payload),
+            topic.type.__name__,
+            error,
+        )
+        return None
+    return message
+
+
+def subscribe(
+    session: zenoh.Session,
+    topic: Topic[M],
+    prefix: str,
+    handler: Callable[[str, M], None],
+    device: str = "*",
+) -> zenoh.Subscriber:
+    """Call handler(key, message) on Zenoh's thread for each message; handlers only append to a
+    queue.
+    """
+
+    def on_sample(sample: zenoh.Sample) -> None:
+        message = decode(topic, sample.payload.to_bytes())
+        if message is not None:
+            handler(str(sample.key_expr), message)
+
+    return session.declare_subscriber(topic.pattern(prefix, device), on_sample)

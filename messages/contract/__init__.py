@@ -1,0 +1,1 @@
+"""What crosses the bus: protobuf messages and the table of topics."""

@@ -1,0 +1,212 @@
+"""Every topic of the system, in the order the data flow.
+
+Bus keys, recording channels, staleness limits and docs/topics.md come from this table; no other
+file spells a key. A key is ``<prefix>/<device>/<topic>`` or, for topics of which there is one per
+estimator, ``<prefix>/<device>/<topic>/<estimator>``. Prefix, device and estimator names match NAME.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from google.protobuf.message import Message
+
+from messages.contract import gyrofree_pb2 as pb
+
+M = TypeVar("M", bound=Message)
+
+NAME = re.compile(r"[a-z][a-z0-9_-]{0,31}")
+REPLAY_SUFFIX = "-replay"  # of a device's name when a recording of it is played on the bus
+RECORDER = "recorder"  # the device name under which the recorder speaks
+
+GATEWAY, ESTIMATES = (
+    "gateway",
+    "estimator",
+)  # processes that keep what they publish, by the topics' `source`
+
+
+class TopicError(ValueError):
+    """A name or key that cannot stand on the bus."""
+
+
+@dataclass(frozen=True)
+class Topic(Generic[M]):
+    """One row of the table."""
+
+    name: str
+    type: type[M]
+    rate: float  # Hz, nominal; 0 for messages sent on an event
+    source: str  # the process that publishes it
+    text: str
+    per_estimator: bool = False
+    recorded: bool = True
+
+    def key(self, prefix: str, device: str, estimator: str = "") -> str:
+        """Bus key of this topic; raises TopicError for a name that may not stand in a key."""
+        names = [prefix, device] + ([estimator] if self.per_estimator else [])
+        for name in names:
+            check_name(name)
+        return "/".join([prefix, device, self.name] + names[2:])
+
+    def pattern(self, prefix: str, device: str = "*") -> str:
+        """Key expression that matches this topic of one or (default) every device."""
+        return f"{prefix}/{device}/{self.name}" + ("/*" if self.per_estimator else "")
+
+
+ACCEL = Topic("accel", pb.AccelBatch, 100, "gateway", "raw and scaled accelerometer axes")
+IMU = Topic("imu", pb.ImuBatch, 100, "gateway", "specific force and rate of a six-axis board")
+TACHO = Topic("tacho", pb.TachoRate, 20, "gateway", "table rate from tachometer pulses")
+GNSS = Topic("gnss", pb.GnssFix, 4, "gateway", "GNSS epoch: position, velocity, quality")
+LOCATION = Topic("location", LocationFix, 4, "gateway", "the same position for any viewer")
+LINK = Topic("link", pb.LinkStatus, 1, "gateway", "state and ledger of the line")
+BOARD = Topic("board", pb.BoardInfo, 0.1, "gateway", "what the board says of itself")
+TRUTH = Topic("truth", pb.Truth, 100, "simulator", "true motion; simulated boards only")
+RATE = Topic(
+    "rate", pb.RateEstimate, 100, "estimator", "gyro-free rotation estimate", per_estimator=True
+)
+NAV = Topic("nav", pb.NavSolution, 20, "estimator", "INS/GNSS solution", per_estimator=True)
+INNOVATION = Topic(
+    "innovation", pb.Innovation, 4, "estimator", "correction by one fix", per_estimator=True
+)
+POSE = Topic(
+    "pose", FrameTransform, 20, "estimator", "body against n, for any viewer", per_estimator=True
+)
+ESTIMATOR = Topic(
+    "estimator", pb.EstimatorStatus, 1, "estimator", "health of one estimator", per_estimator=True
+)
+ADC = Topic("adc", pb.AdcBatch, 100, "gateway", "raw counts of an analogue board")
+ATTITUDE = Topic(
+    "attitude", pb.AttitudeEstimate, 50, "estimator", "tilt of a six-axis board", per_estimator=True
+)
+AXES = Topic("axes", pb.AxisHealth, 4, "estimator", "health of every accelerometer axis")
+CALIBRATION = Topic(
+    "calibration", pb.CalibrationStatus, 2, "estimator", "progress of a guided calibration"
+)
+WIRING = Topic(
+    "wiring", pb.WiringStatus, 4, "estimator", "progress of a guided detection of axes and signs"
+)
+MUTE = Topic(
+    "mute", pb.GnssMute, 0, "estimator", "an operator's GNSS outage: fixes that are held back"
+)
+NOTE = Topic("note", pb.Note, 0, "any", "remarks on the data by people and programs")
+REPLAY = Topic("replay", pb.ReplayStatus, 5, "replay", "where a replay stands", recorded=False)
+STATUS = Topic("status", pb.RecorderStatus, 1, "recorder", "state of the recording", recorded=False)
+LOG = Topic("log", Log, 0, "any", "warnings worth keeping with the data")
+
+TOPICS: tuple[Topic, ...] = (
+    ACCEL,
+    IMU,
+    ADC,
+    TACHO,
+    GNSS,
+    LOCATION,
+    LINK,
+    BOARD,
+    TRUTH,
+    RATE,
+    NAV,
+    INNOVATION,
+    ATTITUDE,
+    POSE,
+    ESTIMATOR,
+    AXES,
+    CALIBRATION,
+    WIRING,
+    NOTE,
+    REPLAY,
+    STATUS,
+    LOG,
+    MUTE,
+)
+
+BY_NAME = {topic.name: topic for topic in TOPICS}
+PIPELINE_INPUTS = (
+    ACCEL,
+    IMU,
+    ADC,
+    GNSS,
+    TACHO,
+)  # what estimates are made of, live and from a recording
+PIPELINE_ORDERS = (
+    MUTE,
+)  # what people ordered: published live, given from a recording before all inputs
+
+
+@dataclass(frozen=True)
+class Address:
+    """A bus key taken apart."""
+
+    prefix: str
+    device: str
+    topic: Topic
+    estimator: str
+
+
+def check_name(name: str) -> str:
+    """The name itself; raises TopicError when it may not stand in a key."""
+    if not NAME.fullmatch(name):
+        raise TopicError(
+            f"name {name!r}: want a-z, 0-9, _ and - after a first letter, at most 32 characters"
+        )
+    return name
+
+
+def parse(key: str) -> Address:
+    """Take a key apart; raises TopicError for one that is not in the table."""
+    parts = key.split("/")
+    topic = BY_NAME.get(parts[2]) if len(parts) in (3, 4) else None
+    if topic is None or (len(parts) == 4) != topic.per_estimator:
+        known = ", ".join(BY_NAME)
+        raise TopicError(
+            f"key {key!r}: want <prefix>/<device>/<topic>[/<estimator>], topic one of {known}"
+        )
+    return Address(parts[0], parts[1], topic, parts[3] if topic.per_estimator else "")
+
+
+def recorder_control_key(prefix: str) -> str:
+    """Key of the recorder's queryable: RecorderCommand in, RecorderStatus out."""
+    return f"{check_name(prefix)}/{RECORDER}/control"
+
+
+def history_key(prefix: str, device: str) -> str:
+    """Key of a gateway's queryable for journal records: selector parameters `first` and `last`."""
+    return f"{check_name(prefix)}/{check_name(device)}/history"
+
+
+def published_key(prefix: str, device: str, source: str) -> str:
+    """Key of a queryable for published messages: HistoryQuery in, HistoryReply out; `*` stands for
+    any name.
+    """
+    for name in (prefix, device, source):
+        if name != "*":
+            check_name(name)
+    return f"{prefix}/{device}/published/{source}"
+
+
+def control_key(prefix: str, device: str, what: str) -> str:
+    """Key of a queryable for orders to one device: what is "board-control" (BoardCommand in, Reply
+    out) or alike.
+    """
+    return f"{check_name(prefix)}/{check_name(device)}/{check_name(what)}"
+
+
+def replay_control_key(prefix: str) -> str:
+    """Key of a replay's queryable: ReplayCommand in, ReplayStatus out."""
+    return f"{check_name(prefix)}/{REPLAY.name}/control"
+
+
+def markdown() -> str:
+    """The table of docs/topics.md."""
+    rows = ["| topic | type | Hz | published by | recorded | what |", "|---|---|---|---|---|---|"]
+    for topic in TOPICS:
+        name = topic.name + ("/&lt;estimator&gt;" if topic.per_estimator else "")
+        rate = f"{topic.rate:g}" if topic.rate else "on event"
+        recorded = "yes" if topic.recorded else "no"
+        rows.append(
+            f"| `{name}` | `{topic.type.DESCRIPTOR.full_name}` | {rate} | {topic.source} |"
+            f" {recorded} | {topic.text} |"
+        )
+    return "\n".join(rows) + "\n"

@@ -1,0 +1,148 @@
+"""Asking for published messages, and answering: HistoryQuery and HistoryReply over the bus.
+
+The one that published them answers from its spool (spool.py), on
+<prefix>/<device>/published/<source>.
+"""
+
+import logging
+import queue
+import threading
+import time
+from collections.abc import Callable
+
+import zenoh
+from google.protobuf.message import DecodeError
+
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import published_key
+from messages.history.spool import REPLY_BYTES, Spool
+
+log = logging.getLogger(__name__)
+
+ANSWER_S = 10.0  # an answer is a MB from the disk; a busy machine takes its time
+LEAST_BYTES = 1 << 15  # of an answer that a busier machine is asked for
+
+
+def declare(
+    session: zenoh.Session, prefix: str, device: str, source: str, spool: Spool
+) -> zenoh.Queryable:
+    """Answer from `spool` what is asked of `device` (`*`: of any); undeclare the result at the
+    end.
+    """
+    mine = published_key(prefix, device, source)
+
+    def on_query(query: zenoh.Query) -> None:
+        asked = str(query.key_expr).split("/")
+        about = device if device != "*" or len(asked) != 4 else asked[1]
+        try:
+            question = pb.HistoryQuery.FromString(
+                query.payload.to_bytes() if query.payload is not None else b""
+            )
+        except DecodeError:
+            query.reply_err(b"the payload is no HistoryQuery")
+            return
+        try:
+            reply = spool.answer(question, about)
+        except OSError as error:
+            query.reply_err(f"history: {error}".encode())
+            return
+        key = (
+            published_key(prefix, about if about != "*" else source, source)
+            if device == "*"
+            else mine
+        )
+        query.reply(key, reply.SerializeToString())
+
+    return session.declare_queryable(mine, on_query)
+
+
+def ask(
+    session: zenoh.Session,
+    prefix: str,
+    device: str,
+    source: str,
+    query: pb.HistoryQuery,
+    timeout_s: float = ANSWER_S,
+) -> pb.HistoryReply | None:
+    """The answer of one source, or of all of them put together (`*`); None when nobody answered."""
+    found = None
+    replies = session.get(
+        published_key(prefix, device, source),
+        payload=query.SerializeToString(),
+        timeout=timeout_s,
+        target=zenoh.QueryTarget.ALL,
+        consolidation=zenoh.ConsolidationMode.NONE,
+    )
+    for reply in replies:
+        if reply.ok is None:
+            log.warning(
+                "history of %s: %s",
+                device,
+                reply.err.payload.to_bytes().decode(errors="replace")[:200],
+            )
+            continue
+        try:
+            answer = pb.HistoryReply.FromString(reply.ok.payload.to_bytes())
+        except DecodeError as error:
+            log.warning("history of %s: %s", device, error)
+            continue
+        if found is None:
+            found = answer
+        else:
+            found.MergeFrom(answer)
+    return found
+
+
+class Asker:
+    """Asks on a thread of its own, one question after the other; `done(token, reply)` is called
+    there.
+    """
+
+    RETRIES = 4  # a link that is just back may carry samples before it carries questions
+    RETRY_S = 0.5
+    PATIENCE_S = 1800.0  # with one that is there, but does not answer in time
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        prefix: str,
+        done: Callable[[object, pb.HistoryReply | None], None],
+    ):
+        self._session, self._prefix, self._done = session, prefix, done
+        self._questions: queue.SimpleQueue[tuple | None] = queue.SimpleQueue()
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="history", daemon=True)
+        self._thread.start()
+
+    def ask(self, token: object, device: str, source: str, query: pb.HistoryQuery) -> None:
+        """Put a question; returns at once."""
+        self._questions.put((token, device, source, query))
+
+    def close(self) -> None:
+        """Ask no more; what is under way is given up."""
+        self._stop.set()
+        self._questions.put(None)
+        self._thread.join(timeout=ANSWER_S + 1.0)
+
+    def _run(self) -> None:
+        while (question := self._questions.get()) is not None and not self._stop.is_set():
+            token, device, source, asked = question
+            reply, nobody, end = None, 0, time.monotonic() + self.PATIENCE_S
+            query = pb.HistoryQuery()
+            query.CopyFrom(asked)
+            while reply is None and nobody < self.RETRIES and time.monotonic() < end:
+                began = time.monotonic()
+                try:
+                    reply = ask(self._session, self._prefix, device, source, query)
+                except zenoh.ZError as error:
+                    log.warning("history of %s: %s", device, error)
+                if reply is None:
+                    slow = time.monotonic() - began >= ANSWER_S / 2  # it is there
+                    nobody += not slow
+                    if (
+                        slow and query.every_s <= 0.0
+                    ):  # whoever was slow is asked for less at a time
+                        query.max_bytes = max(LEAST_BYTES, (query.max_bytes or REPLY_BYTES) // 2)
+                    if self._stop.wait(self.RETRY_S):
+                        return
+            self._done(token, reply)

@@ -1,0 +1,374 @@
+"""Gaps of the bus, noticed by jumps of header.sequence, and filled with what the publisher kept.
+
+A Mender stands between a subscriber and its consumer. It takes messages as they arrive and gives
+them on in the order of publication, with the missing ones in their place; they come from the
+publisher's spool (spool.py). It has no thread, no clock and no bus: questions go out through `ask`,
+answers come back through `answer`, so that recorder, estimator and dashboard use it on their own
+threads, and a test without any.
+
+Messages belong together by device and publishing process (a "stream"): one question about a stream
+fills the gaps of all its topics, in the right order among them. With `hold`, live messages of a
+stream wait while one of its gaps is being filled, at most `max_held` of them; newer ones are as if
+lost, and asked for later. Without, they pass at once and the filled ones come late.
+"""
+
+import logging
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from google.protobuf.message import DecodeError
+
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.header import first_field
+from messages.contract.topics import BY_NAME, REPLAY_SUFFIX, Topic
+
+log = logging.getLogger(__name__)
+
+MAX_HELD = 60_000
+REMEMBERED = 4096  # payloads without a header: the newest are recognised when they come again
+
+
+class Arrival(NamedTuple):
+    """One message: live as it came, or filled in."""
+
+    topic: Topic
+    device: str
+    estimator: str
+    payload: bytes
+    at_ns: int  # when it came, or, filled in, when it was published; UTC
+    late: bool = False
+
+    @property
+    def name(self) -> str:
+        """Topic with its estimator."""
+        return f"{self.topic.name}/{self.estimator}" if self.estimator else self.topic.name
+
+
+class Question(NamedTuple):
+    """What to ask the publisher of a stream."""
+
+    stream: tuple[str, str]  # device, source
+    query: pb.HistoryQuery
+
+
+@dataclass
+class _Key:
+    """What is known of one topic of a stream."""
+
+    run: int
+    last: int
+    missing: list[list[int]] = field(
+        default_factory=list
+    )  # [run, first, last, countable], being asked for
+    filled: tuple[int, int] = (1, 0)  # sequences that came filled in before they came live
+    repaired: int = 0
+    lost: int = 0
+
+    def advance(self, run: int, sequence: int) -> None:
+        """A filled-in message is the newest now."""
+        follows = run == self.run and self.filled[1] == self.last
+        self.filled = (self.filled[0] if follows else sequence, sequence)
+        self.run, self.last = run, sequence
+
+
+@dataclass
+class _Stream:
+    asking: bool = False
+    full: bool = False  # holds max_held: the newest were not taken
+    held: deque[Arrival] = field(default_factory=deque)
+    waiting: deque[pb.HistoryQuery] = field(default_factory=deque)
+    tried: set[tuple[str, int, int]] = field(default_factory=set)  # beginnings that were asked for
+
+
+class Mender:
+    """See the module. `ask(question)` must not block; `sources` are the processes that have a
+    spool.
+    """
+
+    def __init__(
+        self,
+        ask: Callable[[Question], None],
+        *,
+        hold: bool = True,
+        max_held: int = MAX_HELD,
+        topics: tuple[Topic, ...] = (),
+        sources: tuple[str, ...] = ("gateway", "estimator"),
+        since_ns: int = 0,
+    ) -> None:
+        """`topics` limits what is asked for; none: everything. A run that began after `since_ns` is
+        wanted whole.
+        """
+        self._ask, self._hold, self._max_held = ask, hold, max_held
+        self._topics, self._sources, self._since_ns = topics, sources, since_ns
+        self._keys: dict[tuple[str, str], _Key] = {}
+        self._streams: dict[tuple[str, str], _Stream] = {}
+        self._seen: deque[int] = deque(maxlen=REMEMBERED)  # hashes of payloads without a header
+
+    @property
+    def held(self) -> int:
+        """Live messages that wait for a gap to be filled."""
+        return sum(len(stream.held) for stream in self._streams.values())
+
+    @property
+    def asking(self) -> bool:
+        """True while an answer is awaited."""
+        return any(stream.asking for stream in self._streams.values())
+
+    def counts(self) -> dict[str, tuple[int, int]]:
+        """Repaired and finally lost messages by "<device>/<topic>", where there are any."""
+        return {
+            f"{device}/{name}": (key.repaired, key.lost)
+            for (device, name), key in self._keys.items()
+            if key.repaired or key.lost
+        }
+
+    def seed(self, device: str, name: str, run: int, last: int) -> None:
+        """The consumer has everything of this topic up to here, from an earlier life."""
+        self._keys[device, name] = _Key(run, last)
+
+    def taken(self) -> dict[tuple[str, str], tuple[int, int]]:
+        """Run and sequence of the newest message given on, by device and topic: for `seed` in a
+        later life.
+        """
+        return {name: (key.run, key.last) for name, key in self._keys.items()}
+
+    def take(self, arrival: Arrival) -> list[Arrival]:
+        """One live message; what can be given on now, in order."""
+        if arrival.topic.source not in self._sources or arrival.device.endswith(REPLAY_SUFFIX):
+            return [arrival]
+        stream = self._streams.setdefault((arrival.device, arrival.topic.source), _Stream())
+        if self._hold and stream.asking:
+            if len(stream.held) < self._max_held:
+                stream.held.append(arrival)
+                return []
+            if not stream.full:
+                log.warning(
+                    "%s: %d messages wait; newer ones are asked for later",
+                    arrival.device,
+                    self._max_held,
+                )
+            stream.full = True
+            return []
+        return self._pass(stream, arrival)
+
+    def answer(self, question: Question, reply: pb.HistoryReply | None) -> list[Arrival]:
+        """The publisher's answer (None: there is none); what can be given on now, in order."""
+        stream = self._streams.setdefault(question.stream, _Stream())
+        out: list[Arrival] = []
+        for item in reply.items if reply is not None else ():
+            skipped = self._skipped(stream, question, item)
+            if skipped is not None:
+                self._ask(skipped)
+                return out
+            out += self._fill(question.stream[0], item)
+        if reply is not None and reply.next:
+            query = pb.HistoryQuery()
+            query.CopyFrom(question.query)
+            query.position = reply.next
+            self._ask(Question(question.stream, query))
+            return out
+        if stream.waiting:
+            self._ask(Question(question.stream, stream.waiting.popleft()))
+            return out
+        self._give_up(question.stream)
+        stream.asking = stream.full = False
+        stream.tried.clear()
+        while stream.held and not stream.asking:
+            out += self._pass(stream, stream.held.popleft())
+        return out
+
+    def release(self) -> list[Arrival]:
+        """Everything that is held, without waiting any longer: the end."""
+        return [arrival for stream in self._streams.values() for arrival in self._release(stream)]
+
+    # --- one message
+
+    def _pass(self, stream: _Stream, arrival: Arrival) -> list[Arrival]:
+        header = header_of(arrival)
+        if header is None:
+            return [] if self._known(arrival.payload) else [arrival]
+        key = self._keys.get((arrival.device, arrival.name))
+        if key is None:
+            key = self._keys[arrival.device, arrival.name] = _Key(header.run, header.sequence)
+            whole = 0 < self._since_ns < header.run and header.sequence > 1
+            if not whole:
+                return [arrival]
+            key.last = 0
+        if header.run == key.run and header.sequence == key.last + 1:
+            key.last += 1
+            return [arrival]
+        if header.run == key.run and header.sequence <= key.last:
+            if key.filled[0] <= header.sequence <= key.filled[1]:
+                return []  # it was filled in already
+            key.last = header.sequence  # a publisher without a spool began anew, or repeats itself
+            return [arrival]
+        if header.run > key.run and header.sequence == key.last + 1:  # the same estimator counts on
+            key.run, key.last = header.run, header.sequence
+            return [arrival]
+        if header.run < key.run:
+            key.run, key.last = (
+                header.run,
+                header.sequence,
+            )  # another recording, or a clock set back
+            return [arrival]
+        self._notice(stream, arrival, key, header)
+        if self._hold:
+            stream.held.appendleft(arrival)
+            return []
+        key.run, key.last = header.run, header.sequence
+        return [arrival]
+
+    def _notice(self, stream: _Stream, arrival: Arrival, key: _Key, header: pb.Header) -> None:
+        """A gap lies before this message: ask for what is in it."""
+        query = pb.HistoryQuery(
+            topics=self._wanted(arrival),
+            of=arrival.name,
+            after_run=key.run,
+            after_sequence=key.last,
+            until_run=header.run,
+            until_sequence=header.sequence,
+        )
+        if header.run == key.run:
+            key.missing.append([key.run, key.last + 1, header.sequence - 1, 1])
+        # how many there were at the end of the one run, and where the other began to count, only
+        # the answer says
+        else:
+            key.missing.append([key.run, key.last + 1, 1 << 62, 0])
+            key.missing.append([header.run, 1, header.sequence - 1, 0])
+        if stream.asking:
+            stream.waiting.append(query)
+        else:
+            stream.asking = True
+            self._ask(Question((arrival.device, arrival.topic.source), query))
+
+    def _wanted(self, arrival: Arrival) -> list[str]:
+        if not self._topics:
+            return []
+        return [
+            t.name for t in self._topics if t.source == arrival.topic.source and not t.per_estimator
+        ]
+
+    def _skipped(
+        self, stream: _Stream, question: Question, item: pb.HistoryItem
+    ) -> Question | None:
+        """Another topic had lost some before this question's beginning: what to ask instead, from
+        there on.
+        """
+        key = self._keys.get((question.stream[0], item.topic))
+        if key is None or item.run < key.run or item.sequence == key.last + 1:
+            return None
+        if (item.run == key.run and item.sequence <= key.last) or any(
+            gap[0] == key.run and gap[1] <= gap[2] for gap in key.missing
+        ):
+            return None
+        begin = item.topic, key.run, key.last
+        if begin in stream.tried:
+            return None  # it is gone
+        stream.tried.add(begin)
+        query = pb.HistoryQuery()
+        query.CopyFrom(question.query)
+        query.until_of, query.position = query.until_of or query.of, 0
+        query.of, query.after_run, query.after_sequence = begin
+        return Question(question.stream, query)
+
+    def _fill(self, device: str, item: pb.HistoryItem) -> list[Arrival]:
+        name, _, estimator = item.topic.partition("/")
+        topic = BY_NAME.get(name)
+        if topic is None:
+            return []
+        arrival = Arrival(topic, device, estimator, item.payload, item.published_ns, late=True)
+        if not item.run:
+            return [] if self._known(item.payload) else [arrival]
+        key = self._keys.get((device, item.topic))
+        if key is None:
+            return []  # never heard live: not this consumer's gap
+        for gap in key.missing:
+            if gap[0] == item.run and gap[1] <= item.sequence <= gap[2]:
+                _take_out(key.missing, gap, item.sequence)
+                key.repaired += 1
+                if (item.run, item.sequence) > (key.run, key.last):
+                    key.advance(item.run, item.sequence)
+                return [arrival]
+        if (item.run, item.sequence) <= (key.run, key.last):
+            return []
+        key.lost += item.sequence - key.last - 1 if item.run == key.run else 0
+        key.advance(item.run, item.sequence)
+        key.repaired += 1
+        return [arrival]
+
+    def _give_up(self, stream: tuple[str, str]) -> None:
+        """What the answers have not brought is lost."""
+        for (device, name), key in self._keys.items():
+            if (
+                device == stream[0]
+                and BY_NAME[name.partition("/")[0]].source == stream[1]
+                and key.missing
+            ):
+                lost = sum(
+                    max(0, last - first + 1) * countable
+                    for _, first, last, countable in key.missing
+                )
+                if lost:
+                    log.warning(
+                        "%s/%s: %d messages are lost: their publisher has them no more",
+                        device,
+                        name,
+                        lost,
+                    )
+                key.lost += lost
+                newest = max(
+                    ((run, last) for run, _, last, _ in key.missing if last < 1 << 62),
+                    default=(0, 0),
+                )
+                if newest > (key.run, key.last):
+                    key.run, key.last = newest
+                key.missing.clear()
+
+    def _release(self, stream: _Stream) -> list[Arrival]:
+        """Let go what is held, gaps and all."""
+        out, held = [], list(stream.held)
+        stream.held.clear()
+        stream.asking = False
+        stream.waiting.clear()
+        for arrival in held:
+            header = header_of(arrival)
+            key = self._keys.get((arrival.device, arrival.name))
+            if header is not None and key is not None:
+                if (header.run, header.sequence) <= (key.run, key.last):
+                    continue
+                key.lost += header.sequence - key.last - 1 if header.run == key.run else 0
+                key.run, key.last = header.run, header.sequence
+                key.missing.clear()
+            out.append(arrival)
+        return out
+
+    def _known(self, payload: bytes) -> bool:
+        mark = hash(payload)
+        if mark in self._seen:
+            return True
+        self._seen.append(mark)
+        return False
+
+
+def _take_out(missing: list[list[int]], gap: list[int], sequence: int) -> None:
+    """One message of a gap has come: what is left of it before and behind."""
+    run, first, last, countable = gap
+    missing.remove(gap)
+    if first < sequence:  # a run's own first numbers may never have been
+        missing.append([run, first, sequence - 1, int(countable or first > 1)])
+    if sequence < last:
+        missing.append([run, sequence + 1, last, countable])
+
+
+def header_of(arrival: Arrival) -> pb.Header | None:
+    """The header of a message, the only part that is parsed; None for types without one and for
+    damaged bytes.
+    """
+    if "header" not in arrival.topic.type.DESCRIPTOR.fields_by_name:
+        return None
+    try:
+        return pb.Header.FromString(first_field(arrival.payload))
+    except (DecodeError, ValueError):
+        return None

@@ -1,0 +1,1 @@
+"""Sessions become tables and files of other programs."""

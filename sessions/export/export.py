@@ -1,0 +1,241 @@
+"""A recording in other people's formats. SI units stand in the column names; docs/recordings.md
+describes the files.
+
+csv      one file per bus key            parquet  one file per bus key, zstd
+mat      one file, a struct per key      mcap     the same recording, cut by time or topic; the
+bytes are the bus's own kml/gpx  tracks of fixes and of every navigation filter
+
+Big recordings stream: only mat holds all in memory.
+"""
+
+import csv
+import re
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from scipy.io import savemat
+
+from messages.contract.topics import GNSS, LOG, NAV, parse
+from sessions.export.columns import Column, Value
+from sessions.export.table import Progress, Selection, Survey, rows, silent, survey, tables
+from sessions.export.track import write_gpx, write_kml
+from sessions.recording.mcap_log import Damage, McapLog, read
+
+ROW_GROUP = 20_000  # rows of Parquet written at once
+
+
+class ExportError(ValueError):
+    """Nothing to export, or a place that cannot be written; the text says which."""
+
+
+def file_stem(key: str) -> str:
+    """`gyrofree/cube/rate/products-ekf` -> `cube.rate.products-ekf`: the file name of a key."""
+    return ".".join(key.split("/")[1:])
+
+
+def to_csv(
+    path: Path, out: Path, selection: Selection = Selection(), progress: Progress = silent
+) -> list[Path]:
+    """One CSV per key into the folder `out`; empty cells where a number is not known.
+
+    Raises ExportError for a selection without messages, OSError for what cannot be read or written.
+    """
+    found = _surveyed(path, selection, progress)
+    files: dict[str, Path] = {}
+    with ExitStack() as stack:
+        writers = {}
+        for key, columns in found.columns.items():
+            files[key] = out / f"{file_stem(key)}.csv"
+            writers[key] = csv.writer(
+                stack.enter_context(files[key].open("w", newline="", encoding="utf-8"))
+            )
+            writers[key].writerow([column.name for column in columns.names])
+        for key, row in rows(path, found, selection, _second_half(progress)):
+            writers[key].writerow(["" if cell != cell else cell for cell in row])
+    return list(files.values())
+
+
+def to_parquet(
+    path: Path, out: Path, selection: Selection = Selection(), progress: Progress = silent
+) -> list[Path]:
+    """One Parquet file per key into the folder `out`. Raises as to_csv."""
+    found = _surveyed(path, selection, progress)
+    files: dict[str, Path] = {}
+    with ExitStack() as stack:
+        groups: dict[str, _RowGroups] = {}
+        for key, columns in found.columns.items():
+            files[key] = out / f"{file_stem(key)}.parquet"
+            groups[key] = stack.enter_context(
+                _RowGroups(files[key], columns.names, {"key": key, "source": path.name})
+            )
+        for key, row in rows(path, found, selection, _second_half(progress)):
+            groups[key].add(row)
+    return list(files.values())
+
+
+class _RowGroups:
+    """A Parquet file written some rows at a time."""
+
+    def __init__(self, path: Path, columns: list[Column], metadata: dict[str, str]) -> None:
+        types = [(column.name, pa.string() if column.text else pa.float64()) for column in columns]
+        self._schema = pa.schema(types, metadata=metadata)
+        self._writer = pq.ParquetWriter(path, self._schema, compression="zstd")
+        self._rows: list[list[Value]] = []
+
+    def __enter__(self) -> "_RowGroups":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._flush()
+        self._writer.close()
+
+    def add(self, row: list[Value]) -> None:
+        """One row more."""
+        self._rows.append(row)
+        if len(self._rows) >= ROW_GROUP:
+            self._flush()
+
+    def _flush(self) -> None:
+        if not self._rows:
+            return
+        arrays = [
+            pa.array(
+                [float(cell) for cell in cells] if field.type == pa.float64() else cells,
+                type=field.type,
+            )
+            for field, cells in zip(self._schema, zip(*self._rows, strict=True), strict=True)
+        ]
+        self._writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
+        self._rows = []
+
+
+def to_mat(
+    path: Path, out: Path, selection: Selection = Selection(), progress: Progress = silent
+) -> list[Path]:
+    """One MATLAB 5 file: struct per key (dots and dashes of the name as underscores), field per
+    column.
+    """
+    found = tables(path, selection, progress)
+    if not found:
+        raise ExportError(f"{path}: no message of the wanted topics and time")
+    content: dict[str, Any] = {}
+    for key, table in found.items():
+        struct = {column.name[:31]: table.data[column.name] for column in table.columns}
+        content[re.sub(r"[^a-z0-9]", "_", file_stem(key))[:31]] = struct
+    target = (
+        out / f"{path.parent.name if path.stem in ('recording', 'recovered') else path.stem}.mat"
+    )
+    savemat(target, content, do_compression=True, oned_as="column")
+    return [target]
+
+
+def to_mcap(
+    path: Path, out: Path, selection: Selection = Selection(), progress: Progress = silent
+) -> list[Path]:
+    """The recording between two times as one MCAP file `cut.mcap`; raises ExportError when nothing
+    is in between.
+    """
+    target = out / "cut.mcap"
+    count = 0
+    start = None
+    with target.open("wb") as stream:
+        log = McapLog(stream.fileno(), 128 * 1024)
+        for row in read(path, Damage()):
+            start = row.log_ns if start is None else start
+            topic = parse(row.key).topic
+            if (
+                selection.takes(topic)
+                and selection.start_s <= (row.log_ns - start) / 1e9 <= selection.end_s
+            ):
+                count += 1
+                log.add(
+                    log.open_channel(row.key, topic), row.log_ns, row.publish_ns, row.payload, count
+                )
+                if count % 5000 == 0:
+                    log.push()
+                    progress(0.5, "cutting")
+        log.finish()
+        log.push()
+    if not count:
+        target.unlink()
+        raise ExportError(f"{path}: no message of the wanted topics and time")
+    progress(1.0, "cut")
+    return [target]
+
+
+def to_kml(
+    path: Path, out: Path, selection: Selection = Selection(), progress: Progress = silent
+) -> list[Path]:
+    """Tracks for Google Earth and the like."""
+    return [write_kml(out / "track.kml", _tracks(path, selection, progress))]
+
+
+def to_gpx(
+    path: Path, out: Path, selection: Selection = Selection(), progress: Progress = silent
+) -> list[Path]:
+    """Tracks with times, for maps and GNSS tools."""
+    return [write_gpx(out / "track.gpx", _tracks(path, selection, progress))]
+
+
+Writer = Callable[[Path, Path, Selection, Progress], list[Path]]
+FORMATS: dict[str, Writer] = {
+    "csv": to_csv,
+    "parquet": to_parquet,
+    "mat": to_mat,
+    "kml": to_kml,
+    "gpx": to_gpx,
+    "mcap": to_mcap,
+}
+
+
+def export(
+    path: Path,
+    form: str,
+    out: Path,
+    selection: Selection = Selection(),
+    progress: Progress = silent,
+):
+    """Write a recording into the folder `out` (made when absent); the files that were written.
+
+    Raises ExportError for an unknown format and for a selection without data, OSError.
+    """
+    if form not in FORMATS:
+        raise ExportError(f"format {form!r}: want one of {', '.join(FORMATS)}")
+    out.mkdir(parents=True, exist_ok=True)
+    return FORMATS[form](path, out, selection, progress)
+
+
+def _surveyed(path: Path, selection: Selection, progress: Progress) -> Survey:
+    found = survey(path, selection, lambda done, what: progress(done * 0.3, what))
+    if not found.columns:
+        raise ExportError(f"{path}: no message of the wanted topics and time")
+    return found
+
+
+def _second_half(progress: Progress) -> Progress:
+    return lambda done, what: progress(0.3 + done * 0.7, what)
+
+
+def _tracks(path: Path, selection: Selection, progress: Progress) -> dict[str, np.ndarray]:
+    """Name -> (n, 4) utc s, latitude deg, longitude deg, height m."""
+    wanted = selection.topics or frozenset({GNSS.name, NAV.name})
+    found = tables(
+        path, Selection(wanted - {LOG.name}, selection.start_s, selection.end_s), progress
+    )
+    result = {
+        file_stem(key): table.vector("utc_s", "latitude_deg", "longitude_deg", "height_m")
+        for key, table in found.items()
+        if "latitude_deg" in table.data
+    }
+    result = {name: track[np.any(track[:, 1:] != 0.0, axis=1)] for name, track in result.items()}
+    result = {name: track for name, track in result.items() if len(track)}
+    if not result:
+        raise ExportError(
+            f"{path}: it has neither fixes nor a navigation solution, so there is no track to draw"
+        )
+    return result

@@ -1,0 +1,146 @@
+"""A recording as tables of numbers, one per bus key: read once for the widths, once for the
+rows.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from google.protobuf.message import DecodeError, Message
+from numpy.typing import NDArray
+
+from messages.contract.topics import Topic, TopicError, parse
+from sessions.export.columns import TIME, Column, Columns, Value
+from sessions.recording.mcap_log import Damage, Recorded, read
+
+Progress = Callable[[float, str], None]  # share done 0 to 1, what is being done
+
+
+def silent(done: float, what: str) -> None:
+    """No progress shown."""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What of a recording is wanted."""
+
+    topics: frozenset[str] = frozenset()  # names; empty: all
+    start_s: float = 0.0  # from the first message's receive time, s
+    end_s: float = float("inf")
+
+    def takes(self, topic: Topic) -> bool:
+        """Is this topic wanted?"""
+        return not self.topics or topic.name in self.topics
+
+
+@dataclass
+class Survey:
+    """What a recording holds."""
+
+    columns: dict[str, Columns] = field(default_factory=dict)  # bus key -> its columns
+    counts: dict[str, int] = field(default_factory=dict)  # bus key -> messages
+    first_ns: int = 0  # receive time of the first message, ns since 1970
+    last_ns: int = 0
+    undecodable: int = 0  # messages whose type is unknown or whose bytes are no such message
+    damage: Damage = field(default_factory=Damage)
+
+
+def messages(
+    path: Path, selection: Selection, damage: Damage
+) -> Iterator[tuple[Recorded, Topic, Message | None]]:
+    """Selected messages in the order of recording, decoded; None for one that cannot be. Raises
+    OSError.
+    """
+    start = None
+    for row in read(path, damage):
+        start = row.log_ns if start is None else start
+        if not selection.start_s <= (row.log_ns - start) / 1e9 <= selection.end_s:
+            continue
+        try:
+            topic = parse(row.key).topic
+        except TopicError:
+            continue
+        if selection.takes(topic):
+            try:
+                yield row, topic, topic.type.FromString(row.payload)
+            except DecodeError:
+                yield row, topic, None
+
+
+def survey(path: Path, selection: Selection = Selection(), progress: Progress = silent) -> Survey:
+    """First reading: keys, counts, times, widths. Raises OSError."""
+    found = Survey()
+    size = max(1, path.stat().st_size)
+    seen = 0
+    for row, topic, message in messages(path, selection, found.damage):
+        found.first_ns = found.first_ns or row.log_ns
+        found.last_ns = max(found.last_ns, row.log_ns)
+        seen += len(row.payload) + 40
+        if sum(found.counts.values()) % 5000 == 0:
+            progress(
+                min(0.99, seen / (4 * size)), "looking through"
+            )  # payloads shrink to about a quarter
+        if message is None:
+            found.undecodable += 1
+            continue
+        if row.key not in found.columns:
+            found.columns[row.key] = Columns(topic)
+        found.columns[row.key].widen(message)
+        found.counts[row.key] = found.counts.get(row.key, 0) + 1
+    progress(1.0, "looked through")
+    return found
+
+
+def rows(
+    path: Path, found: Survey, selection: Selection = Selection(), progress: Progress = silent
+) -> Iterator[tuple[str, list[Value]]]:
+    """Second reading: (bus key, row) in the order of recording. Raises OSError."""
+    total, done = max(1, sum(found.counts.values())), 0
+    for row, _, message in messages(path, selection, Damage()):
+        if message is None or row.key not in found.columns:
+            continue
+        for cells in found.columns[row.key].rows(message, row.log_ns):
+            yield row.key, cells
+        done += 1
+        if done % 2000 == 0:
+            progress(done / total, "writing")
+    progress(1.0, "written")
+
+
+@dataclass(frozen=True)
+class Table:
+    """All rows of one key, as arrays."""
+
+    columns: list[Column]
+    data: dict[str, NDArray]  # column name -> (n,) float64, or str
+
+    def __len__(self) -> int:
+        return len(self.data[TIME])
+
+    def vector(self, *names: str) -> NDArray[np.float64]:
+        """Columns side by side, (n, len(names)). Raises KeyError for a column that is not there."""
+        return np.column_stack([self.data[name] for name in names])
+
+
+def tables(
+    path: Path, selection: Selection = Selection(), progress: Progress = silent
+) -> dict[str, Table]:
+    """A whole recording in memory: bus key -> table. Raises OSError."""
+    found = survey(path, selection, lambda done, what: progress(done * 0.4, what))
+    columns = {key: columns.names for key, columns in found.columns.items()}
+    cells: dict[str, list[list[Value]]] = {key: [] for key in columns}
+    for key, row in rows(
+        path, found, selection, lambda done, what: progress(0.4 + done * 0.6, "reading")
+    ):
+        cells[key].append(row)
+    return {key: _table(columns[key], cells[key]) for key in columns}
+
+
+def _table(columns: list[Column], cells: list[list[Value]]) -> Table:
+    by_column = list(zip(*cells, strict=True)) if cells else [() for _ in columns]
+    data = {
+        column.name: np.array(values, dtype=str if column.text else np.float64)
+        for column, values in zip(columns, by_column, strict=True)
+    }
+    return Table(columns, data)

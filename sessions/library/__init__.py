@@ -1,0 +1,1 @@
+"""Sessions are found, labelled, compared and removed."""

@@ -1,0 +1,233 @@
+"""A recording read into curves: `build`, and a program of its own for whoever must not wait.
+
+    python -m sessions.library.curves_build RECORDING.mcap
+
+writes curves.npz beside the recording and prints the share done, a number per line.
+"""
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from google.protobuf.message import DecodeError, Message
+from numpy.typing import NDArray
+
+from estimator.settings import EstimatorSettings
+from messages.contract.topics import GNSS, IMU, NAV, NOTE, RATE, TACHO, TRUTH, Topic, parse
+from sessions.library.curves import Curves, Line, Mark, bin_for, bins_of, load, save
+from sessions.library.curves_bins import Binner, PulseLine, TrackLine
+from sessions.library.scan import Block, Extent, Progress, extent, scan
+from sessions.recording.manifest import SessionError, name_of, read_manifest
+
+Array = NDArray[np.float64]
+
+WANTED: tuple[Topic, ...] = (RATE, IMU, TACHO, TRUTH, NAV, GNSS, NOTE)
+STRAY_S = (
+    5.0  # a sample whose own time lies further outside the recording is put where it was received
+)
+COARSE_CHUNKS = 250  # read for the first look at a recording ...
+COARSE_THIN = 4  # ... and of those one message in so many
+LONG_CHUNKS = 4 * COARSE_CHUNKS  # a recording of more gets one
+
+
+def build(path: Path, coarse: bool = False, on_progress: Progress = lambda _: None) -> Curves:
+    """Curves of a recording; `coarse`: of evenly spaced parts of it only.
+
+    Raises OSError, and ValueError for a file without any message.
+    """
+    found = extent(path)
+    stride = max(1, found.chunks // COARSE_CHUNKS) if coarse else 1
+    reading = _Reading(path, found, stride)
+    for block in scan(path, WANTED, stride, on_progress):
+        reading.take(
+            block
+            if stride == 1
+            else Block(block.key, block.log_ns[::COARSE_THIN], block.payloads[::COARSE_THIN])
+        )
+    return reading.result()
+
+
+def ensure(path: Path, on_progress: Progress = lambda _: None) -> Curves:
+    """The kept curves, or new ones, kept if the folder can be written. Raises what build raises."""
+    kept = load(path)
+    if kept is not None:
+        return kept
+    made = build(path, on_progress=on_progress)
+    try:
+        save(made, path)
+    except OSError:
+        pass  # a read-only archive is compared all the same, only slower
+    return made
+
+
+class _Reading:
+    """What has been read so far."""
+
+    def __init__(self, path: Path, found: Extent, stride: int) -> None:
+        self._path, self._extent, self._coarse = path, found, stride > 1
+        least = 1.1 * found.seconds * stride / found.chunks if self._coarse else 0.0
+        self._least_s = least  # width of bins, at least, s
+        self._bin_s = 0.0  # known with the first samples
+        self._lines: dict[str, Binner] = {}
+        self._pulses: dict[str, PulseLine] = {}
+        self._tracks: dict[str, TrackLine] = {}
+        self._marks: list[Mark] = []
+        self._clocks: set[str] = set()
+        self._periods: dict[str, float] = {}
+        self._take: dict[str, Callable[[str, list[Message], Array], None]] = {
+            RATE.name: self._rate,
+            TRUTH.name: self._truth,
+            IMU.name: self._imu,
+            TACHO.name: self._tacho,
+            NAV.name: self._nav,
+            GNSS.name: self._gnss,
+            NOTE.name: self._note,
+        }
+
+    def take(self, block: Block) -> None:
+        """One block of messages of one key; those that cannot be decoded are left out."""
+        address = parse(block.key)
+        decoded = list(_decoded(address.topic, block))
+        if not decoded:
+            return
+        found = [message for _, message in decoded]
+        name = f"{address.device}/{address.topic.name}" + (
+            f"/{address.estimator}" if address.estimator else ""
+        )
+        for header in {(m.header.run, m.header.epoch) for m in (found[0], found[-1])}:
+            if address.topic is not NOTE and header[0]:
+                self._clocks.add(f"{address.device}/{header[0]}/{header[1]}")
+        self._take[address.topic.name](name, found, self._times(decoded))
+
+    def result(self) -> Curves:
+        """All of it, on one grid."""
+        seconds = max(self._extent.seconds, 1e-3)
+        width = self._bin_s or bin_for(seconds, max(self._least_s, 0.01))
+        n = bins_of(seconds, width)
+        lines = {key: binner.line(n) for key, binner in self._lines.items()}
+        dark = {key: _dark(key, lines) for key in self._pulses}
+        lines |= {
+            key: pulses.line(n, width, self._coarse, dark[key])
+            for key, pulses in self._pulses.items()
+        }
+        tracks = {key: track.track() for key, track in self._tracks.items()}
+        return Curves(
+            name_of(self._path),
+            self._extent.first_ns,
+            seconds,
+            width,
+            dict(sorted(lines.items())),
+            dict(sorted(tracks.items())),
+            tuple(sorted(self._marks, key=lambda mark: mark.t)),
+            tuple(sorted(self._clocks)),
+            self._coarse,
+            leader_of(self._path),
+        )
+
+    def _times(self, decoded: list[tuple[int, Message]]) -> Array:
+        """The samples' own times, s from the first message; receive times where those cannot be."""
+        first = self._extent.first_ns
+        own = np.array(
+            [m.header.utc_ns for _, m in decoded], dtype=np.float64
+        )  # 1e18 ns has a step of 256 ns
+        own = (own - first) / 1e9
+        received = np.array([log_ns - first for log_ns, _ in decoded], dtype=np.float64) / 1e9
+        stray = (own < -STRAY_S) | (own > self._extent.seconds + STRAY_S)
+        return np.where(stray, received, own)
+
+    def _binner(self, key: str, t: Array, width: int) -> Binner:
+        if key not in self._lines:
+            if not self._bin_s:
+                period = float(np.median(np.diff(t))) if len(t) > 2 else 0.01
+                self._bin_s = bin_for(self._extent.seconds, max(self._least_s, period))
+            self._lines[key] = Binner(key, self._extent.seconds, self._bin_s, width)
+        return self._lines[key]
+
+    def _rate(self, key: str, found: list[Message], t: Array) -> None:
+        values = np.array(
+            [(*m.omega_ib_b_radps, m.angle_z_rad) for m in found if len(m.omega_ib_b_radps) == 3]
+        )
+        if len(values) == len(t):
+            self._binner(key, t, 4).add(t, values)
+
+    _truth = _rate
+
+    def _imu(self, key: str, found: list[Message], t: Array) -> None:
+        batches = [np.array(m.omega_ib_b_radps).reshape(-1, 3) for m in found]
+        times = [
+            at + m.period_s * np.arange(len(b)) for at, m, b in zip(t, found, batches, strict=True)
+        ]
+        if all_times := np.concatenate(times).tolist():
+            at = np.array(all_times)
+            self._binner(key.replace("/imu", "/gyro"), at, 3).add(at, np.concatenate(batches))
+
+    def _tacho(self, key: str, found: list[Message], t: Array) -> None:
+        pulses = self._pulses.setdefault(key, PulseLine(key))
+        pulses.add(t, np.array([m.omega_radps for m in found]))
+
+    def _nav(self, key: str, found: list[Message], t: Array) -> None:
+        for at, m in zip(t.tolist(), found, strict=True):
+            if len(m.p_ned_m) == 3 and (m.origin_latitude_deg or m.origin_longitude_deg):
+                origin = (
+                    np.radians(m.origin_latitude_deg),
+                    np.radians(m.origin_longitude_deg),
+                    m.origin_height_m,
+                )
+                self._track(key, origin).add(at, *m.p_ned_m)
+
+    def _gnss(self, key: str, found: list[Message], t: Array) -> None:
+        for at, m in zip(t.tolist(), found, strict=True):
+            if m.quality:
+                place = (np.radians(m.latitude_deg), np.radians(m.longitude_deg), m.height_m)
+                self._track(key, place).add_place(at, *place)
+
+    def _track(self, key: str, origin: tuple[float, float, float]) -> TrackLine:
+        return self._tracks.setdefault(key, TrackLine(key, origin))
+
+    def _note(self, key: str, found: list[Message], t: Array) -> None:
+        for at, m in zip(t.tolist(), found, strict=True):
+            moment = (m.at_utc_ns - self._extent.first_ns) / 1e9 if m.at_utc_ns else at
+            self._marks.append(Mark(float(moment), m.text or "mark", m.author, m.seconds))
+
+
+def _dark(key: str, lines: dict[str, Line]) -> NDArray[np.bool_] | None:
+    """Bins in which the tachometer's device has no sample at all."""
+    mine = [line.mean[:, 0] for line in lines.values() if line.device == key.split("/")[0]]
+    return np.isnan(np.column_stack(mine)).all(axis=1) if mine else None
+
+
+def leader_of(path: Path) -> str:
+    """The first rate estimator of the configuration that a session was recorded with, else of the
+    default one.
+    """
+    try:
+        estimator = read_manifest(path.parent).configuration.get("estimator")
+    except SessionError:
+        estimator = None
+    names = estimator.get("rate") if isinstance(estimator, dict) else None
+    return str((names or EstimatorSettings().rate)[0])
+
+
+def _decoded(topic: Topic, block: Block) -> Iterator[tuple[int, Message]]:
+    for log_ns, payload in zip(block.log_ns, block.payloads, strict=True):
+        try:
+            yield log_ns, topic.type.FromString(payload)
+        except DecodeError:
+            continue
+
+
+def main(arguments: list[str]) -> int:
+    """The program; 0 when the curves are there, 1 with one line on standard error when not."""
+    path = Path(arguments[0])
+    try:
+        if load(path) is None:
+            save(build(path, on_progress=lambda done: print(f"{done:.3f}", flush=True)), path)
+    except (OSError, ValueError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))

@@ -1,0 +1,163 @@
+"""A comparison as a browser draws it: any window of it, at most so many points per line. Degrees
+here, at the last.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.library.compare import Comparison, Overlaid, moved
+from sessions.library.curves import RATE, TACHO, TRUTH, Line
+
+Array = NDArray[np.floating[Any]]
+
+POINTS = 1200  # per line, two for each bin of the window
+TRACK_POINTS = 1500
+DEG = float(np.degrees(1.0))
+
+
+def drawing(
+    found: Comparison,
+    begin_s: float | None = None,
+    end_s: float | None = None,
+    points: int = POINTS,
+    everything: bool = False,
+) -> dict[str, Any]:
+    """Lines of rate, error and angle within a window, and the tracks; for JSON.
+
+    `everything`: all estimators of every session instead of its leading line. Units: deg/s, deg, s,
+    m.
+    """
+    span = found.span
+    begin = span[0] if begin_s is None else begin_s
+    end = span[1] if end_s is None else end_s
+    lines = []
+    for number, one in enumerate(found.sessions):
+        for line in _shown(one, number, everything):
+            lines.append(_line(one, number, line, begin, end, points))
+    return {
+        "span": list(span),
+        "window": [begin, end],
+        "sessions": [_session(one) for one in found.sessions],
+        "lines": [line for line in lines if line["rate"] or line["error"]],
+        "tracks": _tracks(found),
+    }
+
+
+def _shown(one: Overlaid, number: int, everything: bool) -> list[Line]:
+    """The leading line and the tachometer of each; the truth of the first only."""
+    lines = [line for line in one.curves.lines.values() if everything or line.key == one.lead]
+    if everything:
+        return lines
+    kinds = (TACHO, TRUTH) if number == 0 else (TACHO,)
+    return lines + [line for kind in kinds for line in one.curves.of_kind(kind)]
+
+
+def _session(one: Overlaid) -> dict[str, Any]:
+    shift = one.shift
+    return {
+        "id": one.curves.session,
+        "offset_s": one.offset_s,
+        "seconds": one.curves.seconds,
+        "by": one.by,
+        "quality": one.quality,
+        "correlation": None if shift is None else shift.correlation,
+        "rival_s": None if shift is None else shift.rival_s,
+        "rival_correlation": None if shift is None else shift.rival_correlation,
+        "line": one.lead,
+        "coarse": one.curves.coarse,
+        "others": max(0, len(one.curves.of_kind(RATE)) - 1),
+        "marks": [
+            {"t": mark.t + one.offset_s, "text": mark.text, "author": mark.author}
+            for mark in one.curves.marks
+        ],
+    }
+
+
+def _line(
+    one: Overlaid, number: int, line: Line, begin: float, end: float, points: int
+) -> dict[str, Any]:
+    against, error = one.curves.error_of(line)
+    bins = max(1, points // 2)
+    window = (begin - one.offset_s, end - one.offset_s)
+    t, step, first, last, every = _grid(len(line.mean), one.curves.bin_s, window, bins)
+    parts: dict[str, Any] = {}
+    for name in line.components:
+        _, low, high = line.part(name) or (None, np.zeros(0), np.zeros(0))
+        parts[name] = _decimated(low[first:last], high[first:last], every, DEG)
+    errors = {
+        name: _decimated(e[first:last], e[first:last], every, DEG) for name, e in error.items()
+    }
+    angle = parts.pop("angle_z", None)
+    return {
+        "session": number,
+        "key": line.key,
+        "kind": line.kind,
+        "title": line.title,
+        "t0": t + one.offset_s,
+        "dt": step,
+        "rate": parts,
+        "error": errors,
+        "against": against,
+        "angle": {"z": angle} if angle else {},
+    }
+
+
+def _grid(
+    n: int, bin_s: float, window: tuple[float, float], bins: int
+) -> tuple[float, float, int, int, int]:
+    """(time of the first point, step of points, first and one past the last bin, bins per point)
+    for a window.
+    """
+    first = int(np.clip(np.floor(window[0] / bin_s), 0, n))
+    last = int(np.clip(np.ceil(window[1] / bin_s), first, n))
+    every = max(1, -(-(last - first) // bins))
+    first -= first % every  # so that points stay where they are when the window moves
+    return (first + 0.5 * every) * bin_s, every * bin_s, first, last, every
+
+
+def _decimated(low: Array, high: Array, every: int, scale: float) -> dict[str, Any]:
+    """Least and greatest of every `every` bins, NaN as None; `high` only where it differs."""
+    if every > 1 and len(low):
+        pad = -len(low) % every
+        low = np.fmin.reduce(
+            np.pad(low, (0, pad), constant_values=np.nan).reshape(-1, every), axis=1
+        )
+        high = np.fmax.reduce(
+            np.pad(high, (0, pad), constant_values=np.nan).reshape(-1, every), axis=1
+        )
+    same = np.array_equal(low, high, equal_nan=True)
+    return {"low": _numbers(low * scale), "high": None if same else _numbers(high * scale)}
+
+
+def _numbers(values: Array) -> list[float | None]:
+    rounded = np.round(values.astype(np.float64), 5)
+    return [None if value != value else value for value in rounded.tolist()]
+
+
+def _tracks(found: Comparison) -> list[dict[str, Any]]:
+    """North and east from the first track's origin."""
+    keyed: Sequence[tuple[int, Overlaid, str]] = [
+        (number, one, key) for number, one in enumerate(found.sessions) for key in one.curves.tracks
+    ]
+    if not keyed:
+        return []
+    origin = keyed[0][1].curves.tracks[keyed[0][2]].origin
+    result = []
+    for number, one, key in keyed:
+        points = moved(one.curves.tracks[key], origin)
+        points = points[:: max(1, -(-len(points) // TRACK_POINTS))]
+        result.append(
+            {
+                "session": number,
+                "key": key,
+                "title": key.split("/", 1)[1].removeprefix("nav/"),
+                "t": np.round(points[:, 0] + one.offset_s, 2).tolist(),
+                "north": np.round(points[:, 1], 3).tolist(),
+                "east": np.round(points[:, 2], 3).tolist(),
+                "down": np.round(points[:, 3], 3).tolist(),
+            }
+        )
+    return result

@@ -1,0 +1,1 @@
+"""What crosses the bus becomes a session on disk."""

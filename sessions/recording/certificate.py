@@ -1,0 +1,140 @@
+"""What a session holds of what there was, per device and topic, and what made it: certificate and
+provenance.
+
+The certificate counts messages on the bus by their sequences, and the line before it by the
+gateway's own ledger (LinkStatus). It speaks of what lies between the first and the last message of
+a topic.
+"""
+
+from google.protobuf.message import DecodeError
+from pydantic import BaseModel, ConfigDict
+
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import BOARD, LINK, NAV, RATE, Address, TopicError, parse
+from sessions.recording.manifest import KeyCount
+
+LOOK_EVERY = 200  # messages of an estimate between two looks at its calibration
+WIRE = (
+    "good_frames",
+    "lost_frames",
+    "lost_samples",
+    "device_dropped",
+    "bad_chunks",
+    "bad_bytes",
+    "reboots",
+)
+
+
+class TopicCertificate(BaseModel):
+    """Messages of one topic."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    expected: int = 0
+    received: int = 0  # distinct ones in the file, the repaired among them
+    repaired: int = 0
+    lost: int = 0
+    damaged: int = 0  # in the file, but their header cannot be read
+
+
+class DeviceCertificate(BaseModel):
+    """One device: its topics, its line, and the time nobody read it."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    complete: bool = (
+        True  # nothing lost or damaged on the bus, no sample lost on the line, never dark
+    )
+    topics: dict[str, TopicCertificate] = {}
+    wire: dict[str, int] = {}  # counters of LinkStatus over the session
+    dark_s: float = 0.0  # s, by the board's clock, that nobody read it between two gateways' runs
+
+
+def certify(
+    keys: dict[str, KeyCount], wire: dict[str, dict[str, int]]
+) -> dict[str, DeviceCertificate]:
+    """Certificate per device from the counts per bus key and the lines' counters per device."""
+    found: dict[str, DeviceCertificate] = {}
+    for key, count in sorted(keys.items()):
+        try:
+            address = parse(key)
+        except TopicError:
+            continue
+        device = found.setdefault(
+            address.device, DeviceCertificate(wire=wire.get(address.device, {}))
+        )
+        name = (
+            f"{address.topic.name}/{address.estimator}" if address.estimator else address.topic.name
+        )
+        device.topics[name] = TopicCertificate(
+            expected=count.expected,
+            received=count.messages - count.repeated,
+            repaired=count.repaired,
+            lost=count.lost,
+            damaged=count.unreadable,
+        )
+        if address.topic.source == LINK.source:
+            device.dark_s = max(device.dark_s, count.dark_s)
+    for device in found.values():
+        bad = any(topic.lost or topic.damaged for topic in device.topics.values())
+        device.complete = not (bad or device.wire.get("lost_samples") or device.dark_s)
+    return found
+
+
+class Witness:
+    """Looks at the few messages that say how a session came about."""
+
+    def __init__(self) -> None:
+        self._boards: dict[str, pb.BoardInfo] = {}
+        self._lines: dict[
+            str, dict[int, tuple[pb.LinkStatus, pb.LinkStatus]]
+        ] = {}  # by run: first and last
+        self._cards: dict[str, set[str]] = {}
+        self._n: dict[tuple[str, str], int] = {}
+
+    def look(self, address: Address, payload: bytes) -> None:
+        """One recorded message; almost all of them are passed over without being parsed."""
+        topic, device = address.topic, address.device
+        try:
+            if topic is BOARD:
+                self._boards[device] = pb.BoardInfo.FromString(payload)
+            elif topic is LINK:
+                status = pb.LinkStatus.FromString(payload)
+                runs = self._lines.setdefault(device, {})
+                runs[status.header.run] = (runs.get(status.header.run, (status,))[0], status)
+            elif topic is RATE or topic is NAV:
+                n = self._n[device, address.estimator] = (
+                    self._n.get((device, address.estimator), -1) + 1
+                )
+                if n % LOOK_EVERY == 0:
+                    card = topic.type.FromString(payload).calibration
+                    self._cards.setdefault(device, set()).update([card] if card else [])
+        except DecodeError:
+            pass  # counted as unreadable elsewhere
+
+    def wire(self) -> dict[str, dict[str, int]]:
+        """Counters of each device's line, from the first to the last status of each of its
+        gateway's runs.
+        """
+        found = {}
+        for device, runs in self._lines.copy().items():
+            pairs = list(runs.copy().values())
+            found[device] = {
+                name: sum(getattr(b, name) - getattr(a, name) for a, b in pairs) for name in WIRE
+            }
+        return found
+
+    def provenance(self) -> dict[str, dict[str, object]]:
+        """Per device: firmware, board, axes, and the calibration cards its estimates used."""
+        found: dict[str, dict[str, object]] = {}
+        for device, board in self._boards.copy().items():
+            found.setdefault(device, {}).update(
+                firmware=board.firmware,
+                uid=board.uid,
+                board_id=board.board_id,
+                axes=board.axes,
+                sample_period_s=board.sample_period_s,
+            )
+        for device, cards in self._cards.copy().items():
+            found.setdefault(device, {})["calibration"] = sorted(cards.copy())
+        return found

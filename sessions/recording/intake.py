@@ -1,0 +1,115 @@
+"""Between the bus and the file: gaps are filled before anything is written, so that a recording is
+in order.
+
+While a gap of a stream is being filled its live messages wait in memory (mending.Mender); they are
+in the publisher's spool too, so a crash of the recorder loses none of them.
+"""
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import Address, TopicError, parse
+from messages.history.mending import Arrival, Mender, Question
+from sessions.recording.manifest import Manifest
+
+
+class Entry(NamedTuple):
+    """One message to be recorded."""
+
+    log_ns: int
+    key: str
+    payload: bytes
+    late: bool
+
+
+class Intake:
+    """Takes messages in the order of arrival, gives them in the order of publication."""
+
+    def __init__(self, prefix: str, ask: Callable[[Question], None] | None, since_ns: int) -> None:
+        """Without `ask` nothing is repaired. Runs that began after since_ns (UTC) are wanted from
+        their beginning.
+        """
+        self._prefix = prefix
+        self._mender = None if ask is None else Mender(ask, since_ns=since_ns)
+        self._answers: deque[tuple[Question, pb.HistoryReply | None]] = deque()
+        self._addresses: dict[str, Address | None] = {}
+        self._keys: dict[
+            tuple[str, str, str], str
+        ] = {}  # bus keys by topic, device, estimator: checked names cost
+        self._last_ns: dict[
+            tuple[str, str], int
+        ] = {}  # by device and source: the time of recording goes on
+
+    @property
+    def asking(self) -> bool:
+        """True while an answer is awaited."""
+        return self._mender is not None and self._mender.asking
+
+    @property
+    def held(self) -> int:
+        """Messages that wait for a gap before them to be filled."""
+        return 0 if self._mender is None else self._mender.held
+
+    def resume(self, manifest: Manifest) -> None:
+        """Go on where a session ended that a crash cut off: what came in between is asked for."""
+        for key, count in manifest.keys.items():
+            address = self._address(key)
+            if self._mender is not None and address is not None and count.last_sequence:
+                name = (
+                    f"{address.topic.name}/{address.estimator}"
+                    if address.estimator
+                    else address.topic.name
+                )
+                self._mender.seed(address.device, name, count.last_run, count.last_sequence)
+
+    def answered(self, question: Question, reply: pb.HistoryReply | None) -> None:
+        """An answer, on any thread; `answers` takes it in."""
+        self._answers.append((question, reply))
+
+    def answers(self) -> Iterator[Entry]:
+        """What the answers that came bring."""
+        while self._answers and self._mender is not None:
+            yield from self._entries(self._mender.answer(*self._answers.popleft()))
+
+    def take(self, received_ns: int, key: str, payload: bytes) -> Iterator[Entry]:
+        """One message from the bus."""
+        address = self._address(key)
+        if self._mender is None or address is None or not address.topic.recorded:
+            yield Entry(received_ns, key, payload, False)
+            return
+        arrival = Arrival(address.topic, address.device, address.estimator, payload, received_ns)
+        yield from self._entries(self._mender.take(arrival))
+
+    def release(self) -> Iterator[Entry]:
+        """What is still held, gaps and all."""
+        if self._mender is not None:
+            yield from self._entries(self._mender.release())
+
+    def _address(self, key: str) -> Address | None:
+        if key not in self._addresses:
+            if len(self._addresses) > 4096:  # a foreign publisher with ever new keys
+                self._addresses.clear()
+                self._keys.clear()
+            try:
+                self._addresses[key] = parse(key)
+            except TopicError:
+                self._addresses[key] = None
+        return self._addresses[key]
+
+    def _entries(self, arrivals: list[Arrival]) -> Iterator[Entry]:
+        for arrival in arrivals:
+            stream = arrival.device, arrival.topic.source
+            at_ns = arrival.at_ns
+            if arrival.late:  # the publisher's clock may differ from ours; the order must not
+                at_ns = min(at_ns, time.time_ns())
+            at_ns = self._last_ns[stream] = max(at_ns, self._last_ns.get(stream, 0))
+            name = arrival.topic.name, arrival.device, arrival.estimator
+            key = self._keys.get(name)
+            if key is None:
+                key = self._keys[name] = arrival.topic.key(
+                    self._prefix, arrival.device, arrival.estimator
+                )
+            yield Entry(at_ns, key, arrival.payload, arrival.late)

@@ -1,0 +1,146 @@
+"""session.json: what a session is, beside its recording.
+
+A session is a folder `<root>/<id>/` with `session.json` and one MCAP file. The state says how far
+to trust the file: open (being recorded, or cut off), closed (complete, with its hash), recovered
+(rebuilt from one cut off, which stays).
+"""
+
+import os
+import re
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+MANIFEST = "session.json"
+RECORDING = "recording.mcap"
+RECOVERED = "recovered.mcap"
+SESSION_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,31}")  # what a person may add to an id
+SESSION_ID = re.compile(r"[0-9]{8}-[0-9]{6}(-[a-z0-9][a-z0-9_-]{0,40})?")
+
+
+class SessionError(ValueError):
+    """A session that cannot be named, found or read; the text says which and why."""
+
+
+def name_of(recording: Path) -> str:
+    """What a recording is called: its session's id, else the file's own name."""
+    return recording.parent.name if recording.name in (RECORDING, RECOVERED) else recording.stem
+
+
+class KeyCount(BaseModel):
+    """What came in on one bus key."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    messages: int = 0
+    lost: int = 0  # sum of forward jumps of header.sequence within one run
+    restarts: int = 0  # header.run changed or header.sequence went back: the publisher began anew
+    repeated: int = 0  # the same header.sequence twice running
+    unreadable: int = 0  # payloads without a readable header; recorded all the same
+    repaired: int = 0  # of `messages`, filled in from what their publisher had kept
+    # s, by the board's clock, that nobody spoke between one publisher's last message and the next's
+    dark_s: float = 0.0
+    last_run: int = 0  # of the newest message: where the session after a crash goes on
+    last_sequence: int = 0
+
+    @property
+    def expected(self) -> int:
+        """Messages that ought to be here: those that are, without repetitions, and those known to
+        be missing.
+        """
+        return self.messages - self.repeated + self.lost
+
+
+class Manifest(BaseModel):
+    """The content of session.json. Unknown fields are left out on reading: later versions may add
+    some.
+    """
+
+    model_config = ConfigDict(extra="ignore")
+
+    format: Literal[1] = 1
+    id: str = Field(pattern=rf"^{SESSION_ID.pattern}$")
+    state: Literal["open", "closed", "recovered"] = "open"
+    file: Literal["recording.mcap", "recovered.mcap"] = RECORDING
+    note: str = ""
+    user: str = ""  # who ordered the start; empty when it began by itself
+    continues: str = (
+        ""  # id of the session before, when this one began because that file was full or cut off
+    )
+    devices: list[str] = []
+    sources: list[str] = []  # names of messages.Source seen in headers: HARDWARE, SIMULATED, ...
+    start_utc_ns: int = 0  # receive time of the start, ns since 1970
+    end_utc_ns: int = 0  # receive time of the last message counted here
+    bytes: int = 0  # of the file
+    sha256: str = ""  # of the closed or recovered file
+    keys: dict[str, KeyCount] = {}
+    channels: dict[
+        int, str
+    ] = {}  # MCAP channel id -> bus key, so that a file can be read without its first chunk
+    overflow: int = 0  # messages not recorded because the disk or the process could not keep up
+    unknown: int = 0  # messages on keys that are not in the topic table; not recorded
+    recovery: str = ""  # what the recovery found and kept
+    certificate: dict[str, dict[str, object]] = {}  # per device: certificate.DeviceCertificate
+    provenance: dict[str, dict[str, object]] = {}  # per device: firmware, board, calibration cards
+    versions: dict[str, str] = {}
+    configuration: dict[str, object] = {}
+
+    @property
+    def messages(self) -> int:
+        """Messages counted over all keys."""
+        return sum(count.messages for count in self.keys.values())
+
+    @property
+    def lost(self) -> int:
+        """Messages known to be missing: jumps of sequence, and what was refused."""
+        return sum(count.lost for count in self.keys.values()) + self.overflow
+
+
+def check_id(session: str) -> str:
+    """The id itself; raises SessionError for anything that is not one, so that an id can be used as
+    a folder name.
+    """
+    if not SESSION_ID.fullmatch(session):
+        raise SessionError(
+            f"session {session[:80]!r}: want an id like 20260131-120000 or 20260131-120000-name"
+        )
+    return session
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """session.json of a folder; raises SessionError with the file and the reason."""
+    path = folder / MANIFEST
+    try:
+        manifest = Manifest.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise SessionError(f"{path}: {error.strerror}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "the file"
+        raise SessionError(f"{path}: {where}: {first['msg']}") from error
+    if manifest.id != folder.name:
+        raise SessionError(f"{path}: id {manifest.id!r} stands in the folder of {folder.name!r}")
+    return manifest
+
+
+def write_manifest(folder: Path, manifest: Manifest) -> None:
+    """Replace session.json in one step: after a crash there is the old or the new one. Raises
+    OSError.
+    """
+    new = folder / (MANIFEST + ".new")
+    with new.open("w", encoding="utf-8") as stream:
+        stream.write(manifest.model_dump_json(indent=1) + "\n")
+        stream.flush()
+        os.fsync(stream.fileno())
+    os.replace(new, folder / MANIFEST)
+    sync_folder(folder)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make new and renamed entries of a folder survive a power cut."""
+    fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(fd)
+    finally:
+        os.close(fd)

@@ -1,0 +1,218 @@
+"""MCAP with the bus's own bytes in it: one channel per bus key, its schema a protobuf
+FileDescriptorSet.
+
+The file can be opened by any MCAP viewer; layout and records: https://mcap.dev/spec. Nothing here
+looks into a payload.
+"""
+
+import hashlib
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from google.protobuf.descriptor import FileDescriptor
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from mcap.records import Channel, Chunk, Message, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.writer import CompressionType, Writer
+
+from messages.contract.topics import Topic
+from sessions.recording.chunk_index import spill
+
+PROFILE = "gyrofree"
+RECORD_LIMIT = 64 * 1024**2  # bytes; a longer record is damage, not data (our chunks are 128 KiB)
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """One message as it crossed the bus."""
+
+    log_ns: int  # when the recorder received it, UTC, ns since 1970
+    publish_ns: int  # header.utc_ns, or log_ns when it has none
+    key: str
+    payload: bytes
+
+
+def descriptor_set(topic: Topic) -> bytes:
+    """The serialised FileDescriptorSet of a topic's type with everything it imports, dependencies
+    first.
+    """
+    files: dict[str, FileDescriptor] = {}
+
+    def visit(file: FileDescriptor) -> None:
+        if file.name not in files:
+            for dependency in file.dependencies:
+                visit(dependency)
+            files[file.name] = file
+
+    visit(topic.type.DESCRIPTOR.file)
+    result = FileDescriptorSet()
+    for file in files.values():
+        file.CopyToProto(result.file.add())
+    return result.SerializeToString()
+
+
+class Sink:
+    """What the MCAP writer writes to: memory first, the file when `push` is called.
+
+    On a full disk the bytes stay in memory and the next push goes on where the last one stopped, so
+    that a disk that gets room again has lost nothing.
+    """
+
+    def __init__(self, fd: int) -> None:
+        self._fd = fd
+        self._written = 0
+        self.hash = (
+            hashlib.sha256()
+        )  # of what the file holds; the writer never goes back, so no second reading
+        self.pending = bytearray()
+
+    def write(self, data: bytes) -> int:
+        self.pending += data
+        return len(data)
+
+    def tell(self) -> int:
+        return self._written + len(self.pending)
+
+    def flush(self) -> None:
+        """For the MCAP writer; the file is written by push, which may fail and be repeated."""
+
+    def push(self) -> None:
+        """Write what is pending; raises OSError with everything unwritten kept."""
+        while self.pending:
+            n = os.write(self._fd, self.pending)
+            self._written += n
+            self.hash.update(memoryview(self.pending)[:n])
+            del self.pending[:n]
+
+
+class McapLog:
+    """Appends messages; channels and schemas are made at the first message of a key."""
+
+    def __init__(self, fd: int, chunk_bytes: int, folder: Path | None = None) -> None:
+        """folder: where the index of a long recording waits for its end."""
+        self._sink = Sink(fd)
+        self._writer = Writer(self._sink, chunk_size=chunk_bytes, compression=CompressionType.ZSTD)
+        spill(self._writer, folder)
+        self._writer.start(PROFILE)
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+
+    @property
+    def channels(self) -> dict[int, str]:
+        """MCAP channel id -> bus key."""
+        return {number: key for key, number in self._channels.items()}
+
+    @property
+    def pending(self) -> int:
+        """Bytes of complete chunks that are not in the file yet."""
+        return len(self._sink.pending)
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file once everything pending is written."""
+        return self._sink.tell()
+
+    @property
+    def sha256(self) -> str:
+        """Hex digest of what has been written to the file."""
+        return self._sink.hash.hexdigest()
+
+    def open_channel(self, key: str, topic: Topic) -> int:
+        """Channel number of a key, made when it is new."""
+        if key not in self._channels:
+            name = topic.type.DESCRIPTOR.full_name
+            if name not in self._schemas:
+                self._schemas[name] = self._writer.register_schema(
+                    name, "protobuf", descriptor_set(topic)
+                )
+            self._channels[key] = self._writer.register_channel(
+                key, "protobuf", self._schemas[name]
+            )
+        return self._channels[key]
+
+    def add(
+        self, channel: int, log_ns: int, publish_ns: int, payload: bytes, sequence: int = 0
+    ) -> None:
+        """Append one message; MCAP's own sequence has 32 bits."""
+        self._writer.add_message(channel, log_ns, payload, publish_ns, sequence & 0xFFFFFFFF)
+
+    def close_chunk(self) -> None:
+        """End the running chunk, so that the next push writes everything added until now."""
+        self._writer.flush()
+
+    def push(self) -> None:
+        """Write complete chunks to the file; raises OSError, nothing is forgotten then."""
+        self._sink.push()
+
+    def finish(self) -> None:
+        """End the data and append index and statistics; push writes them."""
+        self._writer.finish()
+
+
+@dataclass
+class Damage:
+    """What was wrong with a file that was read to its readable end."""
+
+    chunks: int = 0  # complete, but with a wrong CRC or not to be decompressed
+    orphans: int = 0  # messages of channels that no readable chunk declares
+    tail: str = ""  # why reading ended before the file's end; empty when it did not
+
+    def __str__(self) -> str:
+        parts = [f"{self.chunks} damaged chunks left out"] if self.chunks else []
+        parts += [f"{self.orphans} messages of unknown channels left out"] if self.orphans else []
+        return "; ".join(parts + ([self.tail] if self.tail else [])) or "no damage"
+
+
+def read(
+    path: Path, damage: Damage | None = None, channels: dict[int, str] | None = None
+) -> Iterator[Recorded]:
+    """Every readable message in the order of recording, also of a file without an end; CRCs are
+    checked.
+
+    `channels` (of session.json) names channels whose declaration is in a damaged chunk. What could
+    not be read is counted in `damage`. Raises OSError when the file cannot be opened.
+    """
+    damage = damage if damage is not None else Damage()
+    names = dict(channels or {})
+    with path.open("rb") as stream:
+        for record in _records(stream, damage):
+            if isinstance(record, Channel):
+                names[record.id] = record.topic
+            elif isinstance(record, Message):
+                key = names.get(record.channel_id)
+                if key is None:
+                    damage.orphans += 1
+                else:
+                    yield Recorded(record.log_time, record.publish_time, key, record.data)
+
+
+def _records(stream: IO[bytes], damage: Damage) -> Iterator[Schema | Channel | Message]:
+    """Records of all good chunks; ends, with the reason in damage.tail, where the file cannot be
+    read on.
+
+    Damaged lengths make the MCAP library raise almost anything (struct.error, UnicodeDecodeError,
+    its own errors), so everything but an error of the disk is taken as "this is no MCAP from here
+    on".
+    """
+    records = StreamReader(stream, emit_chunks=True, record_size_limit=RECORD_LIMIT).records
+    while True:
+        try:
+            record = next(records)
+        except StopIteration:
+            return
+        except OSError:
+            raise
+        except Exception as error:
+            damage.tail = f"ends at byte {stream.tell()} without a close ({type(error).__name__})"
+            return
+        if not isinstance(record, Chunk):
+            continue
+        try:
+            inside = breakup_chunk(record, validate_crc=True)
+        except Exception:
+            damage.chunks += 1
+            continue
+        yield from inside

@@ -1,0 +1,363 @@
+"""The recorder: everything recorded that crosses the bus, byte for byte, and nothing lost that the
+disk has taken.
+
+Zenoh's thread only appends to a deque; one thread writes, the store's own thread syncs. Orders come
+as queries on messages.topics.recorder_control_key: a RecorderCommand as payload, a RecorderStatus
+as reply.
+"""
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+
+import zenoh
+from google.protobuf.message import DecodeError
+
+from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import RECORDER, STATUS, recorder_control_key
+from messages.history.answers import Asker
+from messages.history.mending import Question
+from sessions.library.catalogue import Catalogue
+from sessions.library.remove import Retention, retain
+from sessions.recording.intake import Intake
+from sessions.recording.manifest import SESSION_NAME, Manifest, SessionError
+from sessions.recording.recover import cut_off, recover_all, recover_session
+from sessions.recording.settings import RecorderSettings
+from sessions.recording.store import SessionStore, start
+
+log = logging.getLogger(__name__)
+
+DRAIN_S = 0.1  # a message waits at most this long before it is in the running chunk
+STATUS_S = 1.0
+REPAIR_S = 2.0  # the end of a session waits so long for gaps that are being filled
+RESUME_S = 600.0  # a session that was cut off within this time is gone on with
+RESUME_BYTES = 256 * 1024**2  # larger ones are recovered beside the recording, and not gone on with
+RETRY_S = 5.0  # an automatic start that the disk refused is tried again after this
+
+
+class Recorder:
+    """The recorder without its loop: `on_sample` and `on_query` are for Zenoh's threads, the rest
+    for one thread.
+    """
+
+    def __init__(
+        self,
+        settings: RecorderSettings,
+        bus: BusSettings,
+        configuration: dict[str, object] | None = None,
+        ask: Callable[[Question], None] | None = None,
+    ) -> None:
+        """`ask` puts a question to a publisher; its answer comes back through `on_answer`. None:
+        gaps stay.
+        """
+        self.settings = settings
+        self.bus = bus
+        self.wake = threading.Event()
+        self._configuration = configuration
+        self._inbox: deque[tuple[int, str, bytes]] = deque()
+        self._orders: deque[zenoh.Query] = deque()
+        self._ask = ask
+        self._fresh = True
+        self._intake = Intake(bus.prefix, None, 0)
+        self._overflow = 0
+        self._store: SessionStore | None = None
+        self._recording = False  # read by Zenoh's thread
+        self._last_flush = 0.0
+        self._message = ""  # of the last start or stop that did not work
+        self._retry_at: float | None = 0.0 if settings.auto_start else None
+        self._last = pb.RecorderStatus()  # of the last session, for the time after it
+
+    def on_sample(self, sample: zenoh.Sample) -> None:
+        """Zenoh's thread: note the receive time and leave."""
+        if not self._recording:
+            return
+        if len(self._inbox) >= self.settings.max_inbox:
+            self._overflow += 1
+            return
+        self._inbox.append((time.time_ns(), str(sample.key_expr), sample.payload.to_bytes()))
+
+    def on_query(self, query: zenoh.Query) -> None:
+        """Zenoh's thread: keep the order for the loop."""
+        self._orders.append(query)
+        self.wake.set()
+
+    def on_answer(self, question: object, reply: pb.HistoryReply | None) -> None:
+        """The asker's thread: what a publisher kept."""
+        self._intake.answered(question, reply)
+        self.wake.set()
+
+    def listen(self) -> None:
+        """Keep what comes from now on for the session that is about to begin."""
+        self._recording = True
+
+    def resume(self, manifest: Manifest) -> None:
+        """Begin a session where the one of `manifest` was cut off; what came since is asked of the
+        publishers.
+        """
+        log.info("going on where %s was cut off", manifest.id)
+        if self._begin(
+            name=manifest.id[16:48], note=manifest.note, user=manifest.user, continues=manifest.id
+        ):
+            self._intake.resume(manifest)
+
+    def step(self) -> None:
+        """Write what came in, answer orders, close a chunk when it is time."""
+        self.wake.clear()
+        self._auto_start()
+        self._drain()
+        while self._orders:
+            self._answer(self._orders.popleft())
+        store, now = self._store, time.monotonic()
+        if store is not None and now - self._last_flush >= self.settings.flush_s:
+            self._last_flush = now
+            store.flush()
+            if store.size >= self.settings.max_file_bytes:
+                self._rotate(store)
+
+    def _drain(self) -> None:
+        store, inbox = self._store, self._inbox
+        if store is None:
+            return
+        intake = self._intake
+        for entry in intake.answers():
+            store.add(*entry)
+        for _ in range(len(inbox)):  # what comes in meanwhile waits for the next step
+            for entry in intake.take(*inbox.popleft()):
+                store.add(*entry)
+        if self._overflow:
+            log.error(
+                "%s: %d messages came faster than they can be written",
+                store.manifest.id,
+                self._overflow,
+            )
+            store.manifest.overflow += self._overflow
+            self._overflow = 0
+
+    def _auto_start(self) -> None:
+        if (
+            self._store is None
+            and self._retry_at is not None
+            and time.monotonic() >= self._retry_at
+        ):
+            self._begin(name=self.settings.name)
+
+    def _begin(
+        self, *, name: str = "", note: str = "", user: str = "", continues: str = ""
+    ) -> bool:
+        """Start a session; on refusal say why in the status and, with auto_start, try again
+        later.
+        """
+        try:
+            store = start(
+                self.settings,
+                name=name,
+                note=note,
+                user=user,
+                continues=continues,
+                configuration=self._configuration,
+            )
+        except OSError as error:
+            text = (
+                f"{self.settings.root}: cannot record: {error.strerror}; "
+                "want a folder with room that this user may write ([recorder] root)"
+            )
+            if text != self._message:
+                log.error("%s", text)
+            self._message = text
+            self._retry_at = time.monotonic() + RETRY_S if self.settings.auto_start else None
+            return False
+        self._message, self._retry_at = "", None
+        if self._fresh:  # a file that only goes on keeps what is known of the streams
+            self._intake = Intake(self.bus.prefix, self._ask, store.manifest.start_utc_ns)
+        self._fresh = True
+        self._store, self._recording = store, True
+        self._last_flush = time.monotonic()
+        log.info("recording %s", store.folder)
+        return True
+
+    def _rotate(self, store: SessionStore) -> None:
+        manifest = store.manifest
+        log.info("%s: %d bytes: continuing in a new session", manifest.id, store.size)
+        name = manifest.id[16:48]  # after the time
+        self._end(keep_listening=True)
+        self._fresh = False
+        if not self._begin(
+            name=name, note=manifest.note, user=manifest.user, continues=manifest.id
+        ):
+            self._retry_at = time.monotonic() + RETRY_S
+
+    def _end(self, *, keep_listening: bool = False) -> None:
+        store = self._store
+        if store is None:
+            return
+        self._recording = keep_listening
+        self._drain()
+        if not keep_listening:
+            self._finish_repairs(store)
+        closed = store.close()
+        self._last = self._describe(store)
+        self._store = None
+        self._message = "" if closed else store.error
+        log.info(
+            "%s: %s, %d messages",
+            store.manifest.id,
+            "closed" if closed else "left open",
+            store.messages,
+        )
+
+    def _finish_repairs(self, store: SessionStore) -> None:
+        """Wait a little for answers that are under way; then what is held is written with its
+        gaps.
+        """
+        end = time.monotonic() + REPAIR_S
+        while self._intake.asking and time.monotonic() < end:
+            time.sleep(0.01)
+            self._drain()
+        for entry in self._intake.release():
+            store.add(*entry)
+
+    def close(self) -> None:
+        """End the running session and refuse orders that still wait."""
+        self._end()
+        while self._orders:
+            self._orders.popleft().reply_err(b"the recorder is stopping")
+
+    def _answer(self, query: zenoh.Query) -> None:
+        command = pb.RecorderCommand()
+        try:
+            command.ParseFromString(query.payload.to_bytes() if query.payload is not None else b"")
+        except DecodeError:
+            query.reply_err(b"the payload is no RecorderCommand")
+            return
+        refusal = self._obey(command)
+        status = self.status()
+        if refusal:
+            status.message = refusal
+        query.reply(recorder_control_key(self.bus.prefix), status.SerializeToString())
+
+    def _obey(self, command: pb.RecorderCommand) -> str:
+        """Do what a command says; the reason when it is refused, else nothing."""
+        if command.action == pb.RecorderCommand.ACTION_START:
+            if self._store is not None:
+                return f"already recording {self._store.manifest.id}: stop it first"
+            if command.name and not SESSION_NAME.fullmatch(command.name):
+                return (
+                    f"name {command.name[:80]!r}: want a letter or digit, then a-z, 0-9, _ and -,"
+                    " at most 32"
+                )
+            log.info("start ordered by %s", command.user or "an unnamed user")
+            return (
+                ""
+                if self._begin(name=command.name, note=command.note, user=command.user)
+                else self._message
+            )
+        if command.action == pb.RecorderCommand.ACTION_STOP:
+            if self._store is None:
+                return "not recording: nothing to stop"
+            log.info("stop ordered by %s", command.user or "an unnamed user")
+            self._retry_at = None
+            self._end()
+            return self._message
+        return ""
+
+    def status(self) -> pb.RecorderStatus:
+        """The state of now."""
+        status = pb.RecorderStatus()
+        status.CopyFrom(self._describe(self._store) if self._store else self._last)
+        status.recording = self._store is not None
+        status.header.device = RECORDER
+        status.header.utc_ns = time.time_ns()
+        status.message = (self._store.error if self._store else "") or self._message
+        return status
+
+    def _describe(self, store: SessionStore) -> pb.RecorderStatus:
+        manifest = store.manifest
+        return pb.RecorderStatus(
+            session=manifest.id,
+            seconds=store.seconds,
+            messages=store.messages,
+            bytes=store.size,
+            durable_messages=store.durable_messages,
+            lost={key: lost for key, lost in store.lost().items() if lost},
+            repaired=store.repaired(),
+            repairing=self._intake.held,
+        )
+
+
+def run(
+    settings: RecorderSettings,
+    bus: BusSettings,
+    stop: threading.Event,
+    configuration: dict[str, object] | None = None,
+) -> None:
+    """Record until `stop` is set; then the running session is closed.
+
+    `configuration` goes into session.json of every session. A router that is not there yet is
+    waited for.
+    """
+    try:
+        session = open_client(bus, stop)
+    except BusUnavailable:
+        if stop.is_set():
+            return
+        raise
+    with session:
+        publishers = Publishers(session, bus.prefix)
+        asker = Asker(
+            session, bus.prefix, lambda question, reply: recorder.on_answer(question, reply)
+        )
+        recorder = Recorder(
+            settings, bus, configuration, lambda q: asker.ask(q, *q.stream, q.query)
+        )
+        samples = session.declare_subscriber(f"{bus.prefix}/**", recorder.on_sample)
+        orders = session.declare_queryable(recorder_control_key(bus.prefix), recorder.on_query)
+        _go_on(recorder, settings.root)
+        # the session that begins now has its session.json before recovery looks at the folders
+        recorder.step()
+        # Beside the recording, not before it: a large file takes a minute, and what runs is locked
+        # against recovery.
+        # When the process ends first, the session stays open and the next start does it.
+        threading.Thread(target=_tend, args=(settings,), name="recovery", daemon=True).start()
+        next_status = 0.0
+        try:
+            while not stop.is_set():
+                recorder.step()
+                if time.monotonic() >= next_status:
+                    next_status = time.monotonic() + STATUS_S
+                    publishers.put(STATUS, RECORDER, recorder.status())
+                recorder.wake.wait(DRAIN_S)
+        finally:
+            samples.undeclare()
+            orders.undeclare()
+            recorder.close()
+            asker.close()
+            publishers.put(STATUS, RECORDER, recorder.status())
+
+
+def _tend(settings: RecorderSettings) -> None:
+    """Recover what was cut off; then the rules of retention, if there are any."""
+    recover_all(settings.root)
+    rule = Retention(settings.keep_days, settings.keep_bytes)
+    if rule != Retention():
+        retain(Catalogue(settings.root), rule)
+
+
+def _go_on(recorder: Recorder, root: Path) -> None:
+    """Recover the session that a crash cut off a moment ago, and go on with it; older ones are not
+    gone on with.
+    """
+    folder = cut_off(root, RESUME_S, RESUME_BYTES)
+    if folder is None:
+        return
+    recorder.listen()  # a recovery takes a second: what comes meanwhile belongs to the next session
+    try:
+        manifest = recover_session(folder)
+    except (SessionError, OSError) as error:
+        log.error("recovery: %s", error)
+        return
+    if manifest is not None:
+        recorder.resume(manifest)

@@ -1,0 +1,1 @@
+"""A session goes through the pipeline again."""

@@ -1,0 +1,194 @@
+"""The scene behind the door: who gets in, which messages pass, what a slow or hostile browser
+meets.
+"""
+
+import socket
+
+import numpy as np
+import pytest
+import viser._messages
+from support.front_door import CAMERA, Door, message, open_door, wait_for
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from dashboard.web.auth import Role
+from dashboard.web.proxy import OPERATOR_MAY, VIEWER_MAY, BadMessage, may_send, message_type
+from dashboard.web.users import remove_user
+
+
+@pytest.fixture(scope="module")
+def door(tmp_path_factory):
+    with open_door(tmp_path_factory.mktemp("door"), free_attempts=100) as opened:
+        yield opened
+
+
+@pytest.fixture
+def checkbox(door: Door):
+    handle = door.viser.gui.add_checkbox("Sw", False)
+    yield handle
+    handle.remove()
+
+
+def closed_with(scene) -> int:
+    """Read until the door closes; its code."""
+    with pytest.raises(ConnectionClosed) as closed:
+        while True:
+            scene.recv(timeout=20.0)
+    return closed.value.rcvd.code
+
+
+def answers(port: int) -> bool:
+    """True while something listens there."""
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
+def only_client(door: Door):
+    return wait_for(lambda: list(door.viser.get_clients().values()), "viser has a client")[-1]
+
+
+def test_page_is_for_signed_in_people_and_talks_to_this_server_only(door: Door):
+    with door.client() as client:
+        assert client.get("/scene/").status_code == 303
+    with door.client("vera") as client:
+        answer = client.get("/scene/")
+        policy = answer.headers["content-security-policy"]
+        host = door.url.removeprefix("http://")
+        assert "<title>Viser</title>" in answer.text
+        assert (
+            f"connect-src data: blob: ws://{host} wss://{host};" in policy
+            and "default-src 'none'" in policy
+        )
+        answer = client.get(
+            "/scene/?websocket=wss://evil.example&darkMode&playbackPath=//evil.example/a"
+        )
+        assert answer.status_code == 303 and answer.headers["location"] == "/scene/?darkMode="
+
+
+def test_socket_needs_sign_in_and_the_same_origin(door: Door):
+    with door.client() as nobody, door.client("otto") as client:
+        for who, options in (
+            (nobody, {}),
+            (client, {"origin": "http://evil.example"}),
+            (client, {"origin": None}),
+            (client, {"origin": "null"}),
+        ):
+            with pytest.raises(InvalidStatus) as refused:
+                door.scene(who, **options)
+            assert refused.value.response.status_code == 403
+
+
+def test_socket_without_visers_protocol_is_refused(door: Door):
+    with door.client("otto") as client, pytest.raises(InvalidStatus):
+        door.scene(client, subprotocols=["chat"])
+
+
+def test_viewer_moves_the_camera_but_no_widget(door: Door, checkbox):
+    with door.client("vera") as client, door.scene(client) as scene:
+        assert scene.subprotocol.startswith("viser-v")
+        assert isinstance(scene.recv(timeout=20.0), bytes)
+        scene.send(message("GuiUpdateMessage", uuid=checkbox._impl.uuid, updates={"value": True}))
+        scene.send(message("ViewerCameraMessage", **CAMERA))
+        viewer = only_client(door)
+        wait_for(lambda: np.allclose(viewer.camera.position, (1, 2, 3)), "the camera moved")
+        assert checkbox.value is False  # sent before the camera and in order, so it was dropped
+
+
+def test_operator_drives_a_widget_but_only_its_value(door: Door, checkbox):
+    with door.client("otto") as client, door.scene(client) as scene:
+        scene.send(message("ViewerCameraMessage", **CAMERA))
+        uuid = checkbox._impl.uuid
+        scene.send(message("GuiUpdateMessage", uuid=uuid, updates={"label": "Mine", "value": True}))
+        scene.send(message("GuiUpdateMessage", uuid=uuid, updates={"visible": False}))
+        scene.send(message("GuiUpdateMessage", uuid=uuid, updates={"value": True}))
+        wait_for(lambda: checkbox.value, "the checkbox changed")
+        assert checkbox.label == "Sw" and checkbox.visible
+
+
+def test_nobody_opens_a_public_tunnel(door: Door, checkbox):
+    asked = []
+    for kind in (viser._messages.ShareUrlRequest, viser._messages.ShareUrlDisconnect):
+        door.viser._websock_server._incoming_handlers[kind] = [lambda *_: asked.append(1)]
+    with door.client("anna") as client, door.scene(client) as scene:
+        scene.send(message("ViewerCameraMessage", **CAMERA))
+        scene.send(message("ShareUrlRequest"))
+        scene.send(message("ShareUrlDisconnect"))
+        scene.send(message("GuiUpdateMessage", uuid=checkbox._impl.uuid, updates={"value": True}))
+        wait_for(lambda: checkbox.value, "the message after it arrived")
+    assert asked == []
+
+
+def test_every_allowed_name_is_a_message_of_this_viser():
+    assert VIEWER_MAY < OPERATOR_MAY
+    for name in OPERATOR_MAY:
+        assert hasattr(viser._messages, name), name
+
+
+def test_viewer_may_use_widgets_that_concern_only_his_view():
+    update = {"uuid": "pause", "updates": {"value": True}}
+    assert may_send(Role.viewer, "GuiUpdateMessage", update, {"pause"})
+    assert not may_send(Role.viewer, "GuiUpdateMessage", update, {"other"})
+    assert not may_send(Role.viewer, "GuiUpdateMessage", update | {"uuid": ["pause"]}, {"pause"})
+    assert not may_send(
+        Role.viewer, "GuiUpdateMessage", {"uuid": "pause", "updates": {"label": "x"}}, {"pause"}
+    )
+
+
+@pytest.mark.parametrize(
+    "data",
+    [b"", b"\xc1", b"\x91" * 20000 + b"\x00", message("X")[:-1], b"\x80", b"\x81\xa4type\x01"],
+)
+def test_what_is_no_message_is_named_so(data):
+    with pytest.raises(BadMessage):
+        message_type(data)
+
+
+@pytest.mark.parametrize(
+    ("data", "code"), [(b"\x91" * 20000 + b"\x00", 1007), ("text", 1009), (b"\x00" * 100_000, 1009)]
+)
+def test_hostile_messages_close_the_connection_and_nothing_else(door: Door, data, code):
+    with door.client("otto") as client, door.scene(client) as scene, door.scene(client) as other:
+        scene.send(data)
+        assert closed_with(scene) == code
+        other.send(message("ViewerCameraMessage", **CAMERA))
+        assert isinstance(other.recv(timeout=20.0), bytes)
+
+
+def test_flood_closes_the_connection(door: Door):
+    with door.client("vera") as client, door.scene(client) as scene:
+        camera = message("ViewerCameraMessage", **CAMERA)
+        with pytest.raises(ConnectionClosed):
+            for _ in range(50_000):
+                scene.send(camera)
+        assert closed_with(scene) == 1008
+
+
+def test_removed_user_is_cut_off_though_silent(tmp_path):
+    with open_door(tmp_path) as door, door.client("vera") as client, door.scene(client) as scene:
+        scene.recv(timeout=20.0)
+        remove_user(door.settings.users, "vera")
+        assert closed_with(scene) == 1008
+
+
+def test_browser_that_takes_nothing_is_dropped_and_does_not_fill_the_memory(tmp_path):
+    with open_door(tmp_path, stall_s=0.5) as door, door.client("vera") as client:
+        slow = door.scene(client, max_queue=1, close_timeout=0.1)
+        slow.send(message("ViewerCameraMessage", **CAMERA))
+        only_client(door)
+        points = np.random.default_rng(1).random((300_000, 3))
+        colors = np.zeros((300_000, 3), np.uint8)
+        for i in range(12):  # far more than the kernel's buffers take
+            door.viser.scene.add_point_cloud(f"/p{i}", points, colors, precision="float32")
+        wait_for(lambda: not door.viser.get_clients(), "the slow browser is gone")
+        with pytest.raises(ConnectionClosed):
+            while True:
+                slow.recv(timeout=20.0)
+
+
+def test_scene_that_is_gone_is_said_and_does_not_hang(tmp_path):
+    with open_door(tmp_path) as door, door.client("vera") as client:
+        port, server, door.viser = door.viser.get_port(), door.viser, None
+        server.stop()
+        wait_for(lambda: not answers(port), "viser ended")
+        with pytest.raises(InvalidStatus):
+            door.scene(client)
+        assert client.get("/api/me").status_code == 200

@@ -1,0 +1,132 @@
+"""The pages and orders of one session, over the real front door, with the real command for reports
+and exports.
+"""
+
+import io
+import json
+import shutil
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from support.front_door import open_door, wait_for
+from support.table_session import SESSION, table_root
+
+from dashboard.web.jobs import Jobs
+
+ROOM = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def door(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("door")
+    shutil.copytree(table_root(), folder / "sessions")
+    jobs = Jobs([sys.executable, "-m", "gyrofree"])
+    with open_door(folder, scene=False, jobs=jobs) as door:
+        yield door
+    jobs.close()
+
+
+def ended(client, answer):
+    assert answer.status_code == 200, answer.text
+    number = answer.json()["number"]
+    return wait_for(
+        lambda: (
+            (job := client.get(f"/api/jobs/{number}").json())["state"] in ("done", "failed") and job
+        ),
+        "job",
+        240,
+    )
+
+
+def test_a_report_is_made_and_served_in_three_forms(door):
+    with door.client("otto") as client:
+        assert client.get(f"/api/sessions/{SESSION}/report.html").status_code == 404
+        job = ended(client, client.post(f"/api/sessions/{SESSION}/report", json={}))
+        assert job["state"] == "done", job
+        page = client.get(f"/api/sessions/{SESSION}/report.html")
+        assert "default-src 'none'" in page.headers["content-security-policy"]
+        assert SESSION in page.text and page.text.count("<img") >= 9
+        assert client.get(f"/api/sessions/{SESSION}/report.pdf").content.startswith(b"%PDF")
+        figures = json.loads(client.get(f"/api/sessions/{SESSION}/report.json").text)["figures"]
+        shown = client.get(f"/sessions/{SESSION}").text
+        assert "Verdict" in shown and "Make it again" in shown
+        trend = client.get("/trend").text
+        assert f"/sessions/{SESSION}" in trend and f"{figures['accel_bias_x_mg']:.5g}" in trend
+
+
+def test_an_export_is_streamed_as_a_zip_of_what_was_asked_for(door):
+    with door.client("otto") as client:
+        order = {"format": "csv", "start_s": 5.0, "end_s": 8.0, "topics": ["accel", "tacho"]}
+        job = ended(client, client.post(f"/api/sessions/{SESSION}/export", json=order))
+        assert job["state"] == "done", job
+        files = zipfile.ZipFile(
+            io.BytesIO(client.get(f"/api/jobs/{job['number']}/download").content)
+        )
+        assert sorted(files.namelist()) == ["cube.accel.csv", "cube.tacho.csv"]
+        rows = files.read("cube.accel.csv").decode().splitlines()
+        assert len(rows) == 1 + 301 and "a11_mps2" in rows[0]
+
+
+def test_a_failed_job_says_why(door):
+    with door.client("otto") as client:
+        job = ended(client, client.post(f"/api/sessions/{SESSION}/export", json={"format": "kml"}))
+        assert (
+            job["state"] == "failed" and "neither fixes nor a navigation solution" in job["message"]
+        )
+        assert client.get(f"/api/jobs/{job['number']}/download").status_code == 409
+        assert client.get("/api/jobs/4711").status_code == 404
+
+
+def test_notes_and_labels_are_kept_and_found(door):
+    with door.client("otto") as client:
+        remark = {"text": "a nudge <b>", "at_s": 12.5}
+        assert client.post(f"/api/sessions/{SESSION}/notes", json=remark).status_code == 200
+        labels = {"title": "First run", "tags": ["table", "keep"], "outcome": "pass"}
+        assert client.post(f"/api/sessions/{SESSION}/labels", json=labels).json()["tags"] == [
+            "keep",
+            "table",
+        ]
+        page = client.get(f"/sessions/{SESSION}").text
+        assert "a nudge &lt;b&gt;" in page and "12.5 s · otto" in page and "First run" in page
+        for word in ("first", "keep", "pass", "2024-01-01", "cube table"):
+            assert [
+                row["id"] for row in client.get("/api/sessions", params={"q": word}).json()
+            ] == [SESSION]
+        assert client.get("/api/sessions", params={"q": "nothing-like-it"}).json() == []
+        assert (
+            client.post(f"/api/sessions/{SESSION}/labels", json={"tags": ["NO TAG"]}).status_code
+            == 409
+        )
+
+
+def test_a_viewer_changes_nothing_and_only_an_admin_deletes(door):
+    with door.client("vera") as client:
+        for order, body in (
+            ("report", {}),
+            ("export", {"format": "csv"}),
+            ("notes", {"text": "x"}),
+            ("delete", {}),
+        ):
+            assert client.post(f"/api/sessions/{SESSION}/{order}", json=body).status_code == 403
+        page = client.get(f"/sessions/{SESSION}").text
+        assert "Completeness" in page and 'id="report"' not in page and 'id="delete"' not in page
+    with door.client("otto") as client:
+        assert client.post(f"/api/sessions/{SESSION}/delete", json={}).status_code == 403
+
+
+@pytest.mark.parametrize("name", ["20990101-000000", "..%2f..%2fetc", "20240101-000000-table%00"])
+def test_a_session_that_is_not_there_is_a_404(door, name):
+    with door.client("anna") as client:
+        assert client.get(f"/api/sessions/{name}/report.html").status_code == 404
+        assert client.get(f"/sessions/{name}").status_code == 404
+        assert client.post(f"/api/sessions/{name}/delete", json={}).status_code == 404
+
+
+def test_deletion_frees_the_disk(door):
+    with door.client("anna") as client:
+        freed = client.post(f"/api/sessions/{SESSION}/delete", json={}).json()["freed_bytes"]
+        assert freed > 1_000_000
+        assert client.get("/api/sessions").json() == []
+    assert not (door.settings.sessions_root / SESSION).exists()

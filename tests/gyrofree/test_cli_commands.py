@@ -1,0 +1,130 @@
+"""Every command as a stranger meets it: help, JSON, and one line where a path or id is wrong."""
+
+import json
+import logging
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from estimator.settings import EstimatorSettings
+from gyrofree.commands.handover import with_changes
+from gyrofree.commands.main import app
+
+SERVICES = {"demo", "router", "gateway", "estimator", "record", "dashboard", "simulate", "play"}
+ORDERS = {
+    "users add",
+    "users remove",
+    "calibrate simulate",
+}  # they do something, and have no result to print
+
+
+def commands(command=None, name=()):
+    command = command or typer.main.get_command(app)
+    if not hasattr(command, "commands"):
+        return {" ".join(name): command}
+    found = {}
+    for key, inner in command.commands.items():
+        found |= commands(inner, (*name, key))
+    return found
+
+
+COMMANDS = commands()
+
+
+def gyrofree(*arguments):
+    level = logging.getLogger().level
+    result = CliRunner().invoke(app, list(arguments))
+    logging.getLogger().setLevel(level)
+    return result
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_help_says_what_every_option_is_for(name):
+    result = gyrofree(*name.split(), "--help")
+    assert result.exit_code == 0 and "Traceback" not in result.output
+    command = COMMANDS[name]
+    first = (command.help or "").strip().splitlines()[0]
+    assert len(first) > 15 and first.endswith(".")
+    silent = [p.name for p in command.params if not getattr(p, "help", None)]
+    assert not silent, f"{name}: no word on {silent}"
+
+
+def test_every_command_with_a_result_speaks_json():
+    without = {
+        name for name, c in COMMANDS.items() if not any("--json" in p.opts for p in c.params)
+    }
+    assert without == SERVICES | ORDERS
+
+
+WRONG = (
+    "sessions show 20990101-000000",
+    "sessions verify 20990101-000000",
+    "sessions delete 20990101-000000 --yes",
+    "sessions note 20990101-000000 text",
+    "sessions tag 20990101-000000 --add keep",
+    "sessions compare 20990101-000000 20990101-000001",
+    "sessions compare nowhere.mcap",
+    "sessions show ../../etc",
+    "export 20990101-000000",
+    "export rubbish.mcap --out out",
+    "report nowhere.mcap",
+    "report rubbish.mcap",
+    "rerun 20990101-000000",
+    "replay 20990101-000000",
+    "reprocess nowhere",
+    "import nowhere.csv",
+    "import rubbish.csv",
+    "run nowhere.csv",
+    "run rubbish.csv",
+    "run nowhere --attitude",
+    "layout show nowhere",
+    "layout compare cube nowhere",
+    "calibrate show nowhere.json",
+    "calibrate show rubbish.json",
+    "calibrate apply nowhere.json nowhere.csv",
+    "sessions list --config nowhere.toml",
+)
+
+
+@pytest.mark.parametrize("line", WRONG)
+def test_what_is_wrong_is_said_in_few_words(line, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("rubbish.csv", "rubbish.mcap", "rubbish.json"):
+        (tmp_path / name).write_bytes(b"\x00\xffthis is not what you want\n1,2,3\n")
+    result = gyrofree(*line.split())
+    assert result.exit_code not in (0, None)
+    assert result.exception is None or isinstance(result.exception, SystemExit), repr(
+        result.exception
+    )
+    said = result.stderr.strip()
+    assert said and "Traceback" not in said and len(said.splitlines()) <= 6
+    assert result.stdout == ""
+
+
+def test_comparing_takes_an_offset_with_its_session():
+    result = gyrofree("sessions", "compare", "a.mcap", "b.mcap", "--offset", "3")
+    assert result.exit_code != 0 and "a.mcap" in result.stderr
+    listed = gyrofree("sessions", "retain", "--json", "--config", "/dev/null")
+    assert listed.exit_code == 0 and isinstance(json.loads(listed.stdout), list)
+
+
+def test_settings_for_one_run_are_checked_like_the_configuration():
+    changed = with_changes(
+        EstimatorSettings(),
+        ["layout.half_side_m=0.0493", "use_every_fix=4", 'rate=["products-ukf"]'],
+    )
+    assert (changed.layout.half_side_m, changed.use_every_fix, changed.rate) == (
+        0.0493,
+        4,
+        ["products-ukf"],
+    )
+    for text, said in (
+        ("layout.size=1", "layout.half_side_m"),
+        ("half=1", "a key of"),
+        ("layout.half_side_m", "KEY=VALUE"),
+        ("layout.half_side_m=-1", "greater than 0"),
+        ("layout.kind=sphere", "no layout 'sphere'"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            with_changes(EstimatorSettings(), [text])

@@ -1,0 +1,127 @@
+"""The supervisor with real child processes."""
+
+import io
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from gyrofree.running.supervisor import Supervisor
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+class Scripts(Supervisor):
+    """Children of `python -c` instead of gyrofree commands."""
+
+    def add_script(self, name, text):
+        self.add(name, text)
+
+    def _command(self, child):
+        return [super()._command(child)[0], "-c", child.arguments[0]]
+
+
+@pytest.fixture
+def supervisor():
+    made = Scripts(Console(file=io.StringIO(), width=200))
+    yield made
+    made.stop()
+
+
+def text(supervisor):
+    return supervisor.console.file.getvalue()
+
+
+def until(supervisor, condition, seconds=30):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, text(supervisor)
+        supervisor.step()
+        time.sleep(0.02)
+
+
+def test_a_child_that_dies_is_started_again_and_the_log_says_so(supervisor):
+    supervisor.add_script("worker", "import time; print('INFO up', flush=True); time.sleep(60)")
+    supervisor.start()
+    until(supervisor, lambda: "up" in text(supervisor))
+    supervisor.children[0].process.kill()
+    until(supervisor, lambda: text(supervisor).count("up") == 2)
+    assert "worker ended by signal SIGKILL: starting it again" in text(supervisor)
+    assert supervisor.children[0].restarts == 1
+
+
+def test_a_taken_port_ends_the_whole(supervisor):
+    supervisor.add_script("web", "import sys; print('ERROR port 8080 is taken'); sys.exit(3)")
+    supervisor.start()
+    until(supervisor, lambda: supervisor.fatal is not None)
+    assert "cannot go on" in text(supervisor)
+
+
+def test_children_end_in_order_when_asked(supervisor):
+    supervisor.add_script("a", "import time; print('INFO up', flush=True); time.sleep(60)")
+    supervisor.add_script("b", "import time; print('INFO up', flush=True); time.sleep(60)")
+    supervisor.start()
+    until(supervisor, lambda: text(supervisor).count("up") == 2)
+    assert supervisor.stop()
+    assert all(child.process.poll() is not None for child in supervisor.children)
+
+
+def test_a_child_that_does_not_listen_is_killed_and_named(supervisor):
+    supervisor.add_script(
+        "deaf",
+        "import signal, time; signal.signal(15, signal.SIG_IGN); print('INFO up', flush=True);"
+        " time.sleep(60)",
+    )
+    supervisor.start()
+    until(supervisor, lambda: "up" in text(supervisor))
+    assert not supervisor.stop()
+    assert "deaf did not end" in text(supervisor)
+
+
+HELD = """
+import signal, sys
+from gyrofree.running.process import stop_on_signals
+stop = stop_on_signals()
+with stop._cond:  # as the main thread is for a moment inside every stop.wait()
+    signal.raise_signal(signal.SIGINT)
+    signal.raise_signal(signal.SIGTERM)
+assert stop.wait(30.0)
+print("ended")
+"""
+
+
+def test_a_signal_may_come_at_any_moment():
+    """Ctrl-C of a terminal and the supervisor's SIGTERM reach a service within a millisecond of
+    each other.
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", HELD], cwd=ROOT, capture_output=True, text=True, timeout=60
+    )
+    assert done.stdout == "ended\n", done.stderr
+
+
+ASLEEP = """
+from gyrofree.running.process import stop_on_signals
+stop = stop_on_signals()
+print("up", flush=True)
+stop.wait()
+"""
+
+
+def test_two_signals_at_once_end_a_service_that_sleeps():
+    for _ in range(4):
+        child = subprocess.Popen(
+            [sys.executable, "-c", ASLEEP], cwd=ROOT, stdout=subprocess.PIPE, text=True
+        )
+        assert child.stdout.readline() == "up\n"
+        time.sleep(0.2)  # into its sleep
+        child.send_signal(signal.SIGINT)
+        child.send_signal(signal.SIGTERM)
+        try:
+            assert child.wait(30) == 0
+        finally:
+            child.kill()

@@ -1,0 +1,395 @@
+"""The products filter: derivatives, exactness, consistency, the published figures, faults."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from inertial.attitude import rotation
+from inertial.layouts.layout import CUBE, LAYOUTS, GeometryError, Layout
+from inertial.rate import products_correct as correct
+from inertial.rate import products_kernel as kernel
+from inertial.rate import products_model as model
+from inertial.rate import turns
+from inertial.rate.estimators import ESTIMATORS, LeastSquaresRate, ProductsRate
+from inertial.rate.observed import sensor
+from inertial.rate.products_ekf import Config, ProductsFilter, tuning
+from inertial.rate.sight import AMBIGUOUS, BLIND, VALID
+from inertial.simulation.profiles import PROFILES, TURNING
+from inertial.simulation.table import IDEAL, TableTest
+
+law = settings(deadline=None, max_examples=40)  # the first call compiles
+numbers = st.floats(-5.0, 5.0)
+states = st.lists(numbers, min_size=22, max_size=22).map(np.array)
+vectors = st.lists(numbers, min_size=3, max_size=3).map(np.array)
+
+
+def numeric(function, x, h=1e-5):
+    """Central differences of function at x."""
+    return np.stack(
+        [(function(x + h * e) - function(x - h * e)) / (2 * h) for e in np.eye(len(x))], axis=1
+    )
+
+
+def run(estimator, table, seconds=30.0, damage=lambda index, a: a):
+    """(states, true rates) of every sample."""
+    states, omegas, block = [], [], None
+    for index in range(int(seconds / table.period_s)):
+        if index % 1000 == 0:
+            block = table.block(index // 1000)
+        row = index % 1000
+        states.append(estimator.step(index, block.t_s[row], damage(index, block.readings[row])))
+        omegas.append(block.omega_b[row])
+    return states, np.array(omegas)
+
+
+def rms_deg(states, omegas):
+    """Rate error RMS by axis, deg/s."""
+    error = np.array([s.omega_b for s in states]) - omegas
+    return np.rad2deg(np.sqrt(np.mean(error**2, axis=0)))
+
+
+@pytest.fixture(scope="module")
+def published():
+    """The demo profile with two seeds, by both estimators."""
+    out = []
+    for seed in (1, 2):
+        table = TableTest(seed)
+        out.append(
+            (run(ProductsRate(table.layout), table), run(LeastSquaresRate(table.layout), table))
+        )
+    return out
+
+
+SQ = np.random.default_rng(5).normal(size=(6, 6))  # of a layout with feedback
+M = np.random.default_rng(6).normal(size=(6, 6))
+
+
+@law
+@given(x=states, alpha=vectors, turning=st.booleans())
+def test_transition_jacobian_matches_central_differences(x, alpha, turning):
+    dt = 0.002
+    F = model.transition_jacobian(x, model.transition(x, alpha, SQ, dt, turning), SQ, dt, turning)
+    expected = numeric(lambda x: model.transition(x, alpha, SQ, dt, turning), x)
+    np.testing.assert_allclose(F, expected, atol=4e-4)  # second order in the turn of one sample
+
+
+@law
+@given(x=states)
+def test_products_jacobian_matches_central_differences(x):
+    expected = numeric(lambda x: model.measured_products(x, M), x)
+    np.testing.assert_allclose(model.measured_products_jacobian(x, M), expected, atol=1e-6)
+
+
+@law
+@given(x=states, alpha=vectors)
+def test_force_jacobian_matches_central_differences(x, alpha):
+    expected = numeric(lambda x: model.measured_force(x, alpha, SQ), x)
+    np.testing.assert_allclose(model.measured_force_jacobian(x, alpha, SQ), expected, atol=1e-6)
+
+
+@law
+@given(x=states, alpha=vectors, seed=st.integers(0, 99))
+def test_the_kernel_is_the_model_without_its_zeros(x, alpha, seed):
+    """Prediction and all three corrections against the same by whole matrices."""
+    s, t, dt = sensor(LAYOUTS["edges-12"](0.05), 0.04), tuning(Config()), 0.01
+    root = np.random.default_rng(seed).normal(size=(22, 22)) * 0.1
+    P = root @ root.T
+    F = model.transition_jacobian(x, model.transition(x, alpha, s.SQ, dt, True), s.SQ, dt, True)
+    mine, mine_P = x.copy(), P.copy()
+    none, work = (0.0, 0.0, 0.0), np.zeros(kernel.WORK)
+    kernel.predict(
+        mine,
+        mine_P.reshape(-1),
+        work,
+        tuple(alpha),
+        (1.0, 0.0, 0.0, 1.0, 0.0, 1.0),
+        dt,
+        True,
+        s,
+        none,
+    )
+    np.testing.assert_allclose(mine, model.transition(x, alpha, s.SQ, dt, True), atol=1e-12)
+    np.testing.assert_allclose(mine_P, F @ P @ F.T, atol=1e-9)
+    assert (mine_P == mine_P.T).all()
+    mean, spread = model.products_spread(P)
+    H, y = model.measured_products_jacobian(x, s.M), np.arange(6.0)
+    C = H @ P @ H.T + s.R_c + spread
+    e = y - model.measured_products(x, s.M) - mean
+    t["products_gate"] = t["force_gate"] = np.inf
+    out, all_y = np.zeros(kernel.OUT), np.concatenate([np.zeros(3), y, np.zeros(3)])
+
+    def agrees(call, H, C, e):
+        mine, mine_P = x.copy(), P.copy()
+        said = call(mine, mine_P.reshape(-1))
+        if said is not None:
+            assert said[0] == pytest.approx(e @ np.linalg.solve(C, e), rel=1e-6)
+            assert -2.0 * np.log(said[1]) == pytest.approx(np.linalg.slogdet(C)[1], abs=1e-8)
+        np.testing.assert_allclose(mine, x + P @ H.T @ np.linalg.solve(C, e), rtol=1e-6, atol=1e-6)
+        np.testing.assert_allclose(mine_P, P - P @ H.T @ np.linalg.solve(C, H @ P), atol=1e-8)
+
+    agrees(lambda x, P: correct.by_products(x, P, work, all_y, tuple(x[:3]), s, t, out), H, C, e)
+    H, p = model.measured_force_jacobian(x, alpha, s.SQ), np.arange(3.0)
+    arm = x[18:21] @ x[18:21] + np.trace(P[18:21, 18:21])
+    C = H @ P @ H.T + s.R_p + (t.centre + arm * s.R_alpha[0, 0]) * np.eye(3)
+    e = p - model.measured_force(x, alpha, s.SQ)
+    agrees(
+        lambda x, P: correct.by_force(x, P, work, tuple(p), tuple(alpha), tuple(alpha), True, s, t),
+        H,
+        C,
+        e,
+    )
+    late = alpha + np.array(
+        [0.3, -0.2, 0.5]
+    )  # the Jacobian is that of the mean before, the prediction that of now
+    H = model.measured_force_jacobian(x, late, s.SQ)
+    doubt = np.trace(P[18:21, 18:21]) * float((alpha - late) @ (alpha - late))
+    C = H @ P @ H.T + s.R_p + (t.centre + arm * s.R_alpha[0, 0] + doubt) * np.eye(3)
+    agrees(
+        lambda x, P: correct.by_force(x, P, work, tuple(p), tuple(alpha), tuple(late), True, s, t),
+        H,
+        C,
+        e,
+    )
+    H, C = np.eye(6, 22), P[:6, :6] + np.diag([t.still_rate] * 3 + [0.0] * 3)
+    C[3:, 3:] += s.R_alpha
+    e = np.concatenate([-x[:3], alpha - x[3:6]])
+    agrees(lambda x, P: correct.by_standstill(x, P, work, tuple(alpha), none, s, t), H, C, e)
+
+
+@law
+@given(v=vectors, scale=st.sampled_from([1e-6, 1e-3, 0.05, 0.1, 1.0]))
+def test_turns_without_arrays_are_those_with(v, scale):
+    turn, other = v * scale, np.array([0.4, -0.2, 0.1, 0.8])
+    q = rotation.from_rotation_vector(turn)
+    np.testing.assert_allclose(turns.quaternion(*turn), q, rtol=1e-14, atol=1e-15)
+    np.testing.assert_allclose(
+        turns.turn_matrix(*turn), rotation.to_dcm(q).ravel(), rtol=1e-13, atol=1e-14
+    )
+    np.testing.assert_allclose(
+        turns.product(tuple(other), tuple(q)), rotation.multiply(other, q), rtol=1e-14, atol=1e-15
+    )
+    up = np.array([0.3, 0.2, 9.7])
+    expected = rotation.tilt_correction(q, up, 1.0)
+    np.testing.assert_allclose(turns.upright(tuple(q), *up), expected, rtol=1e-13, atol=1e-14)
+
+
+def test_spread_of_the_products_is_that_of_random_rates():
+    root = np.array([[1.0, 0.0, 0.0], [0.4, 0.8, 0.0], [-0.3, 0.2, 0.6]])
+    e = np.random.default_rng(1).normal(size=(200_000, 3)) @ root.T
+    z = np.column_stack([e[:, i] * e[:, j] for i, j in zip(model.FIRST, model.SECOND, strict=True)])
+    mean, covariance = model.products_spread(root @ root.T)
+    np.testing.assert_allclose(mean, z.mean(axis=0), atol=0.01)
+    np.testing.assert_allclose(covariance, np.cov(z.T), atol=0.04)
+
+
+def test_perfect_data_give_the_truth():
+    table = TableTest(1, sensor=IDEAL)
+    states, omegas = run(ProductsRate(table.layout), table, 16.0)
+    omega = np.array([s.omega_b for s in states])
+    np.testing.assert_allclose(omega[600:1400], omegas[600:1400], atol=2e-3)
+    assert states[-1].angle_z == pytest.approx(np.deg2rad(-1539.0), abs=0.01)
+
+
+def test_the_published_test_is_followed_below_4_deg_per_s(published):
+    for (by_products, omegas), _ in published:
+        assert rms_deg(by_products, omegas).max() < 1.5
+
+
+def test_products_beat_integration_on_the_published_test(published):
+    for by_products, by_integration in published:
+        assert rms_deg(*by_products).max() < 0.3 * rms_deg(*by_integration).max()
+
+
+def test_angle_and_attitude_come_back_after_30_s(published):
+    for (states, _), _ in published:
+        assert abs(np.rad2deg(states[-1].angle_z)) < 10.0
+
+
+def test_nees_and_nis_are_within_their_bands():
+    """3 degrees of freedom; errors of one run hang together, so the band is for the mean over
+    runs.
+    """
+    nees, nis = [], []
+    for seed in range(11, 17):
+        table = TableTest(seed)
+        states, omegas = run(ProductsRate(table.layout), table, 15.0)
+        for k in range(650, 1400, 50):
+            e = states[k].omega_b - omegas[k]
+            nees.append(e @ np.linalg.solve(states[k].P, e))
+        nis += [s.nis for s in states[520:1500] if s.nis_dof == 6]
+    assert 1.0 < np.mean(nees) < 5.0
+    assert 4.8 < np.mean(nis) < 7.2
+
+
+def test_same_samples_same_bits():
+    table = TableTest(3)
+    first, again = (run(ProductsRate(table.layout), table, 7.0)[0] for _ in range(2))
+    for a, b in zip(first, again, strict=True):
+        assert a.omega_b.tobytes() == b.omega_b.tobytes() and a.P.tobytes() == b.P.tobytes()
+
+
+def test_a_stuck_axis_shows_in_the_nis():
+    """What must rise: the NIS, by far; the innovation names no axis, but it does not stay small."""
+    table = TableTest(1)
+    stuck = {}
+
+    def damage(index, a):
+        if index < 900:
+            return a
+        a = a.copy()
+        a[0] = stuck.setdefault("value", a[0])
+        return a
+
+    healthy, _ = run(ProductsRate(table.layout), table, 16.0)
+    states, _ = run(ProductsRate(table.layout), table, 16.0, damage)
+    assert np.mean([s.nis for s in states[1400:1600]]) > 1.3 * np.mean(
+        [s.nis for s in healthy[1400:1600]]
+    )
+
+
+def test_one_damaged_sample_is_refused_and_counted():
+    table = TableTest(1)
+    estimator = ProductsRate(table.layout)
+
+    def damage(index, a):
+        return a + 30.0 * (np.arange(12) == 7) if index == 1000 else a
+
+    states, omegas = run(estimator, table, 12.0, damage)
+    assert estimator.refused["products"] == 1
+    assert states[1000].nis > 60.0
+    assert np.rad2deg(np.abs(states[-1].omega_b - omegas[-1])).max() < 5.0
+
+
+def test_missing_samples_are_bridged():
+    table = TableTest(1)
+    estimator, block = ProductsRate(table.layout), None
+    for index in range(1300):
+        if index % 1000 == 0:
+            block = table.block(index // 1000)
+        if 800 <= index < 820:
+            estimator.skip(1)
+            continue
+        state = estimator.step(index, block.t_s[index % 1000], block.readings[index % 1000])
+    assert np.rad2deg(np.abs(state.omega_b - block.omega_b[299])).max() < 4.0
+
+
+def test_a_layout_without_products_integrates_and_one_without_rate_is_refused():
+    nine = LAYOUTS["nine"](0.05)
+    table = TableTest(1, layout=nine, profile=PROFILES["published"])
+    states, omegas = run(ProductsRate(nine), table, 8.0)
+    assert states[-1].nis_dof == 0
+    assert rms_deg(states, omegas).max() < 5.0
+    cube = CUBE(0.05)
+    with pytest.raises(GeometryError, match="observe only 4 of the 6 unknowns.*unseen: .*ω'x"):
+        ProductsRate(Layout("five", cube.r_b[:5], cube.theta_b[:5], 0.05))
+
+
+def test_a_flat_layout_uses_the_products_it_sees():
+    cube = CUBE(0.05)
+    flat = Layout("flat", cube.r_b * [1, 1, 0], cube.theta_b, 0.05)
+    filtered = ProductsFilter(flat)
+    assert 0 < filtered.sensor["m"] < 6
+    table = TableTest(2, layout=flat)
+    states, omegas = run(ProductsRate(flat), table, 16.0)
+    assert rms_deg(states, omegas).max() < 4.0
+
+
+@pytest.mark.parametrize("name", [name for name in ESTIMATORS if name != "least-squares"])
+def test_every_filter_follows_the_published_test(name):
+    table = TableTest(4)
+    states, omegas = run(ESTIMATORS[name](table.layout), table, 12.0)
+    assert rms_deg(states, omegas).max() < 2.0
+
+
+@pytest.mark.parametrize("name", ["products-ekf", "products-ukf", "products-rls", "products-mhe"])
+def test_a_batch_gives_the_bits_of_the_live_steps(name):
+    table = TableTest(5, profile="wobble")
+    block = table.block(0)
+    live = ESTIMATORS[name](table.layout)
+    states = [live.step(k, block.t_s[k], block.readings[k]) for k in range(800)]
+    batch = ESTIMATORS[name](table.layout).run_batch(block.t_s[:800], block.readings[:800])
+    assert batch.omega_b.tobytes() == np.array([s.omega_b for s in states]).tobytes()
+    assert batch.q_nb.tobytes() == np.array([s.q_nb for s in states]).tobytes()
+    with pytest.raises(ValueError, match="times that do not grow"):
+        live.run_batch(block.t_s[:2][::-1], block.readings[:2])
+
+
+def test_reversals_and_a_cube_off_the_axis_are_followed():
+    for table in (
+        TableTest(1, profile="reversals"),
+        TableTest(2, centre_b=(0.2, 0.1, 0.0)),
+        TableTest(3, tilt=np.deg2rad(10.0)),
+    ):
+        track = ProductsRate(table.layout).run_batch(
+            *(
+                np.concatenate([getattr(table.block(k), what) for k in range(3)])
+                for what in ("t_s", "readings")
+            )
+        )
+        truth = np.concatenate([table.block(k).omega_b for k in range(3)])
+        assert np.rad2deg(np.sqrt(np.mean((track.omega_b - truth) ** 2, axis=0))).max() < 2.0
+
+
+def test_a_start_while_turning_is_ambiguous_until_the_motion_tells_the_sign():
+    table = TableTest(1, profile=TURNING)
+    states, omegas = run(ProductsRate(table.layout), table, 16.0)
+    assert states[3].sight == (BLIND,) * 3 and "keep still" in states[3].sight_reason
+    assert states[12].sight[2] == AMBIGUOUS and "began while turning, at" in states[12].sight_reason
+    seen = [s.sight[2] for s in states]
+    assert AMBIGUOUS in seen and VALID in seen[300:]
+    assert np.rad2deg(np.abs(states[-1].omega_b - omegas[-1])).max() < 6.0
+
+
+def test_rate_about_an_axis_that_products_do_not_see_becomes_blind():
+    table = TableTest(1, profile="slow")
+    states, _ = run(LeastSquaresRate(table.layout), table, 20.0)
+    assert states[300].sight == (VALID,) * 3
+    assert states[-1].sight == (BLIND,) * 3 and "integration only" in states[-1].sight_reason
+
+
+def test_a_filter_goes_on_without_an_axis_and_takes_it_back():
+    table = TableTest(1)
+    estimator, errors, sigmas = ProductsRate(table.layout), [], []
+    for number in range(3):
+        block = table.block(number)
+        for row in range(1000):
+            index = number * 1000 + row
+            reading = block.readings[row].copy()
+            if 800 <= index < 2000:
+                estimator.exclude(0b100)
+                reading[2] = 30.0  # nobody may look at it
+            elif index == 2000:
+                estimator.exclude(0)
+            state = estimator.step(index, block.t_s[row], reading)
+            errors.append(np.rad2deg(state.omega_b - block.omega_b[row]))
+            sigmas.append(np.sqrt(np.diag(state.P)).max())
+        assert state.excluded == (0b100 if number == 1 else 0) or number == 0
+    assert np.sqrt(np.mean(np.square(errors[800:]), axis=0)).max() < 3.0
+    assert sigmas[810] > sigmas[790]
+    with pytest.raises(GeometryError, match="unseen"):
+        estimator.exclude(0b111111111)
+
+
+def test_a_body_that_turns_freely_is_not_held_to_an_axis():
+    """Readings of a body whose axis wanders: written from E-1, gravity turning with it."""
+    cube, dt, omega, rows, truth = CUBE(0.05), 0.01, np.zeros(3), [], []
+    up, draw = np.array([0.0, 0.0, 9.80665]), np.random.default_rng(1)
+    for k in range(1500):
+        t = k * dt - 4.0
+        new = (
+            np.array([1.5 * np.sin(1.3 * t), 1.2 * np.sin(0.9 * t), 2.5 * np.sin(0.7 * t)])
+            if t > 0
+            else np.zeros(3)
+        )
+        alpha = (new - omega) / dt
+        up = up - dt * np.cross(0.5 * (omega + new), up)
+        up *= 9.80665 / np.linalg.norm(up)
+        omega = new
+        rows.append(
+            cube.J @ np.concatenate([alpha, up]) + cube.quadratic(omega) + draw.normal(0, 0.04, 12)
+        )
+        truth.append(omega)
+    track = ProductsRate(cube).run_batch(dt * np.arange(1500), np.array(rows))
+    error = np.rad2deg(track.omega_b - truth)[600:]
+    assert np.sqrt(np.mean(error**2, axis=0)).max() < 3.0

@@ -1,0 +1,145 @@
+"""Recordings in other programs' formats, read back by those formats' own libraries."""
+
+import csv
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import duckdb
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from mcap.reader import make_reader
+from scipy.io import loadmat
+from support.mcap_protobuf_free import decoded
+from support.table_session import table_recording
+
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import ACCEL, GNSS, RATE
+from sessions.export.export import ExportError, export
+from sessions.export.table import Selection, tables
+from sessions.recording.mcap_log import McapLog, read
+
+KEY = "gyrofree/cube/rate/products-ekf"
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return table_recording()
+
+
+def recorded(path, key, type_):
+    return [type_.FromString(row.payload) for row in read(path) if row.key == key]
+
+
+def test_csv_holds_every_number_that_was_recorded(recording, tmp_path):
+    export(recording, "csv", tmp_path)
+    with (tmp_path / "cube.accel.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    sent = recorded(recording, "gyrofree/cube/accel", pb.AccelBatch)
+    assert len(rows) == sum(len(m.counts) // m.axes for m in sent)
+    assert [int(rows[7][f"a{j}{k}_counts"]) for j in range(1, 5) for k in range(1, 4)] == list(
+        sent[7].counts
+    )
+    assert float(rows[7]["utc_s"]) == pytest.approx(sent[7].header.utc_ns / 1e9, abs=1e-6)
+
+
+def test_parquet_is_read_by_duckdb_and_has_the_units_in_its_names(recording, tmp_path):
+    files = export(recording, "parquet", tmp_path)
+    path = tmp_path / "cube.rate.products-ekf.parquet"
+    assert path in files
+    sent = recorded(recording, KEY, pb.RateEstimate)
+    query = f"select count(*), max(omega_ib_b_radps_z), min(omega_ib_b_radps_z) from '{path}'"
+    ((count, high, low),) = duckdb.sql(query).fetchall()
+    z = [m.omega_ib_b_radps[2] for m in sent]
+    assert (count, high, low) == (len(sent), max(z), min(z))
+    assert pq.read_schema(path).metadata[b"key"] == KEY.encode()
+
+
+def test_mat_has_a_struct_per_key(recording, tmp_path):
+    (path,) = export(recording, "mat", tmp_path, Selection(frozenset({"rate"})))
+    found = loadmat(path, simplify_cells=True)["cube_rate_products_ekf"]
+    sent = recorded(recording, KEY, pb.RateEstimate)
+    assert np.array_equal(found["angle_z_rad"], [m.angle_z_rad for m in sent])
+
+
+def test_cut_mcap_has_the_same_bytes_of_that_time_only(recording, tmp_path):
+    (path,) = export(recording, "mcap", tmp_path, Selection(frozenset({"accel"}), 10.0, 12.0))
+    whole = [row for row in read(recording) if row.key == "gyrofree/cube/accel"]
+    start = next(iter(read(recording))).log_ns
+    wanted = [row.payload for row in whole if 10e9 <= row.log_ns - start <= 12e9]
+    with path.open("rb") as stream:
+        got = [message.data for _, _, message in make_reader(stream).iter_messages()]
+    assert got == wanted and len(got) > 150
+
+
+def test_the_plain_mcap_reader_decodes_with_the_schema_in_the_file(recording):
+    """Nothing of ours: descriptors come from the recording."""
+    message = decoded(recording, KEY)
+    assert message.DESCRIPTOR.full_name == "gyrofree.v1.RateEstimate"
+    assert message is not None and type(message).__module__ != pb.RateEstimate.__module__
+    assert len(message.omega_ib_b_radps) == 3
+
+
+def test_rerun_opens_a_recording_unmodified(recording, tmp_path):
+    """The `rerun` program of rerun-sdk converts it and finds no fault in it."""
+    out = tmp_path / "recording.rrd"
+    command = [
+        str(Path(sys.executable).parent / "rerun"),
+        "mcap",
+        "convert",
+        str(recording),
+        "-o",
+        str(out),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert out.stat().st_size > 100_000
+
+
+def test_tracks_want_fixes(recording, tmp_path):
+    with pytest.raises(ExportError, match="neither fixes nor a navigation solution"):
+        export(recording, "kml", tmp_path)
+
+
+def test_a_drive_becomes_a_track(tmp_path):
+    path = tmp_path / "drive.mcap"
+    with path.open("wb") as stream:
+        log = McapLog(stream.fileno(), 65536)
+        for k in range(20):
+            fix = pb.GnssFix(latitude_deg=40.0 + k * 1e-5, longitude_deg=-105.0, height_m=1600.5)
+            fix.header.utc_ns = 1_700_000_000_000_000_000 + k * 10**9
+            log.add(
+                log.open_channel("gyrofree/car/gnss", GNSS),
+                fix.header.utc_ns,
+                0,
+                fix.SerializeToString(),
+            )
+        log.finish()
+        log.push()
+    (kml,) = export(path, "kml", tmp_path)
+    (gpx,) = export(path, "gpx", tmp_path)
+    line = ET.parse(kml).find(".//{*}coordinates").text.split()
+    assert len(line) == 20 and line[3] == "-105.000000000,40.000030000,1600.5000"
+    points = ET.parse(gpx).findall(".//{*}trkpt")
+    assert (
+        points[0].find("{*}time").text == "2023-11-14T22:13:20.000Z"
+        and points[0].get("lat") == "40.000000000"
+    )
+
+
+def test_nothing_selected_is_said(recording, tmp_path):
+    with pytest.raises(ExportError, match="no message of the wanted topics and time"):
+        export(recording, "csv", tmp_path, Selection(start_s=1e6))
+    with pytest.raises(ExportError, match="want one of csv"):
+        export(recording, "xls", tmp_path)
+
+
+def test_a_table_in_memory_is_the_recording(recording):
+    found = tables(recording, Selection(frozenset({RATE.name, ACCEL.name})))
+    sent = recorded(recording, KEY, pb.RateEstimate)
+    assert np.array_equal(found[KEY].data["nis"], [m.nis for m in sent])
+    readings = found["gyrofree/cube/accel"]
+    assert readings.vector("a11_mps2", "a43_mps2").shape == (3000, 2)
+    assert readings.data["utc_s"][-1] - readings.data["utc_s"][0] == pytest.approx(29.99, abs=1e-3)
