@@ -17,10 +17,10 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 from support.protocol_damage import Truth, damaged_truth  # noqa: E402
 from support.protocol_support import receive  # noqa: E402
-from tests.firmware_protocol.test_core import CORE, c_frames, ledger_of  # noqa: E402
 
 from firmware_protocol.codec import Deframer, Frame  # noqa: E402
 from firmware_protocol.ledger import Ledger  # noqa: E402
+from tests.firmware_protocol.test_core import CORE, c_frames, ledger_of  # noqa: E402
 
 N_FRAMES, N_DAMAGES, N_DROPS, SEEDS = 100_000, 1_000, 150, (20_260, 1)
 

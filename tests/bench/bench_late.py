@@ -28,13 +28,13 @@ from playwright.sync_api import Error, sync_playwright  # noqa: E402
 from support.feeder import Feeder  # noqa: E402
 from support.kill_stack import line  # noqa: E402
 from support.stack import free_port  # noqa: E402
-from tests.system.test_browser import CHROMIUM, FLAGS  # noqa: E402
 
 from dashboard.scene.service import start  # noqa: E402
 from messages.bus.session import BusSettings, Publishers, open_client, open_router  # noqa: E402
 from messages.contract.topics import ESTIMATES, GATEWAY  # noqa: E402
 from messages.history.answers import declare  # noqa: E402
 from messages.history.spool import Spool  # noqa: E402
+from tests.system.test_browser import CHROMIUM, FLAGS  # noqa: E402
 
 DT, DEVICE = 0.01, "cube-01"
 PATIENCE_S = 60.0

@@ -4,7 +4,6 @@ recording knows it.
 
 import numpy as np
 import pytest
-from tests.estimator.test_service import drive_messages
 
 from estimator.convert import horizon_message, innovation_message, nav_message
 from estimator.devices.navigation import NavBoard
@@ -23,6 +22,7 @@ from sessions.recording.settings import RecorderSettings
 from sessions.replay.playback import Playback
 from sessions.replay.reproduce import ESTIMATES, reproduce
 from sessions.replay.rerun import estimates_again
+from tests.estimator.test_service import drive_messages
 
 SETTINGS = EstimatorSettings(navigators=["huber-nhc"], rate=[], attitudes=[])
 

@@ -5,7 +5,6 @@ none twice.
 import threading
 
 import pytest
-from tests.estimator.test_service import accel_batches
 
 from estimator.live import SavedState, Worker
 from estimator.service import Output, Pipeline
@@ -21,6 +20,7 @@ from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ACCEL, ESTIMATOR, GATEWAY, RATE
 from messages.history.mending import Arrival, Question
 from messages.history.spool import Spool
+from tests.estimator.test_service import accel_batches
 
 SETTINGS = EstimatorSettings(navigators=[])
 BATCHES = 300

@@ -5,9 +5,9 @@
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.inertial.test_horizon import epochs, filled, n
 
 from inertial.navigation.window import forward
+from tests.inertial.test_horizon import epochs, filled, n
 
 Array = NDArray[np.float64]
 __all__ = ["epochs"]  # the fixture of the tests beside

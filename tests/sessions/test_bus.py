@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
-from tests.sessions.test_store import accel
 
 from messages.bus.session import BusSettings, Publishers, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
@@ -36,6 +35,7 @@ from sessions.recording.store import start
 from sessions.replay import replay
 from sessions.replay.playback import Playback
 from sessions.replay.source import Source
+from tests.sessions.test_store import accel
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE = 30.0  # s; generous, the tests wait for states

@@ -7,7 +7,6 @@ import threading
 import time
 
 import pytest
-from tests.sessions.test_bus import PATIENCE, bus, client, order, recording, until
 
 from estimator import service
 from estimator.settings import EstimatorSettings
@@ -23,6 +22,7 @@ from sessions.library.catalogue import Catalogue
 from sessions.recording.mcap_log import read
 from sessions.replay import replay
 from sessions.replay.reproduce import differing_fields, reproduce
+from tests.sessions.test_bus import PATIENCE, bus, client, order, recording, until
 
 SETTINGS = EstimatorSettings(rate=list(ESTIMATORS))
 BATCH, BATCHES = 10, 150  # 15 s of the published test: still, then turning
