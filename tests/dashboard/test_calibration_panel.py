@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import viser
 
-from dashboard.scene.feed import Feed
+from dashboard.scene.data.feed import Feed
+from dashboard.scene.data.store import Store
 from dashboard.scene.panels import PAGES, Snapshot
-from dashboard.scene.panels.calibration import Calibration, content, facing, picture, upright
-from dashboard.scene.store import Store
+from dashboard.scene.panels.guided.calibration import Calibration, content, facing, picture, upright
 from estimator import live, service
 from estimator.settings import EstimatorSettings
 from inertial.calibration.poses import candidates, plan
