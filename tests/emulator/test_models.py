@@ -20,11 +20,11 @@ CLOCK = 96e6
 
 @pytest.fixture(scope="module")
 def probe(tmp_path_factory) -> bytes:
-    """tests/c/probe.c as an image."""
+    """tests/firmware_protocol/c/probe.c as an image."""
     folder = tmp_path_factory.mktemp("probe")
     source, script = (
         ROOT / "tests" / "firmware_protocol" / "c" / "probe.c",
-        ROOT / "tests" / "c" / "probe.ld",
+        ROOT / "tests" / "firmware_protocol" / "c" / "probe.ld",
     )
     subprocess.run(
         [

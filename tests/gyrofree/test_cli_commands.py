@@ -44,7 +44,7 @@ def test_help_says_what_every_option_is_for(name):
     result = gyrofree(*name.split(), "--help")
     assert result.exit_code == 0 and "Traceback" not in result.output
     command = COMMANDS[name]
-    first = (command.help or "").strip().splitlines()[0]
+    first = " ".join((command.help or "").split("\n\n")[0].split())
     assert len(first) > 15 and first.endswith(".")
     silent = [p.name for p in command.params if not getattr(p, "help", None)]
     assert not silent, f"{name}: no word on {silent}"

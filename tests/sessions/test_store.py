@@ -235,7 +235,7 @@ def test_a_full_disk_keeps_data_in_memory_until_there_is_room(tmp_path):
         "import resource, signal, sys\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "from pathlib import Path\n"
-        "from tests.test_sessions_store import *\n"
+        "from tests.sessions.test_store import *\n"
         "from sessions.recording.settings import RecorderSettings\n"
         "hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]\n"
         "settings = RecorderSettings(root=Path(sys.argv[1]), chunk_bytes=8192)\n"
