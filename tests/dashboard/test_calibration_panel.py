@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import viser
 
-from dashboard.scene.feed import Feed
+from dashboard.data.store import Store
+from dashboard.desk import Desk
 from dashboard.scene.panels import PAGES, Snapshot
-from dashboard.scene.panels.calibration import Calibration, content, facing, picture, upright
-from dashboard.scene.store import Store
+from dashboard.scene.panels.guided.calibration import Calibration, content, facing, picture, upright
 from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from estimator.worker import Worker
@@ -99,17 +99,15 @@ def test_orders_reach_a_running_worker(free_port, tmp_path):
     thread.start()
     with open_router(bus), open_client(bus, timeout_s=20) as session:
         queryable = orders.take(session, bus.prefix, orders.ESTIMATOR, worker.take_order, "*")
-        feed = Feed(bus, Store(), threading.Event())
+        desk = Desk(session, bus.prefix)
         try:
 
             def order(action):
                 deadline = time.monotonic() + 30.0
-                while True:  # until the feed is on the bus
+                while True:  # until the queryable is known
                     try:
-                        return feed.estimator(
-                            pb.EstimatorCommand(device="cube", action=action), timeout_s=20.0
-                        )
-                    except ConnectionError:
+                        return desk.estimator(pb.EstimatorCommand(device="cube", action=action))
+                    except orders.NoAnswer:
                         assert time.monotonic() < deadline
                         time.sleep(0.05)
 
@@ -124,7 +122,6 @@ def test_orders_reach_a_running_worker(free_port, tmp_path):
             assert not order(pb.EstimatorCommand.ACTION_CALIBRATE_FIT).ok
         finally:
             queryable.undeclare()
-            feed.stop()
             worker.finish()
             thread.join(timeout=10.0)
     assert not thread.is_alive() and worker.failure is None

@@ -21,8 +21,9 @@ from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ACCEL, RATE, parse
 from sessions.library.catalogue import Catalogue
 from sessions.recording.mcap_log import read
+from sessions.recording.samples import samples
 from sessions.replay import replay
-from sessions.replay.reproduce import differing_fields, reproduce
+from sessions.replay.reproduce import compare, reproduce
 from tests.sessions.test_bus import PATIENCE, bus, client, order, recording, until
 
 SETTINGS = EstimatorSettings(rate=list(ESTIMATORS))
@@ -167,5 +168,9 @@ def test_a_changed_bit_a_missing_input_and_a_late_start_are_told_apart(tmp_path)
 def test_fields_that_differ_are_named_also_when_they_are_not_numbers():
     one = pb.RateEstimate(estimator="e", nis=float("nan"), q_nb=[1, 0, 0, 0])
     two = pb.RateEstimate(estimator="e", nis=float("nan"), q_nb=[1, 0, 0, 1e-16])
-    assert differing_fields(RATE, one.SerializeToString(), two.SerializeToString()) == ["q_nb"]
-    assert differing_fields(RATE, one.SerializeToString(), one.SerializeToString()) == []
+    three = pb.RateEstimate(estimator="f", nis=float("nan"), q_nb=[1, 0, 0, 0], innovation=[0.0])
+    first = samples(RATE, [one])
+    assert compare(first, samples(RATE, [one])).same
+    assert compare(first, samples(RATE, [two])).first_difference.endswith(": q_nb")
+    found = compare(first, samples(RATE, [three]))
+    assert found.first_difference.endswith(": estimator, innovation") and not found.same
