@@ -167,10 +167,11 @@ def recorder(folder: Path, hours: float, done: Any) -> None:
 
 def estimator(folder: Path, hours: float, done: Any) -> None:
     """The default estimators, their saved state and their journal."""
-    from estimator.live import SavedState, Worker
-    from estimator.service import Pipeline
+    from estimator.pipeline import Pipeline
+    from estimator.saved_state import SavedState
     from estimator.settings import EstimatorSettings
     from estimator.warm import warm
+    from estimator.worker import Worker
     from messages.history.mending import Arrival
     from messages.history.spool import Spool
 

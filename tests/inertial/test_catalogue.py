@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.optimize import check_grad
 from typer.testing import CliRunner
 
-from estimator.service import UnknownEstimator, make_layout
+from estimator.choice import UnknownEstimator, make_layout
 from estimator.settings import LayoutSettings
 from gyrofree.commands.main import app
 from inertial.layouts import catalogue, search

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import null_space
 
 from estimator.devices.rate import RateBoard
-from estimator.service import Pipeline
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from inertial.layouts.layout import CUBE, LAYOUTS, products
 from inertial.rate import parity
