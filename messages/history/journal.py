@@ -72,6 +72,7 @@ class Journal:
         self.segment_bytes = segment_bytes
         self.run = time.time_ns()
         self.unkept_bytes = 0
+        self.cut_bytes = 0
         self.durable_seq = 0
         self.last_seq = 0
         self.max_sync_s = 0.0
