@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 
-from estimator.convert import moment
+from estimator.convert.header import moment
 from estimator.packed import Doubles, RowFields
 from inertial.rate import products_track as track
 from inertial.rate.track_state import TrackState

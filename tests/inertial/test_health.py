@@ -7,9 +7,10 @@ import pickle
 import numpy as np
 import pytest
 from scipy.linalg import null_space
+from support import parity_twin as twin
 
 from estimator.devices.rate import RateBoard
-from estimator.service import Pipeline
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from inertial import core
 from inertial.core import native
@@ -22,7 +23,6 @@ from inertial.simulation.faults import FaultError, Faults, parse
 from inertial.simulation.table import IDEAL, TableTest
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import AXES
-from tests.inertial import parity_twin as twin
 
 NAMES = CUBE(0.05).axis_names
 

@@ -1,5 +1,5 @@
 // What one axis says of itself, sample by sample: stuck, at the end of its range, spiking.
-// numpy twin: tests/inertial/parity_twin.py.
+// numpy twin: tests/support/parity_twin.py.
 #pragma once
 
 #include <cstdint>

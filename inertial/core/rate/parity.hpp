@@ -1,5 +1,5 @@
 // A small filter that believes in rigid bodies only: what the axes of a board say of one another.
-// Equations H-1 to H-7 of docs/equations-layouts.md. numpy twin: tests/inertial/parity_twin.py.
+// Equations H-1 to H-7 of docs/equations-layouts.md. numpy twin: tests/support/parity_twin.py.
 #pragma once
 
 #include <array>
