@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 
-from estimator.convert import moment
+from estimator.convert.header import moment
 from estimator.packed import Doubles
 from messages.contract import gyrofree_pb2 as pb
 
