@@ -9,6 +9,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
 SAYS = {  # example -> a part of what it prints
+    "add_rate_estimator.py": "the zero-velocity update takes",
     "add_wire_frame.py": "damaged: cobs, 35 bytes",
     "read_recording.py": "deg/s RMS against the tachometer",
     "run_log.py": "the worst is least-squares",
