@@ -17,6 +17,7 @@ bool runs_v3() {
 
 NB_MODULE(GYROFREE_MODULE, m) {
   m.doc() = "Hot loops of the estimators: the same bits on every processor.";
+  m.attr("VERSION") = GYROFREE_VERSION;
   m.def("runs_v3", &runs_v3, "True where this processor runs the x86-64-v3 build of the core.");
   gyrofree::bind_elementary(m);
   gyrofree::bind_navigation(m);
