@@ -71,7 +71,7 @@ void from_python(T& target, nb::handle value, const char* name) {
     if (nb::len(value) != target.size()) throw nb::value_error("the number of items cannot change");
     for (const auto item : value) from_python(target[i++], item, name);
   } else {
-    target = *nb::inst_ptr<T>(value);
+    target = nb::cast<const T&>(value);
   }
 }
 
@@ -106,49 +106,52 @@ struct Names {
   }
 };
 
+// What Python does with a struct, its type left behind: compiled once for all structs.
+struct Access {
+  const char* name;
+  void (*construct)(void* self);
+  nb::object (*get)(void* self, const char* field, nb::handle owner);
+  bool (*set)(void* self, const char* field, nb::handle value);
+  nb::list (*names)(void* self);
+  std::string (*save)(const void* self);
+  void (*restore)(void* self, std::string_view bits);  // self is not constructed yet
+};
+
 template <typename T>
-void set_field(T& self, const char* name, nb::handle value) {
-  Setter setter{name, value};
-  T::visit(self, setter);
-  if (!setter.found)
-    throw nb::attribute_error((std::string("no field ") + name + " in " +
-                               nb::cast<std::string>(nb::type_name(nb::type<T>()).attr("__str__")()))
-                                  .c_str());
+const Access* access_of(const char* name) {
+  static Access access;
+  access = {name,
+            [](void* self) { new (self) T(); },
+            [](void* self, const char* field, nb::handle owner) {
+              Getter getter{field, owner, {}};
+              T::visit(*static_cast<T*>(self), getter);
+              return getter.found;
+            },
+            [](void* self, const char* field, nb::handle value) {
+              Setter setter{field, value};
+              T::visit(*static_cast<T*>(self), setter);
+              return setter.found;
+            },
+            [](void* self) {
+              Names names;
+              T::visit(*static_cast<T*>(self), names);
+              return names.names;
+            },
+            [](const void* self) { return saved(*static_cast<const T*>(self)); },
+            [](void* self, std::string_view bits) { new (self) T(restored<T>(bits)); }};
+  return &access;
 }
+
+void define_fields(nb::handle cls, const Access* access);
 
 }  // namespace detail
 
-// A class of a submodule; `path` is its name below inertial.core, for pickle.
+// A class of a submodule that is an attribute of inertial.core: pickle finds it there whichever build
+// of the core is loaded.
 template <typename T>
 nb::class_<T> bind_fields(nb::module_& m, const char* name, const char* what) {
   auto c = nb::class_<T>(m, name, what);
-  c.def("__init__", [](T* self, nb::kwargs given) {
-    new (self) T();
-    for (const auto& [key, value] : given) detail::set_field(*self, nb::cast<const char*>(key), value);
-  });
-  c.def("__getattr__", [](nb::handle self, const char* wanted) {
-    detail::Getter getter{wanted, self, {}};
-    T::visit(*nb::inst_ptr<T>(self), getter);
-    if (!getter.found.is_valid()) throw nb::attribute_error(wanted);
-    return getter.found;
-  });
-  c.def("__setattr__", [](T& self, const char* key, nb::handle value) { detail::set_field(self, key, value); });
-  c.def("__dir__", [](T& self) {
-    detail::Names names;
-    T::visit(self, names);
-    return names.names;
-  });
-  c.def("__getstate__", [](const T& self) {
-    const std::string bits = saved(self);
-    return nb::bytes(bits.data(), bits.size());
-  });
-  c.def("__setstate__", [](T& self, const nb::bytes& bits) {
-    new (&self) T(restored<T>(std::string_view(bits.c_str(), bits.size())));
-  });
-  c.def("__copy__", [](const T& self) { return self; });
-  c.def("__eq__", [](const T& self, const T& other) { return saved(self) == saved(other); });
-  c.attr("__hash__") = nb::none();
-  // found by pickle whichever build of the core is loaded
+  detail::define_fields(c, detail::access_of<T>(name));
   c.attr("__module__") = "inertial.core";
   c.attr("__qualname__") = nb::str((nb::cast<std::string>(m.attr("__name__")) + "." + name).c_str());
   return c;

@@ -121,13 +121,13 @@ class Reader {
   }
 
   [[noreturn]] void refuse() const {
-    throw std::invalid_argument("saved state does not fit this build of the core, at field " + name_ +
-                                ": start without it");
+    throw std::invalid_argument("saved state does not fit this build of the core, at field " +
+                                std::string(name_) + ": start without it");
   }
 
   std::string_view bytes_;
   std::size_t at_ = 0;
-  std::string name_ = "the first";
+  const char* name_ = "(the first)";
 };
 
 template <typename T>

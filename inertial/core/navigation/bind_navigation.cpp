@@ -1,6 +1,8 @@
 // The navigation filters for Python: structs by their fields, runs over numpy arrays.
 #include <stdexcept>
 
+#include <nanobind/stl/tuple.h>
+
 #include "common/bind_fields.hpp"
 #include "navigation/drag.hpp"
 #include "navigation/earth.hpp"
@@ -23,7 +25,7 @@ Samples samples_of(const ImuIn& imu) {
 
 std::vector<Fix> fixes_of(nb::sequence given) {
   std::vector<Fix> out;
-  for (const auto fix : given) out.push_back(*nb::inst_ptr<Fix>(fix));
+  for (const auto fix : given) out.push_back(nb::cast<const Fix&>(fix));
   return out;
 }
 
