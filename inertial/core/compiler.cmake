@@ -11,5 +11,6 @@ if("$ENV{CXX}" STREQUAL "zig" OR NOT (CMAKE_CXX_COMPILER OR DEFINED ENV{CXX} OR 
                         "Install g++ 12 or newer, or the package ziglang beside this Python.")
   endif()
   # Named by target, so that it compiles for any processor of the kind, not for the one it runs on.
-  set(CMAKE_CXX_COMPILER "${ZIG}" c++ -target ${CMAKE_HOST_SYSTEM_PROCESSOR}-linux-gnu)
+  cmake_host_system_information(RESULT PROCESSOR QUERY OS_PLATFORM)
+  set(CMAKE_CXX_COMPILER "${ZIG}" c++ -target ${PROCESSOR}-linux-gnu)
 endif()

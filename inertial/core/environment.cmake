@@ -3,6 +3,7 @@
 if(ZIG)
   set(CMAKE_CXX_ARCHIVE_CREATE "\"${ZIG}\" ar qc <TARGET> <LINK_FLAGS> <OBJECTS>")
   set(CMAKE_CXX_ARCHIVE_FINISH "\"${ZIG}\" ranlib <TARGET>")
+  set(CMAKE_SKIP_RPATH ON)
 endif()
 
 find_package(Python 3.11 REQUIRED COMPONENTS Interpreter Development.Module)
