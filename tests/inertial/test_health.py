@@ -330,10 +330,10 @@ class Told:
     """An estimator that remembers what it was told."""
 
     def __init__(self, layout) -> None:
-        self.masks = []
+        self.masks, self._real = [], VARIANTS["least-squares"](layout)
 
-    def feed(self, t_s, f_axis, wanted):
-        return [None] * len(wanted)
+    def feed(self, t_s, f_axis):
+        return self._real.feed(t_s, f_axis)
 
     def skip(self, n) -> None: ...
 
