@@ -85,7 +85,6 @@ class _Reading:
         self._tracks: dict[str, TrackLine] = {}
         self._marks: list[Mark] = []
         self._clocks: set[str] = set()
-        self._periods: dict[str, float] = {}
         self._take: dict[str, Callable[[str, Samples, Array], None]] = {
             RATE.name: self._rate,
             TRUTH.name: self._truth,

@@ -1,7 +1,7 @@
 """Does a recording give the same estimates again? Its inputs go through the estimators' pipeline,
 bit for bit compared.
 
-The pipeline is given by the caller (estimator.service.Pipeline in the product), so this room needs
+The pipeline is given by the caller (estimator.pipeline.Pipeline in the product), so this room needs
 no other service. Inputs go in as the recorder received them. One gateway's messages arrive
 everywhere in the order it sent them, so the estimator saw the same order; between gateways the
 order may differ, but no estimate depends on two devices.

@@ -9,6 +9,7 @@ import time
 import pytest
 
 from estimator import service
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from gyrofree.config import Settings
 from gyrofree.running.replay import Options
@@ -59,7 +60,7 @@ def compiled():
     """The estimators' compiled functions, made or taken from the cache before anything waits for
     them.
     """
-    pipeline = service.Pipeline(SETTINGS)
+    pipeline = Pipeline(SETTINGS)
     for batch in batches():
         pipeline.on(ACCEL, batch)
 
@@ -119,7 +120,7 @@ def test_a_live_session_is_reproduced_and_its_replay_gives_the_same_estimates(
     wait_for_last(seen, "cube")
     live = order(client, pb.RecorderCommand.ACTION_STOP)
 
-    report = reproduce(Catalogue(settings.root).path(live.session), service.Pipeline(SETTINGS))
+    report = reproduce(Catalogue(settings.root).path(live.session), Pipeline(SETTINGS))
     assert report.identical and report.as_dict()["identical"], report
     assert {key.rsplit("/", 1)[1] for key in report.keys} == set(SETTINGS.rate)
     assert report.inputs == BATCHES and report.refused == 0
@@ -145,7 +146,7 @@ def test_a_changed_bit_a_missing_input_and_a_late_start_are_told_apart(tmp_path)
     from sessions.recording import store
     from sessions.recording.settings import RecorderSettings
 
-    pipeline, inputs = service.Pipeline(SETTINGS), batches()[:30]
+    pipeline, inputs = Pipeline(SETTINGS), batches()[:30]
     name = SETTINGS.rate[0]
     key = RATE.key("t", "cube", name)
     session = store.start(RecorderSettings(root=tmp_path))
@@ -159,7 +160,7 @@ def test_a_changed_bit_a_missing_input_and_a_late_start_are_told_apart(tmp_path)
                 output.message.header.sequence = 7
                 session.add(T0 + n, key, output.message.SerializeToString())
     assert session.close()
-    result = reproduce(session.folder / "recording.mcap", service.Pipeline(SETTINGS)).keys[key]
+    result = reproduce(session.folder / "recording.mcap", Pipeline(SETTINGS)).keys[key]
     assert result.missing == 2 * BATCH and not result.same
     assert result.different >= 1 and result.first_difference
 
