@@ -1,7 +1,6 @@
 """`gyrofree router`, `gateway`, `estimator`, `record` and `dashboard`: one service each."""
 
 import logging
-import sys
 import threading
 
 from gyrofree.commands.options import (
@@ -10,7 +9,7 @@ from gyrofree.commands.options import (
     settings_of,
 )
 from gyrofree.config import ConfigError
-from gyrofree.running.process import run_service
+from gyrofree.running.process import command, run_service
 
 log = logging.getLogger(__name__)
 
@@ -85,9 +84,9 @@ def dashboard(config: Config = None, verbose: Verbose = False) -> None:
         from dashboard.web.control import ProcessReplay
         from dashboard.web.jobs import Jobs
 
-        replayer = [sys.executable, "-m", "gyrofree", "replay", "--stay"]
-        replayer += ["--config", str(config)] if config else []
-        jobs = Jobs([sys.executable, "-m", "gyrofree"], ["--config", str(config)] if config else [])
+        options = ["--config", str(config)] if config else []
+        replayer = command("replay", "--stay", *options)
+        jobs = Jobs(command(), options)
         service.run(
             settings.dashboard, settings.bus, stop, replay=ProcessReplay(replayer), jobs=jobs
         )
