@@ -1,4 +1,4 @@
-"""Orders to the estimator of a device: guided calibrations and calibration cards. Part of the
+"""Orders to the estimator of a device: guided calibrations and calibration files. Part of the
 shell: knows messages.
 
 A Pipeline hands it samples and EstimatorCommands; what it says is a function of these, except for
