@@ -19,4 +19,6 @@ NB_MODULE(GYROFREE_MODULE, m) {
   m.doc() = "Hot loops of the estimators: the same bits on every processor.";
   m.def("runs_v3", &runs_v3, "True where this processor runs the x86-64-v3 build of the core.");
   gyrofree::bind_elementary(m);
+  gyrofree::bind_rotation(m);
+  gyrofree::bind_earth(m);
 }
