@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from inertial.rotation import euler_angles, to_matrix
 from messages.contract import gyrofree_pb2 as pb
 
 TILT_ROLL, TILT_PITCH, TILT_BIAS = 0, 1, slice(2, 5)  # columns of an attitude ring
@@ -17,20 +18,14 @@ SKY, GROUND, LINE, PLANE = "#56B4E9", "#8a6d3b", "#ffffff", "#E69F00"
 
 def roll_pitch(q_nb: Any) -> tuple[float, float]:
     """Roll and pitch in rad of q_nb (4,), w x y z."""
-    w, x, y, z = q_nb
-    return (
-        math.atan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
-        math.asin(max(-1.0, min(1.0, 2.0 * (w * y - x * z)))),
-    )
+    roll, pitch, _ = euler_angles(to_matrix(q_nb))
+    return float(roll), float(pitch)
 
 
 def between(q: Any, p: Any) -> float:
     """Angle between the verticals of two attitudes, rad."""
-    down = [
-        np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
-        for w, x, y, z in (q, p)
-    ]
-    return math.atan2(float(np.linalg.norm(np.cross(*down))), float(np.dot(*down)))
+    down, other = to_matrix(q)[2], to_matrix(p)[2]
+    return math.atan2(float(np.linalg.norm(np.cross(down, other))), float(np.dot(down, other)))
 
 
 def tilt_rows(ring: Callable[..., Any]) -> dict[str, Callable[..., None]]:

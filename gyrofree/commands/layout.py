@@ -14,6 +14,7 @@ from rich.table import Table
 
 from gyrofree.commands.options import AsJson, console_of, show_table
 from gyrofree.running.process import EXIT_CONFIG, fail
+from inertial.constants import MILLI_G
 
 WIDTH = 150  # characters of tables where nobody looks at a terminal
 
@@ -337,7 +338,7 @@ def _figures(found: list[Any]) -> Table:
         ("products seen (rank of 6)", [str(_products(q)) for q in found]),
         (
             "noise of p x y z, mg",
-            [_three_of(q.sigma_least_squares[3:], 1 / 9.80665e-3, 2) for q in found],
+            [_three_of(q.sigma_least_squares[3:], 1 / MILLI_G, 2) for q in found],
         ),
         (
             "noise of w' x y z, rad/s2",
