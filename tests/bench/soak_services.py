@@ -197,16 +197,23 @@ def estimator(folder: Path, hours: float, done: Any) -> None:
 
 def dashboard(bus: BusSettings, hours: float, done: Any, taken: Any) -> None:
     """The scene's server, its feed and its store, on a real router."""
+    from dashboard.data.feed import Feed
+    from dashboard.data.store import Store
+    from dashboard.desk import Desk
     from dashboard.scene.service import start
 
-    handle = start(bus, SimpleNamespace(viser_port=0))
-    handle.feed.watched.set()
-    while done.value < 0.9999 * hours:
-        time.sleep(0.01)
-        taken.value = handle.feed._taken
-        device = handle.store.device(DEVICE)
-        done.value = max(done.value, 0.0 if device is None else device.t_newest / 3600.0)
-    handle.stop()
+    store, watched = Store(), threading.Event()
+    with open_client(bus, timeout_s=60.0) as session:
+        handle = start(SimpleNamespace(viser_port=0), store, Desk(session, bus.prefix), watched)
+        watched.set()
+        feed = Feed(session, bus.prefix, store, watched)
+        while done.value < 0.9999 * hours:
+            time.sleep(0.01)
+            taken.value = feed.taken
+            device = store.device(DEVICE)
+            done.value = max(done.value, 0.0 if device is None else device.t_newest / 3600.0)
+        handle.stop()
+        feed.stop()
 
 
 def router(bus: BusSettings) -> None:

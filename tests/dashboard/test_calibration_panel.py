@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 import viser
 
-from dashboard.scene.feed import Feed
+from dashboard.data.store import Store
+from dashboard.desk import Desk
 from dashboard.scene.panels import PAGES, Snapshot
-from dashboard.scene.panels.calibration import Calibration, content, facing, picture, upright
-from dashboard.scene.store import Store
+from dashboard.scene.panels.guided.calibration import Calibration, content, facing, picture, upright
 from estimator import live, service
 from estimator.settings import EstimatorSettings
 from inertial.calibration.poses import candidates, plan
+from messages.bus import orders
 from messages.bus.session import BusSettings, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ACCEL, CALIBRATION
@@ -96,20 +97,16 @@ def test_orders_reach_a_running_worker(free_port, tmp_path):
     thread = threading.Thread(target=worker.work, args=(stop,), daemon=True)
     thread.start()
     with open_router(bus), open_client(bus, timeout_s=20) as session:
-        queryable = session.declare_queryable(
-            f"t/*/{live.CONTROL}", lambda query: live.take_order(query, worker)
-        )
-        feed = Feed(bus, Store(), threading.Event())
+        queryable = orders.take(session, bus.prefix, orders.ESTIMATOR, worker.take_order, "*")
+        desk = Desk(session, bus.prefix)
         try:
 
             def order(action):
                 deadline = time.monotonic() + 30.0
-                while True:  # until the feed is on the bus
+                while True:  # until the queryable is known
                     try:
-                        return feed.estimator(
-                            pb.EstimatorCommand(device="cube", action=action), timeout_s=20.0
-                        )
-                    except ConnectionError:
+                        return desk.estimator(pb.EstimatorCommand(device="cube", action=action))
+                    except orders.NoAnswer:
                         assert time.monotonic() < deadline
                         time.sleep(0.05)
 
@@ -124,7 +121,6 @@ def test_orders_reach_a_running_worker(free_port, tmp_path):
             assert not order(pb.EstimatorCommand.ACTION_CALIBRATE_FIT).ok
         finally:
             queryable.undeclare()
-            feed.stop()
             worker.finish()
             thread.join(timeout=10.0)
     assert not thread.is_alive() and worker.failure is None
