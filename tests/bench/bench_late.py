@@ -41,7 +41,8 @@ from tests.system.test_browser import CHROMIUM, FLAGS  # noqa: E402
 
 DT, DEVICE = 0.01, "cube-01"
 PATIENCE_S = 60.0
-SPANS = """() => Object.values(window.__viserTestpoints?.uplots ?? {}).map((plot) => plot.chart.data?.[0] ?? [])
+SPANS = """() => Object.values(window.__viserTestpoints?.uplots ?? {})
+  .map((plot) => plot.chart.data?.[0] ?? [])
   .filter((t) => t.length > 1).map((t) => t.at(-1) - t[0])"""
 
 

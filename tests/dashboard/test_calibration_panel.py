@@ -12,8 +12,9 @@ from dashboard.data.store import Store
 from dashboard.desk import Desk
 from dashboard.scene.panels import PAGES, Snapshot
 from dashboard.scene.panels.guided.calibration import Calibration, content, facing, picture, upright
-from estimator import live, service
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
+from estimator.worker import Worker
 from inertial.calibration.poses import candidates, plan
 from messages.bus import orders
 from messages.bus.session import BusSettings, open_client, open_router
@@ -89,7 +90,7 @@ def test_orders_reach_a_running_worker(free_port, tmp_path):
     bus = BusSettings(prefix="t", router=endpoint, listen=[endpoint])
     settings = EstimatorSettings(rate=["products-ekf"], navigators=[], attitudes=[], cards=tmp_path)
     stop, said = threading.Event(), []
-    worker = live.Worker(service.Pipeline(settings), said.append)
+    worker = Worker(Pipeline(settings), said.append)
     batch = pb.AccelBatch(
         header=pb.Header(device="cube", sequence=1), period_s=0.01, axes=12, f_mps2=[0.1] * 12
     )

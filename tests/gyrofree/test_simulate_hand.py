@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.wire import Wire
 
-from estimator.service import Pipeline
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from gateway.board.device import DeviceLink
 from gateway.ports.reader import Chunk
@@ -37,7 +37,7 @@ class Bench:
             device, GatewaySettings(journal=folder / "journal", devices=[device])
         )
         self.heard = []
-        self.link._put = lambda topic, name, message: self.heard.append((topic, message))
+        self.link.out.direct(lambda topic, name, message: self.heard.append((topic, message)))
         self.pipeline = Pipeline(
             EstimatorSettings(navigators=[], attitudes=["vqf"], axes=folder / "axes")
         )
