@@ -5,6 +5,8 @@ from typing import Any
 
 from rich.table import Table
 
+from inertial.constants import MILLI_G
+
 
 def _products(q: Any) -> int:
     return int((q.singular_products > 1e-4 * max(q.singular_products.max(), 1e-9)).sum())

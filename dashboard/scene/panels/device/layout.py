@@ -29,6 +29,7 @@ class LayoutBench(Panel):
     """One gizmo moves and turns the chosen axis, or all axes of its triad; figures follow."""
 
     title = "Layout"
+    own_inputs = ("Start from", "Sensor", "Whole triad", "Save as TOML")
     own_scene = True
 
     def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
