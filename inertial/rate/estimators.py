@@ -170,10 +170,10 @@ class ProductsRate(_Stepping):
             aided[row:end] = self._aided
             row = end
         rows = parts[0] if len(parts) == 1 else np.concatenate(parts)
-        rows["P"][rows["phase"] == Phase.STILL] += self._unseen
         return self._columns(rows, aided)
 
     def _columns(self, rows: Rows, aided: NDArray[np.bool_] | None = None) -> RateColumns:
+        rows["P"][rows["phase"] == Phase.STILL] += self._unseen
         return columns(
             rows,
             products=self.core.sensor.m,
@@ -217,7 +217,7 @@ class ProductsRate(_Stepping):
 
     def run_batch(self, t_s: Array, f_axis: Array) -> RateColumns:
         """All samples at once: times (n,) s, growing, readings (n, N) m/s^2; the same bits as
-        step() gives one by one, but that P at rest is the filter's own.
+        step() gives one by one.
 
         Raises ValueError for readings that are not finite or times that do not grow.
         """

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from inertial.core import native
 from inertial.layouts.layout import Layout
-from inertial.rate import rows
 from inertial.rate import still as stillness
 from inertial.rate.observed import sensor
+from inertial.rate.rows import Rows, after
 
 Array = NDArray[np.float64]
 
@@ -52,11 +52,11 @@ class LeastSquares:
         LeastSquares.__init__(self, *made_of)
         self.native.restore(image)
 
-    def rows(self, t_s: Array, f_axis: Array) -> rows.Rows:
+    def rows(self, t_s: Array, f_axis: Array) -> Rows:
         """Samples (n, N), m/s^2, at t_s (n,), s, both checked: a row after each. A long silence
         starts anew.
         """
-        return rows.run(self.native, t_s, f_axis)
+        return after(self.native, t_s, f_axis)
 
     def gap(self) -> None:
         """Samples are missing: the next step integrates across, with omega' linear in between."""

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from inertial.core import native
 from inertial.layouts.layout import Layout
-from inertial.rate import rows
 from inertial.rate import still as stillness
 from inertial.rate.bound import Knowledge, known
 from inertial.rate.observed import carry_biases, sensor
+from inertial.rate.rows import Rows, after
 
 Array = NDArray[np.float64]
 
@@ -145,15 +145,15 @@ class ProductsFilter:
         """
         return self.native.lost
 
-    def rows(self, t_s: Array, f_axis: Array) -> rows.Rows:
+    def rows(self, t_s: Array, f_axis: Array) -> Rows:
         """Samples (n, N), m/s^2, at t_s (n,), s, both checked: a row after each."""
-        return rows.run(self.native, t_s, f_axis)
+        return after(self.native, t_s, f_axis)
 
     def gap(self) -> None:
         """Samples are missing: the next step predicts across."""
         self.native.gap()
 
-    def run(self, t_s: Array, f_axis: Array) -> rows.Rows:
+    def run(self, t_s: Array, f_axis: Array) -> Rows:
         """All samples (n, N) at once; the same bits as in parts. Raises ValueError for unusable
         input.
         """

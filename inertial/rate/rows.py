@@ -28,7 +28,7 @@ ROW = _row_type()
 BYTES = native.RATE_ROW_BYTES
 
 
-def run(core: object, t_s: Array, f_axis: Array) -> Rows:
+def after(core: object, t_s: Array, f_axis: Array) -> Rows:
     """Rows (n,) after samples (n, N), m/s^2, at t_s (n,), s, both checked, of an estimator of the
     core.
     """

@@ -25,7 +25,8 @@ void matrix(nb::class_<Sensor>& c, const char* name, Eigen::Matrix<Number, Rows,
         auto& m = s.*member;
         m.setZero();
         m.topLeftCorner(given.rows(), given.cols()) = given;
-      });
+      },
+      nb::rv_policy::automatic);
 }
 
 template <int Rows>
@@ -36,7 +37,8 @@ void vector(nb::class_<Sensor>& c, const char* name, Vector<Rows> Sensor::*membe
         if (value.shape(0) > Rows) throw std::invalid_argument(std::string(name) + ": too many numbers");
         (s.*member).setZero();
         (s.*member).head(value.shape(0)) = map(value);
-      });
+      },
+      nb::rv_policy::automatic);
 }
 
 Sensor blank_sensor() {

@@ -117,7 +117,7 @@ void bind_rate_kernels(nb::module_& m) {
       .def("detect", &Detector::detect)
       .def("forget", &Detector::forget)
       .def_prop_ro("learning", &Detector::learning)
-      .def_prop_ro("reference", &Detector::reference);
+      .def_prop_ro("reference", &Detector::reference, nb::rv_policy::automatic);
 }
 
 }  // namespace gyrofree::rate

@@ -171,13 +171,13 @@ void bind_products(nb::module_& m) {
   c.def("exclude", &ProductsFilter::exclude, nb::arg("sensor"), nb::arg("T"), nb::arg("unknown"));
   c.def("correct", &ProductsFilter::correct, nb::arg("t_s"), nb::arg("rate"), nb::arg("sigma"), nb::arg("signed"),
         nb::arg("axis_b"), "A tachometer's report (E-50); False where it is not used.");
-  c.def_prop_ro("x", [](const ProductsFilter& f) { return to_numpy_vector(f.frame().filter().x); });
-  c.def_prop_ro("P", [](const ProductsFilter& f) { return to_numpy(f.frame().filter().P); });
+  c.def_prop_ro("x", [](const ProductsFilter& f) { return to_numpy_vector(f.frame().filter().x); }, nb::rv_policy::automatic);
+  c.def_prop_ro("P", [](const ProductsFilter& f) { return to_numpy(f.frame().filter().P); }, nb::rv_policy::automatic);
   c.def_prop_ro("q_nb", [](const ProductsFilter& f) {
     auto out = new_array<VectorOut>({4});
     put(out.data(), f.frame().filter().q_nb);
     return out;
-  });
+  }, nb::rv_policy::automatic);
   c.def_prop_ro("last_s", [](const ProductsFilter& f) { return f.frame().last_s(); });
   c.def_prop_ro("steps", [](const ProductsFilter& f) { return f.frame().steps(); });
   c.def_prop_ro("refused_products", [](const ProductsFilter& f) { return f.frame().refused_products(); });
@@ -205,7 +205,7 @@ void bind_rate(nb::module_& m) {
       .def("step", &BoundAlong::step, nb::arg("omega_b"), nb::arg("alpha_b"), nb::arg("q_nb"), nb::arg("still"),
            nb::arg("dt"))
       .def_prop_ro("known", &BoundAlong::known)
-      .def_prop_ro("sigma", &BoundAlong::sigma);
+      .def_prop_ro("sigma", &BoundAlong::sigma, nb::rv_policy::automatic);
 }
 
 }  // namespace gyrofree
