@@ -175,4 +175,4 @@ def test_fields_that_differ_are_named_also_when_they_are_not_numbers():
     assert compare(first, samples(RATE, [one])).same
     assert compare(first, samples(RATE, [two])).first_difference.endswith(": q_nb")
     found = compare(first, samples(RATE, [three]))
-    assert found.first_difference.endswith(": estimator, innovation") and not found.same
+    assert found.first_difference.endswith(": estimator, innovation, nis_dof") and not found.same
