@@ -66,7 +66,7 @@ void judge_sign(Filter& f, const Sensor& s, double dt, bool turning) {
 }
 
 // q_nb turned so that up_b points up in n, of unit length; heading is kept (E-12).
-Quaternion upright(const Quaternion& q, const Vector3& up_b) {
+Quaternion stand_up(const Quaternion& q, const Vector3& up_b) {
   const double size = norm_of(up_b);
   if (size == 0.0) return q;
   const Vector3 up_n = to_matrix(q) * up_b / size;
@@ -77,7 +77,7 @@ Quaternion upright(const Quaternion& q, const Vector3& up_b) {
 void navigate(Filter& f, const Vector3& mean_rate, const Vector3& f_b, const Drive& drive) {
   const double dt = drive.dt;
   const Vector3 turn = dt * (mean_rate - drive.earth_b);
-  f.q_nb = upright(f.q_nb * from_rotation_vector(turn), f.x.segment<3>(LIFT));
+  f.q_nb = stand_up(f.q_nb * from_rotation_vector(turn), f.x.segment<3>(LIFT));
   const Vector3 force_n = to_matrix(f.q_nb) * f_b + Vector3(0.0, 0.0, GRAVITY);
   const Vector3 v_n = f.v_n + 0.5 * dt * (f.force_n + force_n);
   f.p_n += 0.5 * dt * (f.v_n + v_n);
