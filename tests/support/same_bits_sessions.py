@@ -1,4 +1,4 @@
-"""One session of each kind, short: a table, an arm with a receiver, a drive, a board that is tilted."""
+"""One session of each kind, short: table, arm with a receiver, drive, tilted board."""
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -71,7 +71,9 @@ def command(action: int) -> tuple[str, bytes]:
 def header(k: int, name: str = "board") -> pb.Header:
     """Header of the batch that begins at sample k."""
     utc_ns = 1_767_323_045_000_000_000 + k * 10_000_000
-    return pb.Header(device=name, sequence=k // BATCH + 1, epoch=1, device_us=k * 10_000, utc_ns=utc_ns)
+    return pb.Header(
+        device=name, sequence=k // BATCH + 1, epoch=1, device_us=k * 10_000, utc_ns=utc_ns
+    )
 
 
 def drive_messages(seconds: float) -> Iterator[Item]:

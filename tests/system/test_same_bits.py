@@ -1,8 +1,8 @@
 """The same session gives the same bytes, whatever the processor can do.
 
-One process sees the machine as it is. The others are told that it can do less: the core's build for
-any x86-64, numpy without its wide loops, another kernel of BLAS, the C library without AVX2 and FMA.
-What a processor's abilities decide is then different, and what is published must not be.
+One process sees the machine as it is. The other is told that it can do less: the core's build for
+any x86-64, numpy without its wide loops, another kernel of BLAS, the C library without AVX2 and
+FMA. What a processor's abilities decide is then different, and what is published must not be.
 """
 
 import os
@@ -11,11 +11,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from numpy._core._multiarray_umath import __cpu_dispatch__
-
-from inertial import core
 from support.same_bits import TYPES, Published
 from support.same_bits_sessions import sessions
 

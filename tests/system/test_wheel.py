@@ -10,11 +10,15 @@ import zipfile
 from pathlib import Path
 
 import pytest
-
 from support.stack import RunningDemo
 
 ROOT = Path(__file__).resolve().parents[2]
-CORE_SOURCES = {".cpp", ".hpp", ".cmake", ".txt"}  # of inertial/core: what is built takes their place
+CORE_SOURCES = {
+    ".cpp",
+    ".hpp",
+    ".cmake",
+    ".txt",
+}  # of inertial/core: what is built takes their place
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec("scikit_build_core") is None,
     reason="the packages of requirements/build.txt are not here: run make setup",
