@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from inertial.attitude.axis_map import IMU, SI, AxisMap, Figures
 from inertial.attitude.wiring import FORCE_REST, RATE_REST, VOLT_REST, Board, Turn, WiringSession
+from inertial.constants import GRAVITY
 from logs.attitude_log import SAMPLES, LogError
 
 Array = NDArray[np.float64]
 
 INPUT = re.compile(r"in(\d+)_(counts|v)")
 ACC_GYRO = Figures(
-    1.65, 0.4785 / 9.80665, 1.23, float(np.degrees(0.002))
+    1.65, 0.4785 / GRAVITY, 1.23, float(np.degrees(0.002))
 )  # LIS331AL and LPR550AL: data sheets
 VOLT_PER_COUNT = 3.3 / 4095
 WANTED = (

@@ -35,7 +35,7 @@ class Front:
     jobs: Jobs | None = None
     readings: Readings = field(default_factory=Readings)
     uploads: Uploads = field(default_factory=Uploads)
-    open_widgets: Callable[[], Collection[str]] = field(default=lambda: ())
+    open_labels: Collection[str] = ()  # of the scene's inputs that concern nobody else
 
 
 @dataclass(frozen=True)
