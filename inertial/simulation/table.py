@@ -17,7 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.layouts.layout import CUBE, Layout
+from inertial.layouts.catalogue import CUBE
+from inertial.layouts.layout import Layout
 from inertial.simulation.profiles import DEGREE, Profile, named
 
 Array = NDArray[np.float64]

@@ -9,7 +9,8 @@ from scipy.linalg import null_space
 from estimator.devices.rate import RateBoard
 from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
-from inertial.layouts.layout import CUBE, LAYOUTS, products
+from inertial.layouts.catalogue import CUBE, LAYOUTS
+from inertial.layouts.layout import products
 from inertial.rate import parity
 from inertial.rate.estimators import VARIANTS
 from inertial.rate.health import AxisState, HealthMonitor

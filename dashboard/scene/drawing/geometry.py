@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dashboard.data.pose import yaw_of
-from inertial.layouts.layout import CUBE
+from inertial.layouts.catalogue import CUBE
 from messages.contract import gyrofree_pb2 as pb
 
 # Rotation n (north, east, down) -> display (east, north, up): half a turn about (1, 1, 0), w x y z.

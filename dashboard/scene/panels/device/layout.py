@@ -12,8 +12,9 @@ from dashboard.scene.drawing import geometry as geo
 from dashboard.scene.drawing.palette import GREY, ORANGE, SKY, number, rgb, rows
 from dashboard.scene.panels.base import DEG, Panel, Snapshot
 from inertial.layouts import catalogue
+from inertial.layouts.catalogue import CUBE, LAYOUTS
 from inertial.layouts.draw import noise_ellipsoid
-from inertial.layouts.layout import CUBE, LAYOUTS, Layout
+from inertial.layouts.layout import Layout
 from inertial.layouts.quality import UNKNOWNS, Quality, analyse
 
 HALF_SIDE = 0.05  # m
