@@ -26,16 +26,10 @@ MAY_IMPORT["gyrofree"] = set(MAY_IMPORT)  # the composition root wires them all
 LONGEST = 330  # lines of a module
 MOST = 22  # modules of a folder
 # What is still to be undone. Nothing may be added here; what is done with is taken out.
-CIRCLES = [
-    ["gyrofree.commands.compare", "gyrofree.commands.sessions"],
-    ["inertial.rate.health", "inertial.rate.hypotheses"],
-]
+CIRCLES: list[list[str]] = []
 LONG = {
     "dashboard/scene/scene.py",
     "dashboard/web/api.py",
-    "gyrofree/commands/layout.py",
-    "gyrofree/commands/main.py",
-    "gyrofree/commands/sessions.py",
     "inertial/attitude/wiring.py",
     "inertial/navigation/navigation.py",
     "inertial/rate/estimators.py",
@@ -46,7 +40,6 @@ LONG = {
     "messages/history/journal.py",
     "messages/history/mending.py",
     "messages/history/spool.py",
-    "sessions/library/compare.py",
     "sessions/recording/recorder.py",
     "sessions/replay/playback.py",
 }
