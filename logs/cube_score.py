@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.attitude.rotation import from_rotation_vector, level, multiply
 from inertial.calibration.card import Card
 from inertial.layouts.layout import GeometryError, Layout
 from inertial.rate.bound import IN_USE, rate_bound
 from inertial.rate.tachometer import SUFFIX
+from inertial.rotation import followed, level
 from logs.cube_log import CubeLog
 from logs.cube_track import Reference, Track
 
@@ -87,21 +87,18 @@ def _turned(data: CubeLog, shape: Layout, omega_b: Array) -> Array:
     turned.
     """
     n = max(1, round(0.1 / data.period_s))
-    q = np.empty((len(omega_b), 4))
-    q[0] = level(np.linalg.pinv(shape.theta_b) @ data.f_axis[:n].mean(axis=0))
-    for k in range(1, len(q)):
-        mean = 0.5 * (omega_b[k - 1] + omega_b[k])
-        q[k] = multiply(q[k - 1], from_rotation_vector((data.t_s[k] - data.t_s[k - 1]) * mean))
-    return q
+    first = level(np.linalg.pinv(shape.theta_b) @ data.f_axis[:n].mean(axis=0))
+    dt = np.diff(data.t_s[: len(omega_b)])
+    return followed(first, dt[:, None] * (0.5 * (omega_b[:-1] + omega_b[1:])))
 
 
 def notes_of(data: CubeLog, truth: Reference, card: Card | None) -> list[str]:
     """What a person should know of how the scores came about."""
     found = [
         (
-            f"calibration card {card.id}"
+            f"calibration file {card.id}"
             if card
-            else "no calibration card: nominal scale, positions and directions"
+            else "no calibration file: nominal scale, positions and directions"
         )
     ]
     if truth.name == "tachometer":

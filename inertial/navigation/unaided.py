@@ -6,9 +6,9 @@ Equations E-85 and E-86 of docs/equations-gyro-free-navigation.md.
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from inertial.constants import GRAVITY
 
-GRAVITY = 9.80665  # m/s^2
+Array = NDArray[np.float64]
 
 
 def position_error(b_mps2: Array, d_radps: Array, t_s: Array, g: float = GRAVITY) -> Array:

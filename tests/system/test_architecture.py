@@ -16,7 +16,7 @@ MAY_IMPORT = {
     "messages": set(),
     "inertial": set(),
     "emulator": {"firmware_protocol"},
-    "gateway": {"firmware_protocol", "messages"},
+    "gateway": {"firmware_protocol", "messages", "inertial"},
     "estimator": {"messages", "inertial"},
     "logs": {"messages", "inertial"},
     "sessions": {"messages", "inertial", "logs"},
