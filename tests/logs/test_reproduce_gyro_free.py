@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gyrofree.running import simulate_csv
+from inertial.constants import MILLI_G
 from inertial.layouts.catalogue import find
 from inertial.rate.field import cube_angular_acceleration, cube_specific_force
 from logs.reproduce import gyro_free_study as study
@@ -51,7 +52,7 @@ def test_equations_25_26_and_27(made):
         layout.S @ a, np.r_[cube_angular_acceleration(a, 0.1), cube_specific_force(a)]
     )
     # 30 deg/h beside Table 1: 1/2 b t^2 is 18.5 11.0 23.8 m, the drift adds 1/6 d g t^3 = 6.4 m
-    bias = np.array(study.PAPER_BIAS_MG) / study.MG
+    bias = np.array(study.PAPER_BIAS_MG) * MILLI_G
     error = study.closed_form(bias, study.paper_drift(), np.array([30.0]))[0]
     np.testing.assert_allclose(error, [18.54 + 6.42, 11.03, 23.83], atol=0.01)
     assert study.drift_of(error, bias, 30.0) * study.PER_HOUR == pytest.approx(30.0)
