@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from support import rate_twin as twin
 
 from inertial.core import native
-from inertial.layouts.layout import CUBE, LAYOUTS, GeometryError, Layout
+from inertial.layouts.catalogue import CUBE, LAYOUTS
+from inertial.layouts.layout import GeometryError, Layout
 from inertial.rate import products_model as model
 from inertial.rate.estimators import ESTIMATORS, LeastSquaresRate, ProductsRate
 from inertial.rate.observed import sensor

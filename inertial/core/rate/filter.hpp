@@ -1,5 +1,5 @@
 // Products filter: its state by named segments, and the functions of one sample (E-30 to E-39).
-// numpy twin: inertial/rate/products_model.py, tests/inertial/twins/products.py.
+// numpy twin: inertial/rate/products_model.py, tests/support/rate_twin.py.
 #pragma once
 
 #include <limits>
