@@ -1,4 +1,4 @@
-"""The one door to all gyro-free rate estimators: samples in, RateState out.
+"""The one door to all gyro-free rate estimators: samples in, columns of rates out.
 
 ESTIMATORS maps a name to a class that is made of a layout and has `feed`, `step` and `skip`.
 Deterministic: the same samples give the same bits. Frames and units as everywhere: b body, n
@@ -232,7 +232,7 @@ class ProductsRate(_Stepping):
 
 
 class UnscentedRate(ProductsRate):
-    """Estimator "products-ukf": the same model through sigma points (unscented.py)."""
+    """Estimator "products-ukf": the same model through sigma points (E-44)."""
 
     name = "products-ukf"
     method = "ukf"

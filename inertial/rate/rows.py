@@ -1,6 +1,4 @@
-"""What the core says after each sample: structured arrays, field by field as batch.RateColumns names
-them.
-"""
+"""What the core says after each sample: structured arrays whose fields are those of RateColumns."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -22,7 +22,7 @@ from scipy.stats import chi2
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
 
-from inertial.rate import products_ekf, resolved, sight  # noqa: E402
+from inertial.rate import resolved, sight  # noqa: E402
 from inertial.rate.bound import IN_USE, SOURCE, SOURCE_STILL, plot_bound, rate_bound, rms  # noqa: E402
 from inertial.rate.estimators import ESTIMATORS, ProductsRate  # noqa: E402
 from inertial.rate.products_ekf import Config  # noqa: E402
@@ -202,8 +202,6 @@ def main() -> None:
     """All figures."""
     seeds = int(sys.argv[1]) if len(sys.argv) > 1 else 10
     pictures = Path(sys.argv[2]) if len(sys.argv) > 2 else None
-    for name in ESTIMATORS:
-        figures(name, "published", 1)  # compiles
     print(json.dumps({"bench": "rate-cost"} | cost()), flush=True)
     for case in CASES:
         print(

@@ -10,7 +10,7 @@ import pytest
 from estimator.devices.rate import RateBoard, RateOutput
 from estimator.rate_messages import rate_batch
 from inertial.core import native
-from inertial.layouts.layout import CUBE, LAYOUTS
+from inertial.layouts.catalogue import CUBE, LAYOUTS
 from inertial.rate import bound
 from inertial.rate.batch import RateState
 from inertial.rate.estimators import ESTIMATORS, ProductsRate

@@ -7,7 +7,8 @@ import pytest
 
 from inertial.attitude.rotation import multiply, to_dcm
 from inertial.core import native
-from inertial.layouts.layout import CUBE, LAYOUTS, GeometryError, Layout
+from inertial.layouts.catalogue import CUBE, LAYOUTS
+from inertial.layouts.layout import GeometryError, Layout
 from inertial.rate.estimators import ESTIMATORS, LeastSquaresRate
 from inertial.rate.observed import sensor
 from inertial.rate.products_model import squares

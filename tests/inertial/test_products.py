@@ -1,5 +1,10 @@
 """The products filter: derivatives, exactness, consistency, the published figures, faults."""
 
+import os
+import pickle
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,7 +12,8 @@ from hypothesis import strategies as st
 from support import rate_twin as twin
 
 from inertial.core import native
-from inertial.layouts.layout import CUBE, LAYOUTS, GeometryError, Layout
+from inertial.layouts.catalogue import CUBE, LAYOUTS
+from inertial.layouts.layout import GeometryError, Layout
 from inertial.rate import products_model as model
 from inertial.rate.estimators import ESTIMATORS, LeastSquaresRate, ProductsRate
 from inertial.rate.observed import sensor
@@ -368,3 +374,54 @@ def test_a_body_that_turns_freely_is_not_held_to_an_axis():
     track = ProductsRate(cube).run_batch(dt * np.arange(1500), np.array(rows))
     error = np.rad2deg(track.omega_b - truth)[600:]
     assert np.sqrt(np.mean(error**2, axis=0)).max() < 3.0
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_a_pickled_estimator_goes_on_to_the_bit(name):
+    table = TableTest(6)
+    block = table.block(0)
+    estimator = ESTIMATORS[name](table.layout)
+    estimator.feed(block.t_s[:700], block.readings[:700])
+    estimator.exclude(0b100)
+    estimator.feed(block.t_s[700:720], block.readings[700:720])
+    again = pickle.loads(pickle.dumps(estimator))
+    one, other = (e.feed(block.t_s[720:], block.readings[720:]) for e in (estimator, again))
+    for field in ("omega_b", "P", "q_nb", "p_n", "nis", "bound_sigma", "phase"):
+        assert getattr(one, field).tobytes() == getattr(other, field).tobytes()
+    assert one.excluded == other.excluded == 0b100
+
+
+def test_the_state_of_another_version_is_refused():
+    core = ProductsFilter(CUBE(0.05))
+    with pytest.raises(ValueError, match="another version"):
+        core.native.restore(core.native.snapshot() + b"x")
+
+
+@pytest.mark.parametrize("name", ["products-ekf", "products-ukf", "products-mhe"])
+def test_both_builds_of_the_core_give_the_same_bits(name):
+    """In a process of its own each: GYROFREE_CORE names the build."""
+    said = {
+        subprocess.run(
+            [sys.executable, "-c", DIGEST.format(name=name)],
+            env={**os.environ, "GYROFREE_CORE": build},
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
+        for build in ("plain", "")
+    }
+    assert len(said) == 1 and len(said.pop().strip()) == 64
+
+
+DIGEST = """
+import hashlib
+from inertial.rate.estimators import ESTIMATORS
+from inertial.simulation.table import TableTest
+table = TableTest(5, profile="wobble")
+block = table.block(0)
+rows = ESTIMATORS["{name}"](table.layout).feed(block.t_s, block.readings)
+digest = hashlib.sha256()
+for field in ("omega_b", "P", "q_nb", "p_n", "v_n", "nis", "bias", "bound_sigma", "sight"):
+    digest.update(getattr(rows, field).tobytes())
+print(digest.hexdigest())
+"""

@@ -5,7 +5,7 @@ import pytest
 from support.still_twin import StillTwin
 
 from inertial.core import native
-from inertial.layouts.layout import CUBE, LAYOUTS
+from inertial.layouts.catalogue import CUBE, LAYOUTS
 from inertial.rate import still
 from inertial.rate.observed import sensor
 from inertial.simulation.table import TableTest

@@ -49,7 +49,7 @@ Matrix<PRODUCTS, 3> products_model(const Vector3& omega, const Sensor& s) {
 Seen<6> see_products(const Covariance& P, const Vector3& at, const Sensor& s, double share) {
   Seen<6> seen;
   const Matrix<PRODUCTS, 3> H = products_model(at, s);
-  seen.PHt = P.middleCols<6>(BIAS_PRODUCTS) + product_transposed(P.middleCols<3>(OMEGA), H);
+  seen.PHt = P.middleCols<6>(BIAS_PRODUCTS) + columns_by(P.middleCols<3>(OMEGA), H);
   seen.C = seen.PHt.middleRows<6>(BIAS_PRODUCTS) + product(H, seen.PHt.middleRows<3>(OMEGA)) + share * s.R_c;
   return seen;
 }
@@ -79,8 +79,8 @@ Seen<3> see_force(const StateVector& x, const Covariance& P, const Vector3& p, c
   const ForceModel h = force_model(x, alpha, s);
   Seen<3> seen;
   seen.PHt = P.middleCols<3>(LIFT) + P.middleCols<3>(BIAS_FORCE) +
-             product_transposed(P.middleCols<3>(OMEGA), h.by_omega) +
-             product_transposed(P.middleCols<3>(PIVOT), h.by_pivot);
+             columns_by(P.middleCols<3>(OMEGA), h.by_omega) +
+             columns_by(P.middleCols<3>(PIVOT), h.by_pivot);
   seen.C = seen.PHt.middleRows<3>(LIFT) + seen.PHt.middleRows<3>(BIAS_FORCE) +
            h.by_omega * seen.PHt.middleRows<3>(OMEGA) + h.by_pivot * seen.PHt.middleRows<3>(PIVOT) +
            share * s.R_p;

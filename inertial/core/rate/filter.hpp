@@ -1,8 +1,9 @@
 // Products filter: its state by named segments, and the functions of one sample (E-30 to E-39).
-// numpy twin: inertial/rate/products_model.py, tests/inertial/twins/products.py.
+// numpy twin: inertial/rate/products_model.py, tests/support/rate_twin.py.
 #pragma once
 
 #include <limits>
+#include <utility>
 
 #include "common/rotation.hpp"
 #include "rate/sensor.hpp"
@@ -92,6 +93,28 @@ struct Likelihood {
   double density = 1.0;
 };
 
+// A B^T for few columns, the inner sum from term 0 on: product_transposed() in one pass over the rows.
+template <typename A, typename B>
+auto columns_by(const A& a, const B& b) {
+  constexpr int K = B::ColsAtCompileTime;
+  static_assert(A::ColsAtCompileTime == K);
+  Matrix<A::RowsAtCompileTime, B::RowsAtCompileTime> c;
+  for (Eigen::Index j = 0; j < c.cols(); ++j)
+    [&]<int... k>(std::integer_sequence<int, k...>) {
+      c.col(j) = (... + (a.col(k) * b(j, k)));
+    }(std::make_integer_sequence<int, K>());
+  return c;
+}
+
+// P -= G G^T, symmetric to the bit.
+template <int M>
+void take_out(Covariance& P, const Matrix<STATES, M>& G) {
+  for (int j = 0; j < STATES; ++j)
+    [&]<int... k>(std::integer_sequence<int, k...>) {
+      P.col(j) -= (... + (G.col(k) * G(j, k)));
+    }(std::make_integer_sequence<int, M>());
+}
+
 // A measurement with M components: P H^T, the innovation and its covariance C = H P H^T + R.
 template <int M>
 struct Seen {
@@ -114,8 +137,7 @@ Likelihood absorb(StateVector& x, Covariance& P, const Seen<M>& seen, double gat
     G.col(j) *= 1.0 / factor.L(j, j);
   }
   for (int k = 0; k < M; ++k) x += y(k) * G.col(k);
-  for (int j = 0; j < STATES; ++j)
-    for (int k = 0; k < M; ++k) P.col(j) -= G(j, k) * G.col(k);
+  take_out<M>(P, G);
   return told;
 }
 

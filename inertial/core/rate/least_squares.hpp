@@ -1,5 +1,5 @@
 // The paper's way: angular acceleration by least squares, Runge-Kutta to rate and angle (E-3 to E-8).
-// numpy twin: inertial/rate/least_squares.py, tests/inertial/twins/least_squares.py.
+// numpy twin: tests/inertial/test_least_squares.py.
 #pragma once
 
 #include "rate/row.hpp"

@@ -6,28 +6,6 @@ namespace {
 
 Vector3 cross(const Vector3& a, const Vector3& b) { return skew(a) * b; }
 
-// Quaternion of a direction cosine matrix, by its largest component, w >= 0.
-Quaternion from_matrix(const Matrix3& C) {
-  const double xx = C(0, 0), yy = C(1, 1), zz = C(2, 2);
-  const double wx = C(2, 1) - C(1, 2), wy = C(0, 2) - C(2, 0), wz = C(1, 0) - C(0, 1);
-  const double xy = C(0, 1) + C(1, 0), xz = C(0, 2) + C(2, 0), yz = C(1, 2) + C(2, 1);
-  const double w2 = 1.0 + xx + yy + zz, x2 = 1.0 + xx - yy - zz, y2 = 1.0 - xx + yy - zz, z2 = 1.0 - xx - yy + zz;
-  Quaternion q;
-  const double most = std::max({w2, x2, y2, z2});
-  if (most == w2) {
-    q = {w2, wx, wy, wz};
-  } else if (most == x2) {
-    q = {wx, x2, xy, xz};
-  } else if (most == y2) {
-    q = {wy, xy, y2, yz};
-  } else {
-    q = {wz, xz, yz, z2};
-  }
-  q = normalised(q);
-  if (q.w < 0.0) q = {-q.w, -q.x, -q.y, -q.z};
-  return q;
-}
-
 }  // namespace
 
 Quaternion level(const Vector3& up) {

@@ -13,10 +13,9 @@ Matrix<STATES, MOVED> moved_columns(const Covariance& P, const Transition& F) {
   Matrix<STATES, MOVED> G;
   const auto omega = P.middleCols<3>(OMEGA);
   const auto bias = P.middleCols<3>(BIAS_ALPHA);
-  G.leftCols<3>() = product_transposed(omega, F.A) - product_transposed(bias, F.D);
-  G.middleCols<3>(MOVED_LIFT) = product_transposed(P.middleCols<3>(LIFT), F.C) +
-                                product_transposed(omega, F.T) -
-                                product_transposed(bias, Matrix3(F.back * F.T));
+  G.leftCols<3>() = columns_by(omega, F.A) - columns_by(bias, F.D);
+  const Matrix<STATES, 3> middle = omega - F.back * bias;
+  G.middleCols<3>(MOVED_LIFT) = columns_by(P.middleCols<3>(LIFT), F.C) + columns_by(middle, F.T);
   G.col(MOVED_ANGLE) = P.col(ANGLE) + F.dt * P.col(OMEGA + 2) - F.dt * F.back * P.col(BIAS_ALPHA + 2);
   return G;
 }

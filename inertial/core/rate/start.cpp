@@ -208,11 +208,12 @@ double begin_turning(Start& likelier, Start& other, const Watch& w, const Sensor
   const Measurement mean = w.mean_of(n);
   const SymmetricEigen<Matrix3> eigen(outer(Products(mean.segment<6>(PRODUCTS_M))));
   const double size = std::max(eigen.values(2), LEAST);
+  const Vector3 direction = eigen.vectors.col(2);
   double evidence[2];
   for (const int k : {0, 1}) {
     Start& begun = k == 0 ? likelier : other;
     begin_still(begun.filter, s, t, mean);
-    begun.filter.x.segment<3>(OMEGA) = (k == 0 ? 1.0 : -1.0) * std::sqrt(size) * eigen.vectors.col(2);
+    begun.filter.x.segment<3>(OMEGA) = (k == 0 ? 1.0 : -1.0) * std::sqrt(size) * direction;
     if (n == FEWEST) begun.first = begun.filter.x;
     evidence[k] = fit(begun, w, s, t, n, mean, size);
   }

@@ -1,5 +1,5 @@
 // The first state of a products filter: of a body at rest, or of one that turns already (E-36, E-46).
-// numpy twin of the fit: tests/inertial/twins/start.py.
+// numpy twin of the fit: tests/support/rate_twin.py.
 #pragma once
 
 #include "rate/filter.hpp"

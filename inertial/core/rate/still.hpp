@@ -1,6 +1,6 @@
 // Zero-velocity detector: is the body still? Questions on the newest samples, with stated limits
 // (E-20 to E-25). What is asked, and why: inertial/rate/still.py; numpy twin:
-// tests/inertial/twins/still.py.
+// tests/support/still_twin.py.
 #pragma once
 
 #include "rate/sensor.hpp"

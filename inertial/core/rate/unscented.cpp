@@ -3,7 +3,7 @@
 // Symmetric set of 2 n + 1 points with weight 1 - n / spread in the middle; spread = 3 keeps the fourth
 // moment of a Gaussian. Only what the functions are not linear in needs points; the other components
 // are carried linearly, which gives the same numbers as points of all 22 (marginalised transform).
-// numpy twin: tests/inertial/twins/unscented.py.
+// numpy twin: tests/support/rate_twin.py.
 #include "rate/filter.hpp"
 
 namespace gyrofree::rate {
