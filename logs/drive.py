@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.attitude.rotation import to_dcm
+from inertial.earth import ned_between
 from inertial.navigation.batch import FilterRun, run_filters
-from inertial.navigation.earth import ned_between
 from inertial.navigation.filters import DEFAULT, FILTERS, UnknownFilter
 from inertial.navigation.fix import RTK_FIXED, Fix
 from inertial.navigation.navigation import NavigatorConfig
@@ -155,9 +155,10 @@ def of_filter(run: FilterRun) -> Result:
 
 def of_smoother(run: SmoothRun) -> Result:
     """A smoother's run in the common form."""
-    yaw = np.arctan2(run.x[:, 9], run.x[:, 6])
+    forward = run.x["C_nb"][:, :, 0]
+    yaw = np.arctan2(forward[:, 1], forward[:, 0])
     turn = np.interp(
-        run.t - run.x[:, 28], run.t, np.unwrap(yaw)
+        run.t - run.x["lag_velocity"], run.t, np.unwrap(yaw)
     )  # at the time of the receiver's velocity
     left = np.where(run.used[:, None], run.y[:, :6], np.nan)
     return Result(
@@ -261,8 +262,8 @@ def against_truth(result: Result, truth: DriveTruth) -> dict[str, Any]:
     if truth.q_nb is not None:
         psi = np.array(
             [
-                rotation_vector(to_dcm(truth.q_nb[k]) @ row[6:15].reshape(3, 3).T)
-                for k, row in zip(near, x, strict=True)
+                rotation_vector(to_dcm(truth.q_nb[k]) @ C_nb.T)
+                for k, C_nb in zip(near, x["C_nb"], strict=True)
             ]
         ).reshape(-1, 3)
         out["tilt_rms_rad"], out["heading_rms_rad"] = _rms(psi[:, :2]), _rms(psi[:, 2:])
@@ -270,13 +271,13 @@ def against_truth(result: Result, truth: DriveTruth) -> dict[str, Any]:
     if truth.v_n is not None:
         v = np.column_stack([np.interp(t, truth.t, column) for column in truth.v_n.T])
         out["velocity_h_rms_mps"], out["velocity_v_rms_mps"] = (
-            _rms((x[:, 3:6] - v)[:, :2]),
-            _rms((x[:, 3:6] - v)[:, 2:]),
+            _rms((x["v_n"] - v)[:, :2]),
+            _rms((x["v_n"] - v)[:, 2:]),
         )
-        parts, places = [*parts, x[:, 3:6] - v], [*places, 3, 4, 5]
+        parts, places = [*parts, x["v_n"] - v], [*places, 3, 4, 5]
     if truth.position is not None:
         p = np.column_stack([np.interp(t, truth.t, column) for column in truth.position.T])
-        d = np.array([ned_between(*a, *b[:3]) for a, b in zip(p, x, strict=True)]).reshape(
+        d = np.array([ned_between(a, (b["latitude"], b["longitude"], b["height"])) for a, b in zip(p, x, strict=True)]).reshape(
             -1, 3
         ) * (1.0, 1.0, -1.0)
         out["position_h_rms_m"], out["position_v_rms_m"] = _rms(d[:, :2]), _rms(d[:, 2:])

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from estimator.devices.navigation import NavBoard, NavOutput
 from estimator.devices.rate import RateOutput
 from estimator.stream import every
-from inertial.navigation.error_model import PSI, ImuNoise
+from inertial.elementary import product
+from inertial.navigation.error_model import ImuNoise
 from inertial.navigation.navigation import NAVIGATORS, NavigatorConfig
-from inertial.navigation.strapdown import C
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ def attitude_noise(P_omega: Array, C_nb: Array) -> Array:
     """Density (3,) of the attitude error's noise in n, rad^2/s, of a rate with covariance P_omega
     (3, 3), b (E-87).
     """
-    P_n = C_nb @ P_omega @ C_nb.T
+    P_n = product(product(C_nb, P_omega), C_nb.T)
     return NOISE.gyro**2 + 2.0 * CORRELATED * np.minimum(np.diag(P_n), LARGEST**2)
 
 
@@ -134,6 +134,6 @@ class GyroFreeNavigation:
     def _believe(self, P_omega: Array) -> None:
         """Let the filters' process noise be what the rate estimator says of itself now."""
         for navigator in self.board.navigators.values():
-            C_nb = navigator.x[C].reshape(3, 3)
-            if C_nb.any():  # it navigates
-                navigator.model.noise[PSI] = attitude_noise(P_omega, C_nb)
+            if navigator.navigating:
+                noise = attitude_noise(P_omega, navigator.nominal.C_nb)
+                navigator.believe_attitude_noise(noise)

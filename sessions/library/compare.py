@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from inertial.navigation.geodetic import ned_between
+from inertial.earth import ned_between
 from sessions.library.align import GOOD, Shift, correlate
 from sessions.library.curves import RATE, TACHO, Curves, Line, Track
 

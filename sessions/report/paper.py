@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.navigation.earth import gravity
+from inertial.earth import gravity
 from inertial.rate.field import cube_angular_acceleration, cube_specific_force
 from sessions.report.data import Accel, Rate, Run
 from sessions.report.segments import STEP, Segment, reference
