@@ -6,7 +6,7 @@ SI. Angles are in radians, so a rate is in rad/s.
 GRAVITY = 9.80665
 """m/s^2, standard acceleration of free fall (CGPM 1901). Sensors' data sheets mean it by g."""
 
-MILLI_G = 1e-3 * GRAVITY
+MILLI_G = 9.80665e-3
 """m/s^2, of one mg."""
 
 EARTH_RATE = 7.292115e-5

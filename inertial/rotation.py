@@ -192,12 +192,15 @@ def followed(q_nb: ArrayLike, turns_b: ArrayLike) -> Array:
 
 
 def _parts(v: ArrayLike) -> list[Array]:
-    return list(np.moveaxis(np.asarray(v, np.float64), -1, 0))
+    v = np.asarray(v, np.float64)
+    return list(v if v.ndim == 1 else np.moveaxis(v, -1, 0))
 
 
 def _rows(C: ArrayLike) -> list[list[Array]]:
-    return [_parts(row) for row in np.moveaxis(np.asarray(C, np.float64), -2, 0)]
+    C = np.asarray(C, np.float64)
+    return [_parts(row) for row in (C if C.ndim == 2 else np.moveaxis(C, -2, 0))]
 
 
 def _matrix(rows: list[list[Array]]) -> Array:
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    whole = np.array(rows)
+    return whole if whole.ndim == 2 else np.moveaxis(whole, (0, 1), (-2, -1))

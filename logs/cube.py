@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.settings import EstimatorSettings
-from inertial.attitude.rotation import from_rotation_vector, level, multiply
 from inertial.calibration.card import Card, read_card
 from inertial.layouts.catalogue import find
 from inertial.layouts.layout import GeometryError, Layout
@@ -23,6 +22,7 @@ from inertial.rate.bound import IN_USE, rate_bound
 from inertial.rate.estimators import ESTIMATORS, ProductsRate
 from inertial.rate.sight import ALL_BLIND
 from inertial.rate.tachometer import SUFFIX
+from inertial.rotation import followed, level
 from logs.cube_axes import examine
 from logs.cube_log import CubeLog, LogError, read_log
 
@@ -346,20 +346,17 @@ def _turned(data: CubeLog, shape: Layout, omega_b: Array) -> Array:
     turned.
     """
     n = max(1, round(0.1 / data.period_s))
-    q = np.empty((len(omega_b), 4))
-    q[0] = level(np.linalg.pinv(shape.theta_b) @ data.f_axis[:n].mean(axis=0))
-    for k in range(1, len(q)):
-        mean = 0.5 * (omega_b[k - 1] + omega_b[k])
-        q[k] = multiply(q[k - 1], from_rotation_vector((data.t_s[k] - data.t_s[k - 1]) * mean))
-    return q
+    first = level(np.linalg.pinv(shape.theta_b) @ data.f_axis[:n].mean(axis=0))
+    dt = np.diff(data.t_s[: len(omega_b)])
+    return followed(first, dt[:, None] * (0.5 * (omega_b[:-1] + omega_b[1:])))
 
 
 def _notes(data: CubeLog, truth: Reference, card: Card | None) -> list[str]:
     found = [
         (
-            f"calibration card {card.id}"
+            f"calibration file {card.id}"
             if card
-            else "no calibration card: nominal scale, positions and directions"
+            else "no calibration file: nominal scale, positions and directions"
         )
     ]
     if truth.name == "tachometer":

@@ -21,9 +21,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.constants import GRAVITY
+
 Array = NDArray[np.float64]
 
-GRAVITY = 9.80665  # m/s^2, standard
 LSB_MG = 3.9  # mg per count, ADXL345 in full resolution
 AXIS = re.compile(r"a\d{1,2}_(counts|mps2)")  # a column of an accelerometer axis
 TRUE_RATE = ("true_wx", "true_wy", "true_wz")

@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.csv
 from numpy.typing import NDArray
 
+from inertial.constants import GRAVITY, MILLI_G
 from inertial.navigation.fix import (
     AUTONOMOUS,
     DIFFERENTIAL,
@@ -35,8 +36,8 @@ UNITS = {
     "us": 1e-6,
     "ns": 1e-9,
     "mps2": 1.0,
-    "g": 9.80665,
-    "mg": 9.80665e-3,
+    "g": GRAVITY,
+    "mg": MILLI_G,
     "radps": 1.0,
     "degps": math.pi / 180.0,
     "dps": math.pi / 180.0,

@@ -10,6 +10,7 @@ import numpy as np
 
 from inertial.earth import ned_between
 from inertial.navigation.filters import DEFAULT
+from inertial.navigation.results import place_of
 
 if TYPE_CHECKING:
     from logs.drive import Result
@@ -54,16 +55,13 @@ def draw(
     plt.close(figure)
 
 
-PLACE = ("latitude", "longitude", "height")
-
-
 def _way(ax: Any, log: "DriveLog", lead: "Result") -> None:
     first = log.fixes[0]
     origin = first.latitude, first.longitude, first.height
-    fixes = np.array([ned_between(origin, (f.latitude, f.longitude, f.height)) for f in log.fixes])
-    way = np.column_stack(ned_between(origin, tuple(lead.x[k] for k in PLACE)))
-    ax.plot(fixes[:, 1], fixes[:, 0], ".", ms=2, color="#E69F00", label="fixes")
-    ax.plot(way[:, 1], way[:, 0], lw=1.2, color=COLOURS[0], label="solution")
+    places = np.array([(f.latitude, f.longitude, f.height) for f in log.fixes])
+    fixes, way = ned_between(origin, places.T), ned_between(origin, place_of(lead.x))
+    ax.plot(fixes[1], fixes[0], ".", ms=2, color="#E69F00", label="fixes")
+    ax.plot(way[1], way[0], lw=1.2, color=COLOURS[0], label="solution")
     ax.set_aspect("equal", adjustable="datalim")
     ax.set(xlabel="east, m", ylabel="north, m", title="the way")
     ax.legend()

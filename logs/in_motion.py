@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.constants import GRAVITY
+from inertial.earth import radii
 from inertial.navigation import results
 from inertial.navigation.alignment import Alignment, AlignmentSettings, Start
 from inertial.navigation.error_model import ImuNoise
@@ -22,7 +24,6 @@ from inertial.navigation.fix import Fix, FixSettings, core_fix
 from inertial.navigation.navigation import NavigatorConfig, first_leg
 from inertial.rotation import euler_matrix, rotation_vector
 from inertial.simulation.drive import Tuning
-from inertial.simulation.drive_path import radii
 
 Array = NDArray[np.float64]
 
@@ -126,7 +127,7 @@ def align(inputs: Inputs) -> Begin:
             alignment.fix(fix.t, fix.v_n, fix.sigma_v)
             start = alignment.start(alignment.C, fix.v_n)
             if start is not None:
-                still = float(np.linalg.norm(alignment.mean_f)) if alignment.levelled else 9.80665
+                still = float(np.linalg.norm(alignment.mean_f)) if alignment.levelled else GRAVITY
                 return Begin(start, k, i + 1, still)
             k += 1
     raise ValueError(f"this drive never became fit for navigation: {alignment.text}")

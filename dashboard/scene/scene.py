@@ -44,6 +44,7 @@ from dashboard.scene.drawing.palette import (
     rgb,
     truth_colour,
 )
+from inertial.rotation import rotate
 
 ARROW_PER_RADPS = 0.55  # half sides per rad/s; 180 deg/s gives 1.7
 ARROW_LONGEST = 2.2
@@ -278,7 +279,7 @@ class SceneView:
             if index == 0 and p is not None:
                 self._set("/world/ground", p=(0.0, 0.0, round(p[2], 1) + bodies.GROUND_BELOW))
                 if self._choice.follow:
-                    shift = -geo.rotate(np.array(geo.Q_DISPLAY_N), np.array(p))
+                    shift = -rotate(geo.Q_DISPLAY_N, p)
                     self._set("/world", p=tuple(float(v) for v in shift))
 
     def _layers(self):

@@ -52,3 +52,8 @@ def run(
     The core's structs leg and memory change in place.
     """
     return core.run(leg, model, settings, memory, imu, start, stop, fixes).view(RESULT)
+
+
+def place_of(x: Table) -> tuple[NDArray[np.float64], ...]:
+    """Latitude and longitude (rad) and height (m), (k,) each, of nominal states (k,)."""
+    return x["latitude"], x["longitude"], x["height"]

@@ -70,7 +70,7 @@ def test_buttons_follow_the_state_and_are_named_to_the_proxy(free_port):
     server, store = viser.ViserServer(host="127.0.0.1", port=free_port, verbose=False), Store()
     try:
         page = Calibration(server, server.gui.add_folder("x"))
-        assert len(page.uuids) == 4
+        assert len(page.orders) == 4
 
         def shown(state, poses=0):
             status_at(store, state, poses)

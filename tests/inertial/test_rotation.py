@@ -1,4 +1,4 @@
-"""Laws of rotations at identity, near it and at random; tilt from gravity; both twins, bit for bit."""
+"""Laws of rotations at identity, near it and at random; tilt from gravity; both twins agree."""
 
 import numpy as np
 import pytest

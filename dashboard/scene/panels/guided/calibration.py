@@ -8,9 +8,9 @@ import viser
 from dashboard.scene.drawing.palette import AXES, GREEN, escape, number, rgba, rows
 from dashboard.scene.panels.base import Snapshot
 from dashboard.scene.panels.guided.guided import Guided, guidance, head, silent
+from inertial.constants import MILLI_G
 from messages.contract import gyrofree_pb2 as pb
 
-MG = 1e3 / 9.80665  # mg per m/s^2
 CAMERA = np.array([0.80, -0.52, 0.50])  # where the picture is seen from, in the frame whose z is up
 ACTION = pb.EstimatorCommand
 STATE = pb.CalibrationStatus
@@ -83,9 +83,9 @@ def content(m: pb.CalibrationStatus, gone: bool, dark: bool, card: str) -> str:
         return f'<p class="gf-note">{text}</p>' + rows(items)
     if m.bias_sigma_mps2:
         items += [
-            ("bias known to", number(max(m.bias_sigma_mps2) * MG, 2, "mg")),
+            ("bias known to", number(max(m.bias_sigma_mps2) / MILLI_G, 2, "mg")),
             ("scale known to", number(max(m.scale_sigma) * 100, 3, "%")),
-            ("residual of the fit", number(m.residual_mps2 * MG, 2, "mg")),
+            ("residual of the fit", number(m.residual_mps2 / MILLI_G, 2, "mg")),
         ]
     if m.card:
         items.append(("saved as", escape(m.card)))

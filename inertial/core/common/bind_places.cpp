@@ -4,7 +4,7 @@
 
 namespace gyrofree {
 
-void bind_earth(nb::module_& m) {
+void bind_places(nb::module_& m) {
   nb::module_ e = m.def_submodule("earth", "One place at a time; arrays of them: inertial.earth.");
   e.def("radii",
         [](double latitude) {
