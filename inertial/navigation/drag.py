@@ -139,9 +139,7 @@ class DragWatch:
             [walk * dt + bend + np.abs(wander - before), walk * dt / s.memory**2]
         )
         walked = self._walk + 0.5 * (fix.v_n + last.v_n) * UP * dt
-        north, east, down = ned_between(
-            self._origin, (fix.latitude, fix.longitude, fix.height)
-        )
+        north, east, down = ned_between(self._origin, (fix.latitude, fix.longitude, fix.height))
         y = np.array([north, east, -down]) - walked
         white = (s.white * fix.sigma_p) ** 2
         if not self._filter.look(dt, noise, y, fix.v_n * UP - self._v0, white, self._jump):

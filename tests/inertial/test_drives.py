@@ -41,7 +41,9 @@ def test_the_filters_mechanisation_follows_the_truth(seed):
         x = step(x, truth.f_b[k], truth.omega_ib_b[k], 1.0 / RATE)
     north = x.latitude - truth.latitude[-1]
     east = (x.longitude - truth.longitude[-1]) * np.cos(x.latitude)
-    assert max(abs(north), abs(east)) * 6.37e6 < 1.0  # after 300 s; 1e-5 m/s^2 of difference would give 0.45 m
+    assert (
+        max(abs(north), abs(east)) * 6.37e6 < 1.0
+    )  # after 300 s; 1e-5 m/s^2 of difference would give 0.45 m
     assert abs(x.height - truth.height[-1]) < 0.05
     np.testing.assert_allclose(x.v_n, truth.v_n[-1], atol=0.01)
     np.testing.assert_allclose(x.C_nb, truth.C_nb[-1], atol=1e-5)

@@ -57,7 +57,9 @@ def truth_ned(x: State, origin: tuple[float, float, float]) -> Array:
     return np.array(ned_between(origin, (x.latitude, x.longitude, x.height)))
 
 
-def test_fixes_between_samples_are_used_at_their_instant(perfect: tuple[list[State], Array]) -> None:
+def test_fixes_between_samples_are_used_at_their_instant(
+    perfect: tuple[list[State], Array],
+) -> None:
     truth, imu = perfect
     navigator = Navigator()
     play(navigator, imu[: int(60 / DT)], [f for f in drive(truth, imu).fixes if f.t < 58.0])
@@ -157,9 +159,7 @@ def test_nees_keeps_its_band() -> None:
         play(navigator, noisy, fixes)
         x = navigator.nominal
         psi = rotation_vector(end.C_nb @ x.C_nb.T)
-        error = np.concatenate(
-            [psi, x.v_n - end.v_n, truth_ned(x, end.place) * (1, 1, -1)]
-        )
+        error = np.concatenate([psi, x.v_n - end.v_n, truth_ned(x, end.place) * (1, 1, -1)])
         P = navigator.covariance()[:9, :9]
         nees.append(error @ np.linalg.solve(P, error))
     assert 5.2 < np.mean(nees) < 13.8  # 99.9 % of chi-square with 90 degrees of freedom, over 10

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.estimator_drive import exact
-from tests.inertial.test_ins import run
-from tests.inertial.twins import filter as twin
 
 from inertial.core import navigation as core
 from inertial.navigation import fuzzy
 from inertial.navigation.error_model import ImuNoise, make_model
 from inertial.navigation.filters import FILTERS, Constraints
+from tests.inertial.test_ins import run
+from tests.inertial.twins import filter as twin
 
 NOISE = ImuNoise(shake=0.0)
 
