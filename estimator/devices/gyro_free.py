@@ -33,7 +33,9 @@ NOISE = ImuNoise(
     sigma_bias_gyro=math.radians(6.0),
     tau=10.0,
     shake=0.0,
-)  # of the estimates, not of the readings; 0.5 % of scale error under 1 g is such a rate error in a cube of 10 cm
+)
+# of the estimates, not of the readings; 0.5 % of scale error under 1 g is such a rate error in a
+# cube of 10 cm
 CORRELATED = 1.0  # s, for how long the error that a covariance tells of is one and the same
 LARGEST = math.radians(60.0)  # rad/s; a rate that is less certain than that is not known at all
 SIGMA_RATE = math.radians(6.0)  # rad/s, of the rate's error when navigation begins

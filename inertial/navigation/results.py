@@ -1,4 +1,4 @@
-"""What the compiled filters say of fixes: tables whose columns are the fields of the core's structs."""
+"""What the core's filters say of fixes: tables whose columns are the fields of its structs."""
 
 from typing import Any
 

@@ -23,8 +23,8 @@ HEIGHT_UP = np.array([1.0, 1.0, -1.0])  # the error state counts height up
 
 
 class Startup:
-    """Alignment, fed with every sample, and asked at every fix. `history` keeps the samples, because
-    a fix is about a moment that has passed.
+    """Alignment, fed with every sample and asked at every fix. `history` keeps the samples,
+    because a fix is about a moment that has passed.
     """
 
     def __init__(self, settings: AlignmentSettings, history: Any) -> None:
