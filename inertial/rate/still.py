@@ -33,7 +33,7 @@ DEPTH = 128  # samples that the detector remembers
 
 @dataclass(frozen=True)
 class Config:
-    """Limits of the still detector; false alarms by chance at 100 Hz as measured by
+    """Limits of the zero-velocity detector; false alarms by chance at 100 Hz as measured by
     tests/bench/bench_rate.py.
     """
 
@@ -73,13 +73,13 @@ def limits(config: Config) -> native.RateStillLimits:
     """
     if not 2 <= config.short_window <= config.window <= config.guard < DEPTH:
         raise ValueError(
-            f"still detector: windows {config.short_window} <= {config.window} <= {config.guard} <"
-            f" {DEPTH}"
+            f"zero-velocity detector: windows {config.short_window} <= {config.window} <="
+            f" {config.guard} < {DEPTH}"
         )
     if not 1 <= config.brief_span <= config.steady_span < 2 * DEPTH - config.window:
         raise ValueError(
-            f"still detector: spans {config.brief_span} <= {config.steady_span} < {2 * DEPTH} -"
-            f" {config.window}"
+            f"zero-velocity detector: spans {config.brief_span} <= {config.steady_span} <"
+            f" {2 * DEPTH} - {config.window}"
         )
     out = native.RateStillLimits()
     for one in fields(Config):

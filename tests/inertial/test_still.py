@@ -1,4 +1,4 @@
-"""The still detector on simulated standstill and turning."""
+"""The zero-velocity detector on simulated standstill and turning."""
 
 import numpy as np
 import pytest
