@@ -3,6 +3,7 @@
 # make test   everything it needs, then all tests
 # make firmware  the board's image and map into build/firmware, with its size
 # make fuzz   libFuzzer on the board's decoder and commands (SECONDS=60)
+# make wheel  dist/gyrofree-*.whl, which installs and runs where there is no compiler
 # make bench  the figures of README and docs, one JSON line each
 PYTHON ?= python3
 SOURCE ?= table
@@ -12,15 +13,20 @@ BUS_PORT ?= 7447
 SECONDS ?= 60
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
+# The lists name every package with its hash, also those that others ask for.
+INSTALL := $(PIP) install --quiet --no-deps --require-hashes
 DRIVE := $(if $(DATA),--data "$(DATA)")
 
-.PHONY: demo test setup dev system-packages bench docs messages lint firmware fuzz compose-test clean
+.PHONY: demo test setup wheel dev system-packages bench docs messages lint firmware fuzz compose-test clean
 
 # BOARD=emulated: the table is sensed by the firmware image in the emulator
 demo: setup $(if $(filter emulated,$(BOARD)),.make/board firmware)
 	@$(BIN)/gyrofree demo --source $(if $(filter emulated,$(BOARD)),emulated,$(SOURCE)) $(DRIVE) --speed $(SPEED) --port $(PORT) --bus-port $(BUS_PORT)
 
-setup: .make/warm
+# Packages come while the core compiles; neither needs the other.
+setup: .make/tools
+	@$(MAKE) --no-print-directory --output-sync -j2 .make/runtime .make/core
+	@$(MAKE) --no-print-directory .make/warm
 
 .make/venv:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed; this is $$($(PYTHON) --version). Name another: make PYTHON=python3.12"; exit 1; }
@@ -28,24 +34,42 @@ setup: .make/warm
 	$(PYTHON) -m venv .venv
 	@mkdir -p .make && touch $@
 
-.make/runtime: requirements/runtime.txt requirements/build.txt pyproject.toml | .make/venv
-	@echo "Installing packages, each checked against its hash ..."
-	$(PIP) install --require-hashes -r requirements/build.txt -r requirements/runtime.txt
-	$(PIP) install --quiet --no-deps --no-build-isolation --editable .
+.make/tools: requirements/build.txt requirements/compiler.txt requirements/native.sh | .make/venv
+	$(INSTALL) -r requirements/build.txt
+	@sh requirements/native.sh
 	@touch $@
 
-.make/warm: .make/runtime $(wildcard inertial/*.py inertial/*/*.py estimator/*.py)
+.make/runtime: requirements/runtime.txt .make/tools
+	@echo "Installing packages, each checked against its hash ..."
+	$(INSTALL) -r requirements/runtime.txt
+	@touch $@
+
+# The package itself, editable, with its compiled core.
+CORE := $(wildcard inertial/core/*.c* inertial/core/CMakeLists.txt inertial/core/*/*.?pp)
+.make/core: pyproject.toml $(CORE) .make/tools
+	@echo "Compiling the core ..."
+	CXX="$$(cat .make/compiler)" $(PIP) install --quiet --no-deps --no-build-isolation \
+		--config-settings=cmake.define.Python_INCLUDE_DIR="$$(cat .make/headers)" --editable .
+	@touch $@
+
+.make/warm: .make/runtime .make/core $(wildcard inertial/*.py inertial/*/*.py estimator/*.py)
 	@echo "Compiling the filters once, for the cache ..."
 	@$(BIN)/python -m estimator.warm
 	@touch $@
 
+# A wheel in dist/ that needs no compiler where it is installed.
+wheel: .make/tools
+	CXX="$$(cat .make/compiler)" $(PIP) wheel --quiet --no-deps --no-build-isolation \
+		--config-settings=cmake.define.Python_INCLUDE_DIR="$$(cat .make/headers)" --wheel-dir dist .
+	@ls dist/*.whl
+
 .make/board: requirements/board.txt .make/runtime
-	$(PIP) install --require-hashes -r requirements/board.txt
+	$(INSTALL) -r requirements/board.txt
 	@touch $@
 
 dev: .make/dev
 .make/dev: requirements/dev.txt .make/runtime
-	$(PIP) install --require-hashes -r requirements/dev.txt
+	$(INSTALL) -r requirements/dev.txt
 	@touch $@
 
 system-packages:

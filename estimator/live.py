@@ -17,11 +17,8 @@ import queue
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-from google.protobuf.message import DecodeError
 
 import inertial
 from estimator import convert
@@ -29,6 +26,7 @@ from estimator.service import Output, Pipeline
 from estimator.settings import EstimatorSettings
 from estimator.stream import worth_a_line
 from estimator.warm import warm
+from messages.bus import orders
 from messages.bus.session import BusSettings, BusUnavailable, Publishers, decode, open_client
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ESTIMATES, PIPELINE_INPUTS, REPLAY_SUFFIX, TopicError, parse
@@ -45,15 +43,9 @@ SAVE_S = 2.0
 RESUME_S = 600.0  # an older state is of another measurement
 END_S = 3.0  # for what is queued when the service is to end
 STATE = "state.pickle"
-CONTROL = "estimator-control"
 
 
-@dataclass(frozen=True)
-class Order:
-    """A person's order, and where the answer goes."""
-
-    command: pb.EstimatorCommand
-    answer: Callable[[pb.Reply], None]
+Order = orders.Order[pb.EstimatorCommand, pb.Reply]
 
 
 class Worker:
@@ -94,9 +86,10 @@ class Worker:
         """Called on the asker's thread: what a gateway kept."""
         self._queue.put((question, reply))
 
-    def order(self, command: pb.EstimatorCommand, answer: Callable[[pb.Reply], None]) -> None:
+    def take_order(self, order: Order) -> None:
         """Called on the bus's thread: what a person asks for, done between two samples."""
-        self._queue.put(Order(command, answer))
+        order.command.device = order.device
+        self._queue.put(order)
 
     def finish(self) -> None:
         """Ask the worker to end after what is queued now."""
@@ -108,7 +101,7 @@ class Worker:
         """
         try:
             while (item := self._queue.get()) is not None:
-                if isinstance(item, Order):
+                if isinstance(item, orders.Order):
                     reply, outputs = self.pipeline.order(item.command)
                     for output in outputs:
                         self._put(output)
@@ -229,8 +222,7 @@ def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) ->
         # One subscriber for all topics: each has a thread of its own, and a fix must not overtake
         # its samples.
         subscriber = session.declare_subscriber(f"{bus.prefix}/*/*", _on(worker))
-        key = f"{bus.prefix}/*/{CONTROL}"
-        orders = session.declare_queryable(key, lambda query: take_order(query, worker))
+        control = orders.take(session, bus.prefix, orders.ESTIMATOR, worker.take_order, "*")
         log.info(
             "estimating: rate %s; navigation %s",
             ", ".join(settings.rate),
@@ -238,7 +230,7 @@ def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) ->
         )
         stop.wait()
         subscriber.undeclare()
-        orders.undeclare()
+        control.undeclare()
         worker.finish()
         thread.join(timeout=END_S)
         behind = (
@@ -306,23 +298,6 @@ def _version() -> str:
     for path in sorted(p for room in rooms for p in room.rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
-
-
-def take_order(query: Any, worker: Worker) -> None:
-    """An EstimatorCommand on <prefix>/<device>/estimator-control; the Reply follows when it has
-    been done.
-    """
-    command, key = pb.EstimatorCommand(), str(query.key_expr)
-    try:
-        command.ParseFromString(query.payload.to_bytes() if query.payload else b"")
-    except DecodeError as error:
-        query.reply_err(f"{CONTROL}: {error}; want an EstimatorCommand".encode())
-        return
-    command.device = key.split("/")[1]
-    if "*" in key:
-        query.reply_err(f"{CONTROL}: an order is for one device, not for {command.device}".encode())
-        return
-    worker.order(command, lambda reply: query.reply(key, reply.SerializeToString()))
 
 
 def _on(worker: Worker) -> Callable[[Any], None]:

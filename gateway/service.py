@@ -8,18 +8,19 @@ begins when the router comes and the name on the bus is ours (gateway/ports/iden
 import json
 import logging
 import threading
+from collections.abc import Callable
 from concurrent.futures import Future
 
 import zenoh
-from google.protobuf.message import DecodeError
 
 from gateway.board.device import DeviceLink
 from gateway.ports.identity import claim
 from gateway.ports.keeper import Keeper
 from gateway.settings import DeviceSettings, GatewaySettings
+from messages.bus import orders
 from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import GATEWAY, control_key, history_key
+from messages.contract.topics import GATEWAY, history_key
 from messages.history.answers import declare
 from messages.history.journal import Journal, JournalBusy
 
@@ -191,16 +192,13 @@ def _publish(
     try:
         if mine is not None:
             link = mine.link
-            key, control = (
-                history_key(prefix, device.name),
-                control_key(prefix, device.name, "board-control"),
-            )
+            key = history_key(prefix, device.name)
             queryables = [
                 session.declare_queryable(
                     key, lambda query: answer_history(query, key, link.journal)
                 ),
                 declare(session, prefix, device.name, GATEWAY, link.spool),
-                session.declare_queryable(control, lambda query: take_order(query, control, link)),
+                orders.take(session, prefix, orders.BOARD, take_order_of(link), device.name),
             ]
             mine.publishers.attach(session)
         stop.wait()
@@ -212,16 +210,13 @@ def _publish(
         token.undeclare()
 
 
-def take_order(query: zenoh.Query, key: str, link: DeviceLink) -> None:
-    """A BoardCommand for the board; the Reply follows its ACK, or says why there was none."""
-    command = pb.BoardCommand()
-    try:
-        command.ParseFromString(query.payload.to_bytes() if query.payload else b"")
-    except DecodeError as error:
-        query.reply_err(f"board-control: {error}; want a BoardCommand")
-        return
-    answer = link.order(command)
-    answer.add_done_callback(lambda done: query.reply(key, done.result().SerializeToString()))
+def take_order_of(link: DeviceLink) -> Callable[[orders.Order[pb.BoardCommand, pb.Reply]], None]:
+    """Orders go to the board; the answer follows its ACK, or says why there was none."""
+
+    def take_order(order: orders.Order[pb.BoardCommand, pb.Reply]) -> None:
+        link.order(order.command).add_done_callback(lambda done: order.answer(done.result()))
+
+    return take_order
 
 
 def answer_history(query: zenoh.Query, key: str, journal: Journal) -> None:

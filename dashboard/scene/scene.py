@@ -4,19 +4,26 @@ Names of the nodes, which tests and other tools may rely on. Below /world everyt
 (north, east, down): a node's quaternion (w, x, y, z) is the q_nb of the message and its position is
 in metres (the cube: half sides).
 
-    /world                              n turned into the z-up display frame; moved against the
-    vehicle when following /world/truth                        body frame of what is really the
-    case; simulated devices only /world/truth/edges /world/estimate/<estimator>/body    body frame
-    of one estimator (rate/<estimator> or nav/<estimator>)
-    /world/estimate/<estimator>/body/{edges,faces,axes,label}      axes: the twelve sensors, on the
-    main estimator only /world/estimate/<estimator>/body/rate, .../rate_label          arrow of
-    omega_ib_b, on the main estimator only /world/estimate/<estimator>/trajectory/<piece>
-    vehicles /world/estimate/<estimator>/ellipsoid                          3-sigma position, at the
-    body (a board that only tilts: attitude/<estimator>, all with the heading of the truth or of the
-    first) /world/table                        the table below the cube, turning with the truth,
-    else with the main estimate /world/fixes/<piece>                GNSS fixes
-    /world/fixes/rejected/<piece>       those of them that the main estimator did not believe
-    /world/ground                       grid
+    /world                                          n turned into the z-up display frame; moved
+                                                    against the vehicle when following
+    /world/truth                                    body frame of what is really the case;
+                                                    simulated devices only
+    /world/truth/edges
+    /world/estimate/<estimator>/body                body frame of one estimator
+    /world/estimate/<estimator>/body/{edges,faces,label}
+    /world/estimate/<estimator>/body/axes           the twelve sensors; main estimator only
+    /world/estimate/<estimator>/body/rate           arrow of omega_ib_b; main estimator only
+    /world/estimate/<estimator>/body/rate_label
+    /world/estimate/<estimator>/trajectory/<piece>  vehicles
+    /world/estimate/<estimator>/ellipsoid           3-sigma position, at the body
+    /world/table                                    below the cube, turning with the truth, else
+                                                    with the main estimate
+    /world/fixes/<piece>                            GNSS fixes
+    /world/fixes/rejected/<piece>                   those that the main estimator did not believe
+    /world/ground                                   grid
+
+An estimator is one of rate/, of nav/ for a vehicle, or of attitude/ for a board that only tilts:
+those all have the heading of the truth or of the first.
 """
 
 from dataclasses import dataclass, field
@@ -24,11 +31,19 @@ from dataclasses import dataclass, field
 import numpy as np
 import viser
 
-from dashboard.scene import bodies, camera
-from dashboard.scene import geometry as geo
-from dashboard.scene.axis_arrows import AxisArrows
-from dashboard.scene.palette import FIX, REJECTED, estimator_colour, number, rgb, truth_colour
-from dashboard.scene.store import Device
+from dashboard.scene.data.device import Device
+from dashboard.scene.data.track import Track
+from dashboard.scene.drawing import bodies, camera
+from dashboard.scene.drawing import geometry as geo
+from dashboard.scene.drawing.axis_arrows import AxisArrows
+from dashboard.scene.drawing.palette import (
+    FIX,
+    REJECTED,
+    estimator_colour,
+    number,
+    rgb,
+    truth_colour,
+)
 
 ARROW_PER_RADPS = 0.55  # half sides per rad/s; 180 deg/s gives 1.7
 ARROW_LONGEST = 2.2
@@ -128,7 +143,6 @@ class SceneView:
                 self._track(f"/world/estimate/{estimator}/trajectory", track, colour)
 
     # --- building
-    # -------------------------------------------------------------------------------------------------
 
     def _lights(self) -> None:
         """Our own lights: the default ones are so strong that colours turn to white."""
@@ -177,7 +191,6 @@ class SceneView:
             )
 
     # --- updating
-    # -------------------------------------------------------------------------------------------------
 
     def _set(self, path: str, *, q=None, p=None) -> None:
         """Send a pose when it changed."""
@@ -283,7 +296,7 @@ class SceneView:
                 yield node, _TAILS[tail]
 
     def _track(
-        self, base: str, track: geo.Track, colour: tuple[int, int, int], point_size: float = 0.0
+        self, base: str, track: Track, colour: tuple[int, int, int], point_size: float = 0.0
     ) -> None:
         """Bring a track to the browser, as points of that size in m, or as a line when there is no
         size.

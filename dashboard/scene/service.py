@@ -15,8 +15,8 @@ from typing import Protocol
 import viser
 from viser._messages import ShareUrlDisconnect, ShareUrlRequest
 
-from dashboard.scene.feed import Feed
-from dashboard.scene.store import Store
+from dashboard.scene.data.feed import Feed
+from dashboard.scene.data.store import Store
 from dashboard.scene.style import LEFT_WIDTH, css
 from dashboard.scene.view import View
 from messages.bus.session import BusSettings

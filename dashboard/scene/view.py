@@ -8,10 +8,11 @@ from collections.abc import Callable
 
 import viser
 
-from dashboard.scene.feed import Feed
+from dashboard.scene.data.device import Device
+from dashboard.scene.data.feed import Feed
+from dashboard.scene.data.store import Store
 from dashboard.scene.panels import PAGES, Devices, Position, Record, Snapshot, Tilt, Timeline
 from dashboard.scene.scene import LAYERS, Choice, SceneView
-from dashboard.scene.store import Device, Store
 from messages.contract import gyrofree_pb2 as pb
 
 WINDOWS = {"10 s": 10.0, "30 s": 30.0, "60 s": 60.0, "5 min": 300.0, "10 min": 600.0}
@@ -62,7 +63,6 @@ class View:
         return frozenset(self._client.gui._gui_input_handle_from_uuid) - orders
 
     # --- ticks
-    # ----------------------------------------------------------------------------------------------------
 
     def tick_scene(self) -> None:
         """Poses, and less often trajectories."""
@@ -107,7 +107,6 @@ class View:
             self._pages[self._page].update(snapshot)
 
     # --- building
-    # -------------------------------------------------------------------------------------------------
 
     def _build_left(self, on_record: Callable) -> None:
         gui = self._client.gui
@@ -181,7 +180,6 @@ class View:
             turn.on_trigger(lambda _, index=index: self._choose_page(index))
 
     # --- what the person does
-    # -------------------------------------------------------------------------------------
 
     def _theme(self) -> None:
         self._client.gui.configure_theme(

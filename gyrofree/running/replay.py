@@ -7,21 +7,13 @@ import json
 import threading
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from google.protobuf.message import DecodeError
 from rich.console import Console
 from rich.table import Table
 
 from gyrofree.commands.options import show_table
 from gyrofree.config import Settings
-from messages.contract import gyrofree_pb2 as pb
 from sessions.library.catalogue import Catalogue
-
-if TYPE_CHECKING:
-    import zenoh
-
-    from sessions.replay.playback import Playback
 
 
 def find(settings: Settings, session: str) -> Path:
@@ -102,8 +94,9 @@ class Options:
 def run(settings: Settings, path: Path, options: Options, stop: threading.Event) -> None:
     """Play a recording on the bus and obey the orders on <prefix>/replay/control."""
     from estimator.service import Pipeline
+    from messages.bus import orders
     from messages.bus.session import Publishers, open_client
-    from messages.contract.topics import REPLAY, replay_control_key
+    from messages.contract.topics import REPLAY
     from sessions.replay.playback import Playback
     from sessions.replay.replay import DRAIN_S, Outlet
 
@@ -125,25 +118,16 @@ def run(settings: Settings, path: Path, options: Options, stop: threading.Event)
             paused=options.paused,
             show_recorded=options.overlay,
         )
-        key = replay_control_key(settings.bus.prefix)
-        orders = session.declare_queryable(key, lambda query: _order(playback, key, query))
+        control = orders.take(
+            session,
+            settings.bus.prefix,
+            orders.REPLAY,
+            lambda order: playback.order(order.command, order.answer),
+        )
         try:
             playback.run(
                 stop, lambda status: publishers.put(REPLAY, REPLAY.name, status), options.stay
             )
             stop.wait(DRAIN_S)
         finally:
-            orders.undeclare()
-
-
-def _order(playback: "Playback", key: str, query: "zenoh.Query") -> None:
-    """A query on the control key: a ReplayCommand in, a ReplayStatus out when it has been carried
-    out.
-    """
-    command = pb.ReplayCommand()
-    try:
-        command.ParseFromString(query.payload.to_bytes() if query.payload is not None else b"")
-    except DecodeError:
-        query.reply_err(b"the payload is no ReplayCommand")
-        return
-    playback.order(command, lambda status: query.reply(key, status.SerializeToString()))
+            control.undeclare()

@@ -15,3 +15,5 @@ else:
 
 BUILD = native.__name__.rpartition("_")[2]
 """Which build was taken: "plain" or "v3"."""
+VERSION: str = native.VERSION
+"""Digest of the sources it was built from: equal digests give equal bits."""

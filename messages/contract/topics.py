@@ -188,9 +188,11 @@ def published_key(prefix: str, device: str, source: str) -> str:
 
 def control_key(prefix: str, device: str, what: str) -> str:
     """Key of a queryable for orders to one device: what is "board-control" (BoardCommand in, Reply
-    out) or alike.
+    out) or alike; device `*` stands for any.
     """
-    return f"{check_name(prefix)}/{check_name(device)}/{check_name(what)}"
+    if device != "*":
+        check_name(device)
+    return f"{check_name(prefix)}/{device}/{check_name(what)}"
 
 
 def replay_control_key(prefix: str) -> str:

@@ -2,8 +2,7 @@
 disk has taken.
 
 Zenoh's thread only appends to a deque; one thread writes, the store's own thread syncs. Orders come
-as queries on messages.topics.recorder_control_key: a RecorderCommand as payload, a RecorderStatus
-as reply.
+over the bus (messages/bus/orders.py): a RecorderCommand in, a RecorderStatus out.
 """
 
 import logging
@@ -14,11 +13,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import zenoh
-from google.protobuf.message import DecodeError
 
+from messages.bus import orders
 from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import RECORDER, STATUS, recorder_control_key
+from messages.contract.topics import RECORDER, STATUS
 from messages.history.answers import Asker
 from messages.history.mending import Question
 from sessions.library.catalogue import Catalogue
@@ -38,9 +37,11 @@ RESUME_S = 600.0  # a session that was cut off within this time is gone on with
 RESUME_BYTES = 256 * 1024**2  # larger ones are recovered beside the recording, and not gone on with
 RETRY_S = 5.0  # an automatic start that the disk refused is tried again after this
 
+Order = orders.Order[pb.RecorderCommand, pb.RecorderStatus]
+
 
 class Recorder:
-    """The recorder without its loop: `on_sample` and `on_query` are for Zenoh's threads, the rest
+    """The recorder without its loop: `on_sample` and `on_order` are for Zenoh's threads, the rest
     for one thread.
     """
 
@@ -59,7 +60,7 @@ class Recorder:
         self.wake = threading.Event()
         self._configuration = configuration
         self._inbox: deque[tuple[int, str, bytes]] = deque()
-        self._orders: deque[zenoh.Query] = deque()
+        self._orders: deque[Order] = deque()
         self._ask = ask
         self._fresh = True
         self._intake = Intake(bus.prefix, None, 0)
@@ -80,9 +81,9 @@ class Recorder:
             return
         self._inbox.append((time.time_ns(), str(sample.key_expr), sample.payload.to_bytes()))
 
-    def on_query(self, query: zenoh.Query) -> None:
+    def on_order(self, order: Order) -> None:
         """Zenoh's thread: keep the order for the loop."""
-        self._orders.append(query)
+        self._orders.append(order)
         self.wake.set()
 
     def on_answer(self, question: object, reply: pb.HistoryReply | None) -> None:
@@ -224,20 +225,14 @@ class Recorder:
         """End the running session and refuse orders that still wait."""
         self._end()
         while self._orders:
-            self._orders.popleft().reply_err(b"the recorder is stopping")
+            self._orders.popleft().refuse("it is stopping")
 
-    def _answer(self, query: zenoh.Query) -> None:
-        command = pb.RecorderCommand()
-        try:
-            command.ParseFromString(query.payload.to_bytes() if query.payload is not None else b"")
-        except DecodeError:
-            query.reply_err(b"the payload is no RecorderCommand")
-            return
-        refusal = self._obey(command)
+    def _answer(self, order: Order) -> None:
+        refusal = self._obey(order.command)
         status = self.status()
         if refusal:
             status.message = refusal
-        query.reply(recorder_control_key(self.bus.prefix), status.SerializeToString())
+        order.answer(status)
 
     def _obey(self, command: pb.RecorderCommand) -> str:
         """Do what a command says; the reason when it is refused, else nothing."""
@@ -314,7 +309,7 @@ def run(
             settings, bus, configuration, lambda q: asker.ask(q, *q.stream, q.query)
         )
         samples = session.declare_subscriber(f"{bus.prefix}/**", recorder.on_sample)
-        orders = session.declare_queryable(recorder_control_key(bus.prefix), recorder.on_query)
+        control = orders.take(session, bus.prefix, orders.RECORDER, recorder.on_order)
         _go_on(recorder, settings.root)
         # the session that begins now has its session.json before recovery looks at the folders
         recorder.step()
@@ -332,7 +327,7 @@ def run(
                 recorder.wake.wait(DRAIN_S)
         finally:
             samples.undeclare()
-            orders.undeclare()
+            control.undeclare()
             recorder.close()
             asker.close()
             publishers.put(STATUS, RECORDER, recorder.status())

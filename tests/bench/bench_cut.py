@@ -22,8 +22,8 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 from support.bus_cut import Cable  # noqa: E402
 from support.stack import free_port  # noqa: E402
 
-from dashboard.scene.feed import Feed  # noqa: E402
-from dashboard.scene.store import Store  # noqa: E402
+from dashboard.scene.data.feed import Feed  # noqa: E402
+from dashboard.scene.data.store import Store  # noqa: E402
 from messages.bus.session import BusSettings, Publishers, open_client, open_router  # noqa: E402
 from messages.contract import gyrofree_pb2 as pb  # noqa: E402
 from messages.contract.topics import ACCEL, STATUS  # noqa: E402

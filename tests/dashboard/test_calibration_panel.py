@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 import viser
 
-from dashboard.scene.feed import Feed
+from dashboard.scene.data.feed import Feed
+from dashboard.scene.data.store import Store
 from dashboard.scene.panels import PAGES, Snapshot
-from dashboard.scene.panels.calibration import Calibration, content, facing, picture, upright
-from dashboard.scene.store import Store
+from dashboard.scene.panels.guided.calibration import Calibration, content, facing, picture, upright
 from estimator import live, service
 from estimator.settings import EstimatorSettings
 from inertial.calibration.poses import candidates, plan
+from messages.bus import orders
 from messages.bus.session import BusSettings, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ACCEL, CALIBRATION
@@ -96,9 +97,7 @@ def test_orders_reach_a_running_worker(free_port, tmp_path):
     thread = threading.Thread(target=worker.work, args=(stop,), daemon=True)
     thread.start()
     with open_router(bus), open_client(bus, timeout_s=20) as session:
-        queryable = session.declare_queryable(
-            f"t/*/{live.CONTROL}", lambda query: live.take_order(query, worker)
-        )
+        queryable = orders.take(session, bus.prefix, orders.ESTIMATOR, worker.take_order, "*")
         feed = Feed(bus, Store(), threading.Event())
         try:
 

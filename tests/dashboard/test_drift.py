@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dashboard.scene import geometry as geo
-from dashboard.scene.palette import estimator_title
-from dashboard.scene.panels import Snapshot, drift
-from dashboard.scene.store import Store
+from dashboard.scene.data.store import Store
+from dashboard.scene.drawing import geometry as geo
+from dashboard.scene.drawing.palette import estimator_title
+from dashboard.scene.panels import Snapshot
+from dashboard.scene.panels.navigation import drift
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 

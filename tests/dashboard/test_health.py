@@ -7,12 +7,12 @@ import pytest
 import viser
 from support.stack import free_port
 
-from dashboard.scene.axis_arrows import AxisArrows, residual_colour
-from dashboard.scene.palette import GREY, SKY, VERMILLION, YELLOW
+from dashboard.scene.data.store import Store
+from dashboard.scene.drawing.axis_arrows import AxisArrows, residual_colour
+from dashboard.scene.drawing.palette import GREY, SKY, VERMILLION, YELLOW
 from dashboard.scene.panels.base import Snapshot
-from dashboard.scene.panels.health import Health
-from dashboard.scene.panels.layout import LayoutBench, figures
-from dashboard.scene.store import Store
+from dashboard.scene.panels.device.health import Health
+from dashboard.scene.panels.device.layout import LayoutBench, figures
 from inertial.layouts.layout import CUBE
 from inertial.layouts.quality import analyse
 from messages.contract import gyrofree_pb2 as pb

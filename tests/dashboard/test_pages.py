@@ -175,7 +175,8 @@ from dashboard.settings import DashboardSettings
 from gyrofree.running.process import stop_on_signals
 from messages.bus.session import BusSettings
 stop = stop_on_signals()
-service.run(DashboardSettings.model_validate_json(sys.argv[1]), BusSettings(router=sys.argv[2]), stop)
+settings = DashboardSettings.model_validate_json(sys.argv[1])
+service.run(settings, BusSettings(router=sys.argv[2]), stop)
 print("ended", threading.active_count())
 """
 

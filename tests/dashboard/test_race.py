@@ -2,9 +2,9 @@
 
 import time
 
+from dashboard.scene.data.store import Store
 from dashboard.scene.panels.base import Snapshot
-from dashboard.scene.panels.race import Race
-from dashboard.scene.store import Store
+from dashboard.scene.panels.motion.race import Race
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 

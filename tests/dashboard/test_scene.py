@@ -12,20 +12,25 @@ import pytest
 import viser
 from support.feeder import UTC0_NS, Feeder, cube_attitude
 
-from dashboard.scene import camera, series
-from dashboard.scene import geometry as geo
-from dashboard.scene.chart import Curve, _data
-from dashboard.scene.feed import Feed
-from dashboard.scene.palette import estimator_colour, number
+from dashboard.scene.data.feed import Feed
+from dashboard.scene.data.replayed import Replayed
+from dashboard.scene.data.ring import Ring
+from dashboard.scene.data.store import Store
+from dashboard.scene.data.tables import Column, Table
+from dashboard.scene.data.track import Track
+from dashboard.scene.drawing import camera, series
+from dashboard.scene.drawing import geometry as geo
+from dashboard.scene.drawing.chart import Curve, _data
+from dashboard.scene.drawing.palette import estimator_colour, number
 from dashboard.scene.panels import PAGES, Snapshot
 from dashboard.scene.panels.base import Panel
-from dashboard.scene.panels.devices import Devices, counts
-from dashboard.scene.replayed import Replayed
+from dashboard.scene.panels.device.devices import Devices, counts
 from dashboard.scene.service import SceneError, start
-from dashboard.scene.store import NAV_POSITION, RATE_OMEGA, Ring, Store
 from messages.bus.session import BusSettings, Publishers, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
+
+PAIR = Table(1.0, (Column("up", "m"), Column("both", "m", 2))).dtype()
 
 # Chromium without a GPU: WebGL is drawn in software.
 FLAGS = [
@@ -65,24 +70,41 @@ def wait_for(condition, seconds: float = 30.0) -> None:
 
 
 # --- ring and decimation
-# ----------------------------------------------------------------------------------------------
 
 
 def test_ring_keeps_the_newest_rows_in_order():
-    ring = Ring(2, capacity=10)
+    ring = Ring(PAIR, capacity=10)
     for k in range(25):
-        ring.append(k * 0.1, [k, -k])
-    t, rows = ring.window(0.0, 99.0)
-    assert np.allclose(t, np.arange(15, 25) * 0.1)
-    assert rows[:, 0].tolist() == list(range(15, 25)) and rows[-1, 1] == -24
+        ring.append(k * 0.1, up=k, both=[[k, -k]])
+        rows = ring.window(0.0, 99.0)
+        first = max(0, k - 9)
+        assert np.allclose(rows["t"], np.arange(first, k + 1) * 0.1)
+        assert rows["up"].tolist() == list(range(first, k + 1)) and rows["both"][-1, 1] == -k
+
+
+@pytest.mark.parametrize("size", [1, 3, 10, 24])
+def test_ring_takes_rows_one_by_one_or_many_at_once(size):
+    """A whole batch is the same as its rows, also where it is larger than the ring."""
+    ring, single = Ring(PAIR, capacity=10), Ring(PAIR, capacity=10)
+    t, both = np.arange(48) * 0.5, np.random.default_rng(5).normal(size=(48, 2))
+    for first in range(0, 48, size):
+        ring.append(t[first : first + size], both=both[first : first + size])
+    for moment, pair in zip(t, both, strict=True):
+        single.append(moment, both=pair)
+    rows = ring.rows()
+    assert rows.tobytes() == single.rows().tobytes()
+    assert np.array_equal(rows["both"], both[-10:]) and np.isnan(rows["up"]).all()
 
 
 def test_ring_gives_only_the_window_and_drops_rows_out_of_order():
-    ring = Ring(1, capacity=100)
-    for t in (0.0, 1.0, 2.0, 1.5, 3.0):
-        ring.append(t, [t])
-    t, rows = ring.window(1.0, 2.0)
-    assert t.tolist() == [1.0, 2.0] and rows[:, 0].tolist() == [1.0, 2.0]
+    one, many = Ring(PAIR, capacity=100), Ring(PAIR, capacity=100)
+    disorder = np.array([0.0, 1.0, 2.0, 1.5, 1.7, 3.0])
+    for t in disorder:
+        one.append(t, up=t)
+    many.append(disorder, up=disorder)
+    for ring in (one, many):
+        assert ring.rows()["up"].tolist() == [0.0, 1.0, 2.0, 3.0]
+        assert ring.window(1.0, 2.0)["t"].tolist() == [1.0, 2.0]
 
 
 def test_decimation_keeps_every_extreme():
@@ -139,7 +161,6 @@ def test_chart_data_are_of_one_length_finite_and_end_with_the_mask():
 
 
 # --- geometry
-# ---------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -210,17 +231,16 @@ def test_camera_shows_the_centre_where_it_is_not_covered_and_the_whole_width(vie
 
 
 def test_track_thins_itself_and_stays_a_line():
-    track = geo.Track(spacing=1.0)
+    track = Track(spacing=1.0)
     for k in range(100_000):
         track.add((float(k), 0.0, 0.0))
-    assert len(track.pieces) <= geo.Track.PIECES and track.thinned >= 1
+    assert len(track.pieces) <= Track.PIECES and track.thinned >= 1
     for before, after in zip(track.pieces, track.pieces[1:], strict=False):
         assert after[0][0] - before[-1][0] <= 2 * track.spacing
     assert track.pieces[0][0] == (0.0, 0.0, 0.0) and track.last()[0] > 99_000
 
 
 # --- store
-# ------------------------------------------------------------------------------------------------------------
 
 
 def test_store_takes_a_cube_in(store):
@@ -230,8 +250,8 @@ def test_store_takes_a_cube_in(store):
     device = store.device("cube-01")
     assert not device.is_vehicle and device.estimators("rate") == ["products-ekf", "least-squares"]
     t, rows = device.window("rate", "products-ekf", 6.0, 7.0)
-    assert 99 <= len(t) <= 102 and abs(np.degrees(rows[:, RATE_OMEGA][:, 2].mean()) - 171) < 1
-    assert device.window("accel", "", 0, 99)[1].shape == (800, 12)
+    assert 99 <= len(t) <= 102 and abs(np.degrees(rows["omega_ib_b"][:, 2].mean()) - 171) < 1
+    assert device.window("accel", "", 0, 99)[1]["f"].shape == (800, 12)
 
 
 def test_store_takes_a_drive_in_and_puts_fixes_into_the_frame_of_the_trajectory(store):
@@ -242,9 +262,9 @@ def test_store_takes_a_drive_in_and_puts_fixes_into_the_frame_of_the_trajectory(
     assert device.is_vehicle and device.estimators("nav") == ["ekf"]
     t, rows = device.window("nav", "ekf", 0, 99)
     fix_t, fixes = device.window("gnss", "", 0, 99)
-    at_fix = np.array([np.interp(fix_t, t, rows[:, NAV_POSITION][:, k]) for k in range(3)]).T
+    at_fix = np.array([np.interp(fix_t, t, rows["p_n"][:, k]) for k in range(3)]).T
     assert (
-        np.median(np.abs(fixes[:, :3] - at_fix)) < 1.0
+        np.median(np.abs(fixes["p_n"] - at_fix)) < 1.0
     )  # the median: a few fixes are wild on purpose
     assert device.tracks["nav/ekf"].last() is not None and device.tracks["fixes"].last() is not None
 
@@ -298,7 +318,6 @@ def test_malformed_messages_leave_the_store_usable(store):
 
 
 # --- panels
-# -----------------------------------------------------------------------------------------------------------
 
 
 class Seen(Panel):
@@ -380,7 +399,6 @@ def test_colours_and_numbers():
 
 
 # --- bus and server
-# ---------------------------------------------------------------------------------------------------
 
 
 def test_feed_takes_messages_from_the_bus(bus, store):
@@ -490,12 +508,12 @@ def test_what_comes_late_takes_its_place_and_is_marked():
     device = store.device("cube")
     store.put_late("cube", [(tp.ACCEL, "", batch(k)) for k in range(120, 150)], repaired=True)
     t, rows = device.window("accel", "", -1.0, 10.0)
-    assert list(rows[:, 0]) == list(range(100, 160)) and np.allclose(t, np.arange(60) * 0.1)
+    assert list(rows["f"][:, 0]) == list(range(100, 160)) and np.allclose(t, np.arange(60) * 0.1)
     assert len(device.late) == 1 and np.allclose(device.late[0], [2.0, 4.9])
     store.put_late("cube", [(tp.ACCEL, "", batch(k)) for k in range(40, 110)], repaired=False)
     t, rows = device.window("accel", "", -100.0, 10.0)
     assert (
-        list(rows[:, 0]) == list(range(40, 160))
+        list(rows["f"][:, 0]) == list(range(40, 160))
         and device.t_first == pytest.approx(-6.0)
         and len(device.late) == 1
     )

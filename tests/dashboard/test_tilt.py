@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dashboard.scene.panels.devices import Devices
-from dashboard.scene.panels.tilt import Tilt
-from dashboard.scene.store import Store
-from dashboard.scene.tilt import between, horizon_svg, roll_pitch
+from dashboard.scene.data.store import Store
+from dashboard.scene.drawing.horizon import between, horizon_svg, roll_pitch
+from dashboard.scene.panels.device.devices import Devices
+from dashboard.scene.panels.motion.tilt import Tilt
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 
@@ -71,9 +71,9 @@ def test_the_store_keeps_tilt_and_counts():
     device = store.device("board")
     t, rows = device.window("attitude", "vqf", 0.0, 10.0)
     assert len(t) == 100
-    assert np.degrees(rows[-1, :2]) == pytest.approx([20.0, -10.0])
+    assert np.degrees([rows["roll"][-1], rows["pitch"][-1]]) == pytest.approx([20.0, -10.0])
     t, counts = device.window("adc", "", 0.0, 10.0)
-    assert counts[-1, :5].tolist() == [1, 2, 3, 4, 99]
+    assert counts["counts"][-1, :5].tolist() == [1, 2, 3, 4, 99]
     store.put(
         tp.ADC,
         "board",

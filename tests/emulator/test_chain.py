@@ -22,9 +22,10 @@ from gateway.board.orders import SETTINGS
 from gateway.settings import DeviceSettings, GatewaySettings
 from gyrofree.running import emulated
 from inertial.simulation.table import TableTest
+from messages.bus import orders
 from messages.bus.session import BusSettings, open_client, open_router, subscribe
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import ACCEL, BOARD, TRUTH, control_key
+from messages.contract.topics import ACCEL, BOARD, TRUTH
 
 
 @pytest.fixture(scope="module")
@@ -222,19 +223,14 @@ def test_through_a_real_pty_the_gateway_and_the_bus(image, tmp_path, free_port):
         end = time.monotonic() + 60
         while (len(seen["accel"]) < 20 or len(seen["truth"]) < 20) and time.monotonic() < end:
             time.sleep(0.05)
-        order = pb.BoardCommand(name="batch", value=4, user="test").SerializeToString()
-        replies = session.get(
-            control_key(bus.prefix, "cube", "board-control"), payload=order, timeout=20
-        )
-        answers = [
-            pb.Reply.FromString(reply.ok.payload.to_bytes()) for reply in replies if reply.ok
-        ]
+        order = pb.BoardCommand(name="batch", value=4, user="test")
+        answer = orders.give(session, bus.prefix, orders.BOARD, order, "cube", timeout_s=20)
         stop.set()
         for thread in threads:
             thread.join(20)
         keep.clear()
         session.close()
-    assert answers == [pb.Reply(ok=True, message="batch is 4")]
+    assert answer == pb.Reply(ok=True, message="batch is 4")
     assert seen["accel"][-1].header.source == pb.SOURCE_EMULATED and seen["board"][-1].board_id == 3
     by_index = {m.for_index: m for m in seen["truth"]}
     shared = [m for m in seen["accel"] if m.first_index in by_index]

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
+from messages.bus import orders
 from messages.bus.session import BusSettings, Publishers, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import (
@@ -23,7 +24,6 @@ from messages.contract.topics import (
     RECORDER,
     STATUS,
     TRUTH,
-    recorder_control_key,
 )
 from sessions.library.annotations import change_annotations
 from sessions.library.catalogue import Catalogue
@@ -84,11 +84,11 @@ def recording(bus, tmp_path):
 
 
 def order(session, action=pb.RecorderCommand.ACTION_STATUS, **fields) -> pb.RecorderStatus | None:
-    payload = pb.RecorderCommand(action=action, **fields).SerializeToString()
-    for reply in session.get(recorder_control_key("t"), payload=payload, timeout=5.0):
-        if reply.ok is not None:
-            return pb.RecorderStatus.FromString(reply.ok.payload.to_bytes())
-    return None
+    command = pb.RecorderCommand(action=action, **fields)
+    try:
+        return orders.give(session, "t", orders.RECORDER, command)
+    except orders.OrderError:
+        return None
 
 
 START, STOP = pb.RecorderCommand.ACTION_START, pb.RecorderCommand.ACTION_STOP
@@ -230,6 +230,7 @@ RECORD = """
 import sys
 from pathlib import Path
 from gyrofree.running.process import stop_on_signals
+from messages.bus import orders
 from messages.bus.session import BusSettings
 from sessions.recording import recorder
 from sessions.recording.settings import RecorderSettings

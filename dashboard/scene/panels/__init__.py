@@ -2,27 +2,27 @@
 on the left.
 """
 
-from dashboard.scene.panels.acceleration import Acceleration
-from dashboard.scene.panels.angle import Angle
-from dashboard.scene.panels.axes import Axes
 from dashboard.scene.panels.base import Panel, Snapshot
-from dashboard.scene.panels.board import Board
-from dashboard.scene.panels.calibration import Calibration
-from dashboard.scene.panels.devices import Devices
-from dashboard.scene.panels.errors import Errors
-from dashboard.scene.panels.health import Health
-from dashboard.scene.panels.horizon import Horizon
-from dashboard.scene.panels.innovations import Innovations
-from dashboard.scene.panels.layout import LayoutBench
-from dashboard.scene.panels.link import Link
-from dashboard.scene.panels.navigation import Navigation
-from dashboard.scene.panels.position import Position
-from dashboard.scene.panels.race import Race
-from dashboard.scene.panels.rates import Rates
-from dashboard.scene.panels.record import Record
-from dashboard.scene.panels.tilt import Tilt
-from dashboard.scene.panels.timeline import Timeline
-from dashboard.scene.panels.wiring import Wiring
+from dashboard.scene.panels.device.board import Board
+from dashboard.scene.panels.device.devices import Devices
+from dashboard.scene.panels.device.health import Health
+from dashboard.scene.panels.device.layout import LayoutBench
+from dashboard.scene.panels.device.link import Link
+from dashboard.scene.panels.guided.calibration import Calibration
+from dashboard.scene.panels.guided.wiring import Wiring
+from dashboard.scene.panels.motion.acceleration import Acceleration
+from dashboard.scene.panels.motion.angle import Angle
+from dashboard.scene.panels.motion.axes import Axes
+from dashboard.scene.panels.motion.errors import Errors
+from dashboard.scene.panels.motion.innovations import Innovations
+from dashboard.scene.panels.motion.race import Race
+from dashboard.scene.panels.motion.rates import Rates
+from dashboard.scene.panels.motion.tilt import Tilt
+from dashboard.scene.panels.navigation.filters import Navigation
+from dashboard.scene.panels.navigation.horizon import Horizon
+from dashboard.scene.panels.navigation.position import Position
+from dashboard.scene.panels.session.record import Record
+from dashboard.scene.panels.session.timeline import Timeline
 
 PAGES: tuple[type[Panel], ...] = (
     Rates,

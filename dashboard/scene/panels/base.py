@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import viser
 
-from dashboard.scene.chart import Chart, Curve, Shade
-from dashboard.scene.palette import estimator_colour, estimator_title
-from dashboard.scene.store import Device, Store
+from dashboard.scene.data.device import Device
+from dashboard.scene.data.store import Store
+from dashboard.scene.drawing.chart import Chart, Curve, Shade
+from dashboard.scene.drawing.palette import estimator_colour, estimator_title
 from messages.contract import gyrofree_pb2 as pb
 
 log = logging.getLogger(__name__)
@@ -32,7 +33,7 @@ class Snapshot:
     dark: bool
 
     def rows(self, topic: str, estimator: str = "") -> tuple[np.ndarray, np.ndarray]:
-        """Ring rows of a topic inside the window."""
+        """Times (n,) s and rows (n,) of a topic inside the window; columns by name (tables.py)."""
         return self.device.window(topic, estimator, self.t0, self.t1)
 
     def stale(self, topic: str, estimator: str = "") -> bool:

@@ -1,0 +1,243 @@
+"""One uPlot chart: curves with 3-sigma bands, grey gaps, and a heading with live values.
+
+uPlot's own legend knows values only under the cursor, so the heading takes its place. Known traps
+of the charts and what is done about them: NaN is never sent; the time axis is told that it is not a
+date; a gap is a grey series on a scale of its own, drawn last and opaque so that it covers the
+straight line beneath. What was filled in after a loss has an amber strip at the bottom, and a note
+a vertical line, made the same way.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import viser
+
+from dashboard.scene.drawing import series
+from dashboard.scene.drawing.palette import number, rgba
+
+LATE_HEIGHT = 0.035  # of the strip that marks filled-in data, of the chart's height
+REPAIRED, MARK = "#e69f00", "#cc79a7"  # both of the colour-blind safe palette
+
+
+@dataclass
+class Curve:
+    """One line of a chart. t (n,) s, y (n,) in the chart's unit; half (n,) is the half width of its
+    band.
+    """
+
+    label: str
+    colour: str
+    t: np.ndarray
+    y: np.ndarray
+    half: np.ndarray | None = None
+    dash: bool = False
+    stale: bool = False
+    width: float = 1.6
+    about_zero: bool = False  # the band is what an error is allowed to be, so it lies around zero
+    live: bool = True  # its newest value stands in the heading
+
+
+@dataclass
+class Shade:
+    """Times of a chart that a colour lies behind: where on (n,) is true, at t (n,) s."""
+
+    label: str
+    colour: str
+    t: np.ndarray
+    on: np.ndarray
+
+
+class Chart:
+    """A chart inside a container of a client's GUI; show() builds it again only when its set of
+    curves changes.
+    """
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        folder,
+        order: float,
+        title: str,
+        unit: str,
+        height: int = 190,
+        digits: int = 1,
+    ) -> None:
+        self._client, self._folder, self._order = client, folder, order
+        self._title, self._unit, self._height, self._digits = title, unit, height, digits
+        self._signature: tuple = ()
+        self._plot: viser.GuiUplotHandle | None = None
+        with folder:
+            self._heading = client.gui.add_html("", order=order)
+
+    def show(
+        self,
+        curves: Sequence[Curve],
+        t0: float,
+        t1: float,
+        dark: bool,
+        primary: int = 0,
+        late: Sequence[Sequence[float]] = (),
+        marks: Sequence[float] = (),
+        shades: Sequence[Shade] = (),
+    ) -> None:
+        """Draw the window [t0, t1]; gaps are those of the curve number `primary`.
+
+        Stretches [from, until] of `late` get a strip at the bottom: filled in after a loss. Each of
+        `marks` (s) gets a line from top to bottom. A shade lies behind the times it names.
+        """
+        shades = [shade for shade in shades if len(shade.t)]
+        heading = self._heading_html(curves, shades)
+        if self._heading.content != heading:
+            self._heading.content = heading
+        curves = [curve for curve in curves if len(curve.t)]
+        if not curves:
+            if self._plot is not None and self._plot.visible:
+                self._plot.visible = False
+            return
+        data = _data(curves, t0, t1, min(primary, len(curves) - 1), late, marks, shades)
+        signature = (
+            dark,
+            *(s.label for s in shades),
+            *((c.label, c.colour, c.half is not None, c.dash, c.width) for c in curves),
+        )
+        if self._plot is None:
+            self._build(curves, data, dark, shades)
+        elif signature != self._signature:
+            # Changed in place: a browser that is behind would complain of an update of a chart
+            # already removed.
+            self._plot.series, self._plot.bands = _lines(curves, dark, shades)
+            self._plot.data = data
+        else:
+            self._plot.data = data
+        self._signature = signature
+        if not self._plot.visible:
+            self._plot.visible = True
+
+    def _heading_html(self, curves: Sequence[Curve], shades: Sequence[Shade] = ()) -> str:
+        items = []
+        for curve in curves:
+            if not curve.label:
+                continue
+            good = curve.y[np.isfinite(curve.y)] if curve.live else curve.y[:0]
+            value = (
+                number(float(good[-1]), self._digits) if len(good) else ("–" if curve.live else "")
+            )
+            mark = "gf-dash" if curve.dash else "gf-line"
+            stale = " gf-stale" if curve.stale else ""
+            items.append(
+                f'<span class="gf-item{stale}"><i class="{mark}"'
+                f' style="border-color:{curve.colour}"></i>{curve.label} <b>{value}</b></span>'
+            )
+        for shade in shades:
+            if shade.on.any():
+                items.append(
+                    f'<span class="gf-item"><i class="gf-line" style="border-color:{shade.colour};'
+                    f'border-width:8px"></i>{shade.label}</span>'
+                )
+        empty = "" if items else '<span class="gf-item gf-stale">no data yet</span>'
+        return (
+            f'<div class="gf-chart"><span class="gf-title">{self._title}'
+            f" <em>{self._unit}</em></span><span"
+            f' class="gf-legend">{"".join(items)}{empty}</span></div>'
+        )
+
+    def _build(
+        self,
+        curves: Sequence[Curve],
+        data: tuple[np.ndarray, ...],
+        dark: bool,
+        shades: Sequence[Shade] = (),
+    ) -> None:
+        lines, bands = _lines(curves, dark, shades)
+        with self._folder:
+            self._plot = self._client.gui.add_uplot(
+                data,
+                series=lines,
+                bands=bands,
+                scales={"x": {"time": False}, "y": {}, "gap": {"range": (0, 1)}},
+                axes=(
+                    {"size": 26, "font": "11px sans-serif"},
+                    {"size": 46, "font": "11px sans-serif"},
+                ),
+                legend={"show": False},
+                height=self._height,
+                padding=(6, 10, 0, 0),
+                order=self._order + 0.5,
+            )
+
+
+def _lines(
+    curves: Sequence[Curve], dark: bool, shades: Sequence[Shade] = ()
+) -> tuple[tuple[dict, ...], tuple[dict, ...] | None]:
+    """uPlot's description of the series that _data gives, and of the bands between them."""
+    lines: list[dict] = [{"label": "t"}]
+    bands: list[dict] = []
+    for curve in curves:
+        line = {
+            "label": curve.label,
+            "stroke": curve.colour,
+            "width": curve.width,
+            "points": {"show": False},
+        }
+        lines.append(line | ({"dash": (6, 4)} if curve.dash else {}))
+        if curve.half is not None:
+            bands.append({"series": (len(lines), len(lines) + 1), "fill": rgba(curve.colour, 0.20)})
+            edge = {"stroke": rgba(curve.colour, 0.35), "width": 0.7, "points": {"show": False}}
+            lines += [
+                edge | {"label": f"{curve.label} +3σ"},
+                edge | {"label": f"{curve.label} −3σ"},
+            ]
+    for shade in shades:
+        fill = {
+            "scale": "gap",
+            "stroke": shade.colour,
+            "width": 0,
+            "fill": rgba(shade.colour, 0.25),
+            "fillTo": 0,
+        }
+        lines.append(fill | {"label": shade.label, "points": {"show": False}})
+    grey = "#3b3b3b" if dark else "#d5d5d5"
+    gap = {"label": "gap", "scale": "gap", "stroke": grey, "width": 0, "fill": grey, "fillTo": 0}
+    strip = gap | {"label": "filled in", "stroke": REPAIRED, "fill": REPAIRED}
+    mark = gap | {"label": "mark", "stroke": MARK, "fill": MARK}
+    lines += [line | {"points": {"show": False}} for line in (strip, mark, gap)]
+    return tuple(lines), tuple(bands) or None
+
+
+def _data(
+    curves: Sequence[Curve],
+    t0: float,
+    t1: float,
+    primary: int,
+    late: Sequence[Sequence[float]] = (),
+    marks: Sequence[float] = (),
+    shades: Sequence[Shade] = (),
+) -> tuple[np.ndarray, ...]:
+    """The arrays of a chart: time, each curve with the edges of its band, and the gap mask; all of
+    one length.
+    """
+    edges, x = series.grid(t0, t1)
+    lines = [series.decimate(curve.t, curve.y, edges)[0] for curve in curves]
+    low, high = min(float(y.min()) for y in lines), max(float(y.max()) for y in lines)
+    # A band that grows without bound would press the curves flat: it is cut half their range
+    # outside.
+    reach = max((high - low) / 2, 1e-9)
+    out = [x]
+    for curve, y in zip(curves, lines, strict=True):
+        out.append(y)
+        if curve.half is not None:
+            half = series.decimate(curve.t, curve.half, edges)[0]
+            centre = np.zeros_like(y) if curve.about_zero else y
+            out += [
+                np.clip(centre + half, low - reach, high + reach),
+                np.clip(centre - half, low - reach, high + reach),
+            ]
+    for shade in shades:  # the nearest sample's word, 0 or 1
+        on = np.clip(np.searchsorted(shade.t, x), 0, len(shade.t) - 1)
+        out.append(shade.on[on].astype(float))
+    out.append(LATE_HEIGHT * series.stretch_mask(late, edges))
+    out.append(series.moment_mask(marks, edges))
+    t = curves[primary].t
+    out.append(series.gap_mask(t, edges, max(series.gap_limit(t), 2.5 * (edges[1] - edges[0]))))
+    return tuple(out)

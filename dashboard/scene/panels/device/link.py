@@ -1,0 +1,61 @@
+"""The line between board and gateway: what came, what was lost, how late, the clocks, and why bytes
+were bad.
+"""
+
+from dashboard.scene.drawing.palette import escape, number, rows
+from dashboard.scene.panels.base import Panel, Snapshot
+
+
+class Link(Panel):
+    """The ledger of the line; its bytes add up: in = good + bad + pending."""
+
+    title = "Link"
+    _table = None
+
+    def update(self, s: Snapshot) -> None:
+        latest = s.device.get("link")
+        if latest is None:
+            self._table = self.html(
+                '<p class="gf-note">The gateway has not spoken of this line yet.</p>', self._table
+            )
+            return
+        m = latest.message
+        items = [
+            ("state", "connected" if m.connected else '<b class="gf-bad">not connected</b>'),
+            ("port", escape(m.port)),
+            ("samples", number(m.sample_rate_hz, 1, "Hz")),
+            ("frames", number(m.frame_rate_hz, 1, "Hz")),
+            (
+                "latency p50 · p99",
+                f"{number(m.latency_p50_s * 1e3, 2)} · {number(m.latency_p99_s * 1e3, 2, 'ms')}",
+            ),
+            ("clock skew", number(m.clock_skew_ppm, 1, "ppm", sign=True)),
+            ("clock scatter", number(m.clock_residual_s * 1e6, 0, "µs")),
+            ("clock window", number(m.clock_window_s, 0, "s")),
+            ("bytes in", number(m.bytes_in, 0)),
+            ("good frames", f"{number(m.good_frames, 0)} ({number(m.good_bytes, 0)} bytes)"),
+            ("damaged", _count(m.bad_chunks, f" chunks ({number(m.bad_bytes, 0)} bytes)")),
+            ("lost frames", _count(m.lost_frames)),
+            ("of these dropped by the board", number(m.device_dropped, 0)),
+            ("lost samples", _count(m.lost_samples)),
+            ("reboots · reconnects", f"{m.reboots} · {m.reconnects}"),
+            ("frames of unknown type", number(m.unknown_frames, 0)),
+            (
+                "journal, on disk",
+                f"{number(m.durable_sequence, 0)} of {number(m.journal_sequence, 0)}",
+            ),
+            ("GNSS good · bad", f"{m.gnss_good} · {m.gnss_bad}"),
+        ]
+        content = rows(items, s.stale("link"))
+        if m.damage:
+            reasons = sorted(m.damage.items(), key=lambda item: -item[1])
+            content += '<p class="gf-title">Damage by reason</p>'
+            content += rows([(escape(reason), number(count, 0)) for reason, count in reasons])
+        if m.message:
+            content = f'<p class="gf-alert">{escape(m.message)}</p>' + content
+        self._table = self.html(content, self._table)
+
+
+def _count(value: int, after: str = "") -> str:
+    text = number(value, 0) + after
+    return f'<b class="gf-bad">{text}</b>' if value else text

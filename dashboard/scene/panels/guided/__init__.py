@@ -1,0 +1,1 @@
+"""Pages that lead a person through a procedure step by step."""

@@ -1,0 +1,175 @@
+"""The guided calibration: which pose next, is it being taken, is it good enough, save. Orders are
+for operators.
+"""
+
+import numpy as np
+import viser
+
+from dashboard.scene.drawing.palette import AXES, GREEN, escape, number, rgba, rows
+from dashboard.scene.panels.base import Snapshot
+from dashboard.scene.panels.guided.guided import Guided, guidance, head, silent
+from messages.contract import gyrofree_pb2 as pb
+
+MG = 1e3 / 9.80665  # mg per m/s^2
+CAMERA = np.array([0.80, -0.52, 0.50])  # where the picture is seen from, in the frame whose z is up
+ACTION = pb.EstimatorCommand
+STATE = pb.CalibrationStatus
+STATES = {
+    STATE.STATE_IDLE: "not running",
+    STATE.STATE_WAITING: "waiting for the pose",
+    STATE.STATE_TAKING: "taking it",
+    STATE.STATE_TURNING: "table turning",
+    STATE.STATE_FITTED: "fitted",
+    STATE.STATE_SAVED: "saved",
+    STATE.STATE_FAILED: "failed",
+}
+BUTTONS = (  # label, order, icon, colour
+    ("Start calibration", ACTION.ACTION_CALIBRATE_START, viser.Icon.PLAYER_PLAY, (30, 110, 165)),
+    ("Fit now", ACTION.ACTION_CALIBRATE_FIT, viser.Icon.MATH_FUNCTION, "gray"),
+    ("Save card and use it", ACTION.ACTION_CALIBRATE_SAVE, viser.Icon.DEVICE_FLOPPY, (0, 120, 90)),
+    ("Cancel", ACTION.ACTION_CALIBRATE_CANCEL, viser.Icon.X, "gray"),
+)
+
+
+class Calibration(Guided):
+    """Status, picture and four buttons; what they do is done by the estimator of the device."""
+
+    title = "Calibrate"
+    buttons = BUTTONS
+
+    def update(self, s: Snapshot) -> None:
+        self._device = s.device.name
+        if s.device.is_vehicle:
+            self._not_here("Boards of accelerometers are calibrated here.")
+            return
+        latest = s.device.get("calibration")
+        m = latest.message if latest is not None else STATE()
+        running = m.state not in (STATE.STATE_IDLE, STATE.STATE_SAVED)
+        gone = silent(s, "calibration", running)
+        self._status = self.html(content(m, gone, s.dark, self._card(s)), self._status)
+        if not running:
+            self._show({ACTION.ACTION_CALIBRATE_START})
+        elif len(m.poses) < 4:
+            self._show({ACTION.ACTION_CALIBRATE_CANCEL})
+        else:
+            self._show(
+                {
+                    ACTION.ACTION_CALIBRATE_FIT,
+                    ACTION.ACTION_CALIBRATE_SAVE,
+                    ACTION.ACTION_CALIBRATE_CANCEL,
+                }
+            )
+
+    @staticmethod
+    def _card(s: Snapshot) -> str:
+        """Card that the estimates name."""
+        for name in s.device.estimators("rate"):
+            return s.device.get("rate", name).message.calibration
+        return ""
+
+    def _order(self, action: int) -> None:
+        command = pb.EstimatorCommand(action=action, device=self._device)
+        self.order_estimator("Calibration", command)
+
+
+def content(m: pb.CalibrationStatus, gone: bool, dark: bool, card: str) -> str:
+    """The panel's HTML."""
+    items = [("card in use", escape(card) if card else "none: nominal scale and positions")]
+    if m.state == STATE.STATE_IDLE:
+        text = (
+            "Set the body down in nine and more poses, let go each time; the page says which one"
+            " next."
+        )
+        return f'<p class="gf-note">{text}</p>' + rows(items)
+    if m.bias_sigma_mps2:
+        items += [
+            ("bias known to", number(max(m.bias_sigma_mps2) * MG, 2, "mg")),
+            ("scale known to", number(max(m.scale_sigma) * 100, 3, "%")),
+            ("residual of the fit", number(m.residual_mps2 * MG, 2, "mg")),
+        ]
+    if m.card:
+        items.append(("saved as", escape(m.card)))
+    good = f'<b style="color:{GREEN}">✓ good enough</b>' if m.good_enough else "not yet good enough"
+    first = head(STATES.get(m.state, ""), f"{len(m.poses)} poses · {good}", gone)
+    wanted = np.array(m.next_up_b) if len(m.next_up_b) == 3 else None
+    shown = wanted if m.state in (STATE.STATE_WAITING, STATE.STATE_FITTED) else None
+    if m.state == STATE.STATE_TAKING and wanted is not None:
+        shown = wanted
+    drawing = picture(shown, dark) if shown is not None else ""
+    return first + guidance(m.instruction, drawing, m.progress, m.message) + rows(items, stale=gone)
+
+
+def upright(up_b: np.ndarray) -> np.ndarray:
+    """Rotation (3, 3) by the shortest way that turns up_b to z."""
+    u = up_b / np.linalg.norm(up_b)
+    if u[2] < -0.999999:
+        return np.diag([1.0, -1.0, -1.0])
+    axis = np.cross(u, [0.0, 0.0, 1.0])
+    K = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    return np.eye(3) + K + K @ K / (1.0 + u[2])
+
+
+def facing(up_b: np.ndarray, camera: np.ndarray) -> np.ndarray:
+    """As upright(), turned about the vertical until as much as can be is seen of the faces that
+    point up.
+    """
+    faces = [np.sign(up_b[k]) * np.eye(3)[k] for k in range(3) if abs(up_b[k]) > 0.3]
+    first = upright(up_b)
+
+    def turned(k: int) -> np.ndarray:
+        c, s = np.cos(k * np.pi / 12.0), np.sin(k * np.pi / 12.0)
+        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ first
+
+    def seen(k: int) -> float:
+        return round(sum(np.sqrt(max(float(turned(k) @ face @ camera), 0.0)) for face in faces), 6)
+
+    return turned(max(range(24), key=seen))
+
+
+def picture(up_b: np.ndarray, dark: bool) -> str:
+    """The cube as it should stand, an arrow up, as SVG: visible faces with the names of their
+    axes.
+    """
+    camera = CAMERA / np.linalg.norm(CAMERA)
+    R = facing(np.asarray(up_b, dtype=float), camera)
+    right = np.cross([0.0, 0.0, 1.0], camera)
+    right /= np.linalg.norm(right)
+    over = np.cross(camera, right)
+
+    def screen(p: np.ndarray) -> tuple[float, float]:
+        return 110.0 + 44.0 * float(right @ p), 112.0 - 44.0 * float(over @ p)
+
+    line = "#e8e8e8" if dark else "#333333"
+    lowest = min(
+        float((R @ np.array([x, y, z]))[2]) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)
+    )
+    x, y = screen(np.array([0.0, 0.0, lowest]))
+    parts = [f'<ellipse cx="{x:.0f}" cy="{y:.0f}" rx="92" ry="30" fill="rgba(128,128,128,.22)"/>']
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            normal = sign * np.eye(3)[axis]
+            if float((R @ normal) @ camera) <= 0.02:
+                continue
+            a, b = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
+            corners = [
+                screen(R @ (normal + p * a + q * b))
+                for p, q in ((1, 1), (1, -1), (-1, -1), (-1, 1))
+            ]
+            points = " ".join(f"{u:.1f},{v:.1f}" for u, v in corners)
+            u, v = screen(R @ normal)
+            parts.append(
+                f'<polygon points="{points}" fill="{rgba(AXES[axis], 0.85)}" stroke="{line}"'
+                f' stroke-width="1.5" stroke-linejoin="round"/><text x="{u:.0f}" y="{v + 5:.0f}"'
+                ' text-anchor="middle" font-size="16" font-weight="700"'
+                f' fill="#000">{"+" if sign > 0 else "−"}{"xyz"[axis]}</text>'
+            )
+    x, tip = 206.0, 40.0
+    parts.append(
+        f'<path d="M{x},150 V{tip + 12} M{x - 8},{tip + 14} L{x},{tip} L{x + 8},{tip + 14}"'
+        f' fill="none" stroke="{line}" stroke-width="4" stroke-linecap="round"/><text x="{x}"'
+        f' y="172" text-anchor="middle" font-size="13" fill="{line}">up</text>'
+    )
+    return (
+        '<svg class="gf-pose" viewBox="0 0 230 210" width="230" height="210" role="img" '
+        f'style="display:block;margin:.2em auto">{"".join(parts)}</svg>'
+    )

@@ -1,0 +1,37 @@
+"""Specific force of the body's centre in body axes, from the field of all sensors."""
+
+from dashboard.scene.drawing.chart import Curve
+from dashboard.scene.drawing.palette import AXES, truth_colour
+from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve
+
+
+class Acceleration(Panel):
+    """One chart per body axis; a vehicle shows its accelerometer's three axes together."""
+
+    title = "Accel."
+
+    def update(self, s: Snapshot) -> None:
+        if s.device.is_vehicle:
+            t, rows = s.rows("imu")
+            curves = [
+                Curve(f"f{axis}", AXES[k], t, rows["f_b"][:, k], stale=s.stale("imu"))
+                for k, axis in enumerate("xyz")
+            ]
+            self.show("imu", "Specific force, body", "m/s²", curves, s, height=230, digits=2)
+            return
+        for k, axis in enumerate("xyz"):
+            curves = []
+            for name in s.device.estimators("rate"):
+                t, rows = s.rows("rate", name)
+                curves.append(estimator_curve(s, "rate", name, t, rows["f_b"][:, k]))
+            if s.device.get("truth"):
+                t, rows = s.rows("truth")
+                curves.append(Curve("truth", truth_colour(s.dark), t, rows["f_b"][:, k], width=1.0))
+            self.show(
+                axis,
+                f"Specific force f<sub>{axis}</sub> of the centre",
+                "m/s²",
+                curves,
+                s,
+                digits=2,
+            )

@@ -1,0 +1,37 @@
+"""The angle turned about z since the start; a vehicle's heading."""
+
+import numpy as np
+
+from dashboard.scene.drawing.chart import Curve
+from dashboard.scene.drawing.palette import truth_colour
+from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
+
+
+class Angle(Panel):
+    """Angles and, where the truth is known, how far they are off."""
+
+    title = "Angle"
+
+    def update(self, s: Snapshot) -> None:
+        if s.device.is_vehicle:
+            curves = []
+            for name in s.device.estimators("nav"):
+                t, rows = s.rows("nav", name)
+                curves.append(estimator_curve(s, "nav", name, t, np.unwrap(rows["yaw"]) * DEG))
+            self.show("yaw", "Heading from north, unwrapped", "°", curves, s, height=230)
+            return
+        true_t, true_rows = s.rows("truth")
+        angles, errors = [], []
+        for name in s.device.estimators("rate"):
+            t, rows = s.rows("rate", name)
+            angle = rows["angle_z"] * DEG
+            angles.append(estimator_curve(s, "rate", name, t, angle))
+            if len(true_t) > 1:
+                true = np.interp(t, true_t, true_rows["angle_z"] * DEG)
+                errors.append(estimator_curve(s, "rate", name, t, angle - true))
+        if len(true_t):
+            y = true_rows["angle_z"] * DEG
+            angles.append(Curve("truth", truth_colour(s.dark), true_t, y, width=1.0))
+        self.show("angle", "Angle about z", "°", angles, s, height=230)
+        if errors:
+            self.show("error", "Angle error against truth", "°", errors, s, height=190)

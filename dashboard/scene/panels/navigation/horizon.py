@@ -1,0 +1,107 @@
+"""The moving horizon: how many fixes it looks back, and which memberships of the fuzzy sets decided
+that.
+"""
+
+import numpy as np
+
+from dashboard.scene.drawing.chart import Curve
+from dashboard.scene.drawing.palette import AXES, estimator_title, number, rows
+from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve
+from inertial.navigation.fuzzy import MEMBERSHIPS, RULES, membership
+
+WIDTH, HEIGHT = 170, 90
+UNITS = ("m/s²", "rad/s")
+
+
+def sets_svg(points: tuple[float, float, float], value: float, unit: str) -> str:
+    """The three sets over their input, and where the input is now."""
+    span = points[2] - points[0]
+    low, high = points[0] - 0.25 * span, points[2] + 0.25 * span
+    xs = np.array([low, *points, high])
+    out = np.empty(3)
+    lines = ["", "", ""]
+    for x in xs:
+        membership(float(x), np.array(points), out)
+        for k in range(3):
+            y = HEIGHT - 18 - out[k] * (HEIGHT - 26)
+            lines[k] += f"{(x - low) / (high - low) * WIDTH:.1f},{y:.1f} "
+    svg = f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" width="48%" role="img" aria-label="fuzzy sets">'
+    for k in range(3):
+        svg += f'<polyline points="{lines[k]}" fill="none" stroke="{AXES[k]}" stroke-width="1.6"/>'
+    x = float(np.clip((value - low) / (high - low), 0.0, 1.0)) * WIDTH
+    svg += f'<path d="M{x:.1f} 4V{HEIGHT - 18}" stroke="#8C8C8C" stroke-width="2"/>'
+    return (
+        svg + f'<text x="4" y="{HEIGHT - 4}" font-size="11"'
+        f' fill="#8C8C8C">{number(value, 2, unit)}</text></svg>'
+    )
+
+
+class Horizon(Panel):
+    """N over time; the sets as they are, with the input on them."""
+
+    title = "Horizon"
+    _top = None
+
+    def update(self, s: Snapshot) -> None:
+        names = [
+            n
+            for n in s.device.estimators("nav")
+            if s.device.get("nav", n).message.HasField("horizon")
+        ]
+        if not names:
+            note = "No moving horizon runs: add fpe-fuzzy or mhe-robust to [estimator] navigators."
+            self._top = self.html(f'<p class="gf-note">{note}</p>', self._top)
+            return
+        items, drawing = [], ""
+        curves = []
+        for name in names:
+            m = s.device.get("nav", name).message.horizon
+            items.append(
+                (
+                    estimator_title(name),
+                    f"{m.n} fixes" + (f" (from {number(m.crisp, 2)})" if m.inputs else ""),
+                )
+            )
+            t, r = s.rows("nav", name)
+            curves.append(estimator_curve(s, "nav", name, t, r["horizon"]))
+            if len(m.inputs) == 2 and not drawing:
+                drawing = sets_svg(RULES.force, m.inputs[0], UNITS[0]) + sets_svg(
+                    RULES.rate, m.inputs[1], UNITS[1]
+                )
+                self._fuzzy(s, name)
+        legend = (
+            '<p class="gf-note">small · medium · high in the colours below; grey: the vehicle'
+            " now</p>"
+        )
+        self._top = self.html(
+            drawing + (legend if drawing else "") + rows(items, s.stale("nav", names[0])), self._top
+        )
+        self.show("n", "Fixes looked back", "N", curves, s, height=170, digits=0)
+
+    def _fuzzy(self, s: Snapshot, name: str) -> None:
+        t, r = s.rows("nav", name)
+        known = np.isfinite(r["crisp"])
+        if not known.any():
+            return
+        t, r = t[known], r[known]
+        for first, title in (
+            (0, "Memberships of the specific force |f|"),
+            (3, "Memberships of the rate |ω|"),
+        ):
+            curves = [
+                Curve(MEMBERSHIPS[k].split(" ")[1], AXES[k - first], t, r["membership"][:, k])
+                for k in range(first, first + 3)
+            ]
+            self.show(title, title, "0 to 1", curves, s, height=150, digits=2)
+        for k, (title, unit) in enumerate(
+            (("|f| as the rules see it", "m/s²"), ("|ω| as the rules see it", "rad/s"))
+        ):
+            self.show(
+                title,
+                title,
+                unit,
+                [Curve(unit, AXES[2], t, r["inputs"][:, k])],
+                s,
+                height=130,
+                digits=2,
+            )

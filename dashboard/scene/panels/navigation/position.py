@@ -1,0 +1,84 @@
+"""Position in north, east, down with its 3-sigma band, and the numbers of a trajectory."""
+
+import numpy as np
+
+from dashboard.scene.drawing.chart import Curve
+from dashboard.scene.drawing.geometry import MODES
+from dashboard.scene.drawing.palette import FIX, escape, number, rows
+from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
+
+NAMES = ("North", "East", "Down")
+
+
+class Position(Panel):
+    """A vehicle: fused solution over the fixes. The cube: unaided inertial navigation from the
+    start.
+    """
+
+    title = "Position"
+    _table = None
+
+    def update(self, s: Snapshot) -> None:
+        vehicle = s.device.navigates
+        self._table = self.html(self._numbers(s) if vehicle else _cube_note(s), self._table)
+        for k, axis in enumerate(NAMES):
+            curves = []
+            for name in s.device.estimators("nav" if vehicle else "rate"):
+                if vehicle:
+                    t, r = s.rows("nav", name)
+                    half = 3 * r["sigma_p_n"][:, k]
+                    curves.append(estimator_curve(s, "nav", name, t, r["p_n"][:, k], half))
+                else:
+                    t, r = s.rows("rate", name)
+                    curves.append(estimator_curve(s, "rate", name, t, r["p_n"][:, k]))
+            if vehicle and s.device.get("gnss"):
+                t, r = s.rows("gnss")
+                curves.append(
+                    Curve("GNSS", FIX, t, r["p_n"][:, k], stale=s.stale("gnss"), dash=True)
+                )
+            self.show(axis, axis, "m", curves, s, height=150, digits=2)
+
+    @staticmethod
+    def _numbers(s: Snapshot) -> str:
+        names = s.device.estimators("nav")
+        if not names:
+            return rows([("solution", "none yet")], stale=True)
+        m = s.device.get("nav", names[0]).message
+        v = np.asarray(m.v_n_mps) if len(m.v_n_mps) == 3 else np.full(3, np.nan)
+        sigma = np.asarray(m.sigma[6:9]) if len(m.sigma) >= 9 else np.full(3, np.nan)
+        t, r = s.rows("nav", names[0])
+        travelled = (
+            float(np.sum(np.linalg.norm(np.diff(r["p_n"][:, :2], axis=0), axis=1)))
+            if len(t) > 1
+            else 0.0
+        )
+        course = float(np.degrees(np.arctan2(v[1], v[0]))) % 360
+        items = [
+            ("mode", MODES.get(m.mode, "unknown")),
+            ("alignment", escape(m.alignment) or "–"),
+            (
+                "latitude, longitude",
+                f"{number(m.latitude_deg, 7, '°')}, {number(m.longitude_deg, 7, '°')}",
+            ),
+            ("height", number(m.height_m, 2, "m")),
+            ("speed over ground", number(float(np.hypot(v[0], v[1])) * 3.6, 1, "km/h")),
+            ("course", number(course, 1, "°") if np.hypot(v[0], v[1]) > 0.5 else "standing"),
+            ("1σ north, east, down", " · ".join(number(float(x), 2) for x in sigma) + " m"),
+            ("1σ heading", number(float(m.sigma[2]) * DEG if len(m.sigma) > 2 else None, 2, "°")),
+            ("last fix used", f"{number(m.fix_age_s, 1, 's')} ago"),
+            ("way in the window", number(travelled, 0, "m")),
+        ]
+        return rows(items, s.stale("nav", names[0]))
+
+
+def _cube_note(s: Snapshot) -> str:
+    names = s.device.estimators("rate")
+    items = []
+    for name in names:
+        m = s.device.get("rate", name).message
+        if len(m.p_n_m) == 3:
+            items.append((f"distance, {name}", number(float(np.linalg.norm(m.p_n_m)), 1, "m")))
+    return (
+        '<p class="gf-note">Inertial navigation from the start without any aid: it drifts by'
+        " nature.</p>" + rows(items)
+    )

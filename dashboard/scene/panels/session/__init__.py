@@ -1,0 +1,1 @@
+"""What stands on the left for recordings: the recorder, the replay, notes and marks."""

@@ -1,0 +1,94 @@
+"""State of the recorder and the buttons that start and stop it. Who may press them is checked by
+the proxy.
+"""
+
+import logging
+from collections.abc import Callable
+
+import viser
+
+from dashboard.scene.drawing.palette import escape, number, rows
+from messages.contract import gyrofree_pb2 as pb
+
+log = logging.getLogger(__name__)
+
+
+class Record:
+    """Two buttons, a name, and what the recorder says of itself."""
+
+    def __init__(
+        self, client: viser.ClientHandle, call: Callable[[pb.RecorderCommand], pb.RecorderStatus]
+    ) -> None:
+        self._client, self._call = client, call
+        gui = client.gui
+        self._state = gui.add_html("")
+        self._name = gui.add_text("Session", "", hint="Name of the session; empty takes the time")
+        self._start = gui.add_button("Record", icon=viser.Icon.PLAYER_RECORD, color=(192, 40, 40))
+        self._stop = gui.add_button(
+            "Stop recording", icon=viser.Icon.PLAYER_STOP, color="gray", visible=False
+        )
+        self._start.on_click(lambda _: self._order(pb.RecorderCommand.ACTION_START))
+        self._stop.on_click(lambda _: self._order(pb.RecorderCommand.ACTION_STOP))
+
+    @property
+    def uuids(self) -> frozenset[str]:
+        """The elements a viewer may not use."""
+        return frozenset(handle._impl.uuid for handle in (self._start, self._stop, self._name))
+
+    def update(self, latest, now: float) -> None:
+        """Show the recorder's newest status; `latest` is None before it spoke."""
+        stale = latest is None or latest.age(now) > 3.0
+        recording = latest is not None and latest.message.recording
+        content = self._content(latest, stale, recording)
+        if self._state.content != content:
+            self._state.content = content
+        for handle, visible in (
+            (self._start, not recording),
+            (self._name, not recording),
+            (self._stop, recording),
+        ):
+            if handle.visible != visible:
+                handle.visible = visible
+        if self._start.disabled != stale:
+            self._start.disabled = self._stop.disabled = stale
+
+    @staticmethod
+    def _content(latest, stale: bool, recording: bool) -> str:
+        if latest is None:
+            return rows([("recorder", "not running")], stale=True)
+        m = latest.message
+        items = [("recorder", '<b class="gf-rec">● recording</b>' if recording else "ready")]
+        if m.session:
+            items.append(("session" if recording else "last session", escape(m.session)))
+        if recording:
+            items.append(("length", number(m.seconds, 0, "s")))
+            items.append(
+                (
+                    "written · safe on disk",
+                    f"{number(m.messages, 0)} · {number(m.durable_messages, 0)}",
+                )
+            )
+            items.append(("size", number(m.bytes / 1e6, 1, "MB")))
+        lost = sum(m.lost.values())
+        if lost:
+            items.append(("lost on the bus", f'<b class="gf-bad">{number(lost, 0)} messages</b>'))
+        alert = f'<p class="gf-alert">{escape(m.message)}</p>' if m.message else ""
+        return alert + rows(items, stale)
+
+    def _order(self, action: int) -> None:
+        command = pb.RecorderCommand(action=action, name=self._name.value.strip())
+        try:
+            answer = self._call(command)
+            text, good = (answer.message or answer.session or "done"), not answer.message
+        except Exception as error:  # shown to the person who pressed the button
+            log.warning("recorder: %s", error)
+            text, good = str(error), False
+        started = action == pb.RecorderCommand.ACTION_START
+        title = (
+            ("Recording" if started else "Recording stopped")
+            if good
+            else "The recorder did not do it"
+        )
+        self._client.add_notification(
+            title, text, color="teal" if good else "red", auto_close_seconds=6.0
+        )

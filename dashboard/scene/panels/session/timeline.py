@@ -1,0 +1,234 @@
+"""The panel at the bottom left: where the recording or the replay stands, the replay's controls,
+notes and marks.
+"""
+
+import logging
+import time
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from dashboard.scene.data.store import Store
+from dashboard.scene.drawing.palette import escape
+from messages.contract import gyrofree_pb2 as pb
+
+log = logging.getLogger(__name__)
+
+SPEEDS = ("0.1×", "0.25×", "0.5×", "1×", "2×", "5×", "10×", "50×", "100×")
+STALE_S = 2.0
+SHOWN_MARKS = 6
+HOLD_S = 1.0  # after a person's hand on the slider, the replay's position does not move it
+
+
+class Timeline:
+    """Live: time since the recording began, and what is noted. Replay: a slider, keys, speed, steps
+    and a loop.
+    """
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        feed: Any,
+        store: Store,
+        chosen: Callable[[], str],
+        dock: bool = True,
+    ) -> None:
+        """`chosen` names the device that this browser shows, which a note is about."""
+        self._client, self._feed, self._store, self._chosen = client, feed, store, chosen
+        self._touched = 0.0
+        gui = client.gui
+        panel = gui.add_panel()
+        with panel.add_tab("Timeline", viser.Icon.PLAYER_PLAY):
+            self._state = gui.add_html("")
+            self._slider = gui.add_slider(
+                "Position, s",
+                0.0,
+                1.0,
+                0.1,
+                0.0,
+                visible=False,
+                hint="Seconds since the recording began",
+            )
+            self._slider.on_update(lambda event: self._slid(event))
+            moves = ("start", "−10 s", "◂ step", "play / pause", "step ▸", "+10 s")
+            self._buttons = gui.add_button_group("Replay", moves)
+            self._buttons.on_click(lambda _: self._press(self._buttons.value))
+            self._speed = gui.add_dropdown("Speed", SPEEDS, initial_value="1×")
+            self._speed.on_update(lambda event: self._set_speed(event))
+            self._loop = gui.add_button_group("Loop", ("from here", "until here", "off"))
+            self._loop.on_click(lambda _: self._set_loop(self._loop.value))
+            self._note = gui.add_text("Note", "", hint="What should be remembered of this moment")
+            self._keep = gui.add_button_group("Keep", ("note", "mark"))
+            self._keep.on_click(lambda _: self._remember(self._keep.value == "mark"))
+        if dock:
+            panel.dock_below(gui.main_panel)  # viser has no bar over the whole width
+            panel.set_height(300)
+        self._replay_inputs = (self._slider, self._buttons, self._speed, self._loop)
+        self._showing: bool | None = None
+        self._commands()
+
+    @property
+    def uuids(self) -> frozenset[str]:
+        """The elements a viewer may not use: they order, or write into the recording."""
+        handles = (*self._replay_inputs, self._note, self._keep)
+        return frozenset(handle._impl.uuid for handle in handles)
+
+    def update(self, now: float) -> None:
+        """Show the newest state. Call under the store's lock."""
+        replay = self._store.replay
+        running = replay.age(now) < STALE_S
+        if self._showing != running:
+            self._showing = running
+            for handle in self._replay_inputs:
+                handle.visible = running
+        content = self._replay_html(replay.status) if running else self._live_html(now)
+        content += self._marks_html()
+        if self._state.content != content:
+            self._state.content = content
+        if running and now - self._touched > HOLD_S:
+            self._slide(replay.status)
+
+    # --- what is shown
+
+    def _slide(self, m: pb.ReplayStatus) -> None:
+        """Bring the slider to the replay's position; its length first, which bounds the values it
+        takes.
+        """
+        length = max(round(m.length_s, 1), 0.1)
+        if self._slider.max != length:
+            self._slider.max = length
+        value = min(max(round(m.position_s, 1), 0.0), length)
+        if self._slider.value != value:
+            self._slider.value = value
+
+    @staticmethod
+    def _replay_html(m: pb.ReplayStatus) -> str:
+        loop = (
+            f" · loop {clock(m.loop_from_s)} to {clock(m.loop_until_s)}"
+            if m.loop_until_s > m.loop_from_s
+            else ""
+        )
+        state = "❚❚ paused" if m.paused else f"▶ {m.speed:g}×"
+        position = clock(m.position_s, 3 if m.paused else 1)  # a step is one sample
+        message = f" · <b>{escape(m.message)}</b>" if m.message else ""
+        return (
+            f'<p class="gf-note"><b>Replay</b> {escape(m.session)} · {position} of'
+            f" {clock(m.length_s)} · {state}{loop}{message}</p>"
+        )
+
+    def _live_html(self, now: float) -> str:
+        latest = self._store.recorder
+        if latest is None or latest.age(now) > 3.0:
+            return '<p class="gf-note"><b>Live</b> · the recorder is not running</p>'
+        m = latest.message
+        if not m.recording:
+            return (
+                '<p class="gf-note"><b>Live</b> · not being recorded: notes are shown, but not'
+                " kept</p>"
+            )
+        repaired = sum(m.repaired.values())
+        filled = f" · {repaired} messages filled in after a loss" if repaired else ""
+        holding = f" · filling a gap, {m.repairing} messages wait" if m.repairing else ""
+        return (
+            f'<p class="gf-note"><b>Live</b> <b class="gf-rec">●</b> {escape(m.session)} ·'
+            f" {clock(m.seconds)}{filled}{holding}</p>"
+        )
+
+    def _marks_html(self) -> str:
+        device = self._store.device(self._chosen())
+        if device is None or not device.marks:
+            return ""
+        rows = [f"{clock(at)} {escape(text or 'mark')}" for at, text in device.marks[-SHOWN_MARKS:]]
+        return f'<p class="gf-note">{" · ".join(rows)}</p>'
+
+    # --- what a person does
+
+    def _commands(self) -> None:
+        add = self._client.gui.add_command
+        for label, key, press in (
+            ("Replay: play or pause", "K", "play / pause"),
+            ("Replay: a step back", "J", "◂ step"),
+            ("Replay: a step on", "L", "step ▸"),
+        ):
+            add(label, hotkey=key).on_trigger(lambda _, press=press: self._press(press))
+        add("Set a mark", hotkey="M").on_trigger(lambda _: self._remember(True))
+
+    def _order(self, action: int, value: float = 0.0, until: float = 0.0) -> None:
+        if not self._showing:
+            return
+        try:
+            self._feed.replay(pb.ReplayCommand(action=action, value=value, until=until))
+        except ConnectionError as error:
+            self._client.add_notification(
+                "The replay did not do it", str(error), color="red", auto_close_seconds=6.0
+            )
+
+    def _slid(self, event: Any) -> None:
+        if event.client is None:
+            return  # moved by the replay itself
+        self._touched = time.monotonic()
+        self._order(pb.ReplayCommand.ACTION_SEEK, self._slider.value)
+
+    def _set_speed(self, event: Any) -> None:
+        if event.client is not None:
+            self._order(pb.ReplayCommand.ACTION_SPEED, float(self._speed.value.rstrip("×")))
+
+    def _press(self, what: str) -> None:
+        replay, kind = self._store.replay, pb.ReplayCommand
+        if replay.status is None:
+            return
+        at = replay.status.position_s
+        if what == "play / pause":
+            self._order(kind.ACTION_RESUME if replay.status.paused else kind.ACTION_PAUSE)
+        elif what.endswith("step") or what.startswith("step"):
+            self._order(kind.ACTION_STEP, 1.0 if what.startswith("step") else -1.0)
+        else:
+            jump = {"start": -at, "−10 s": -10.0, "+10 s": 10.0}[what]
+            self._order(kind.ACTION_SEEK, max(0.0, at + jump))
+
+    def _set_loop(self, what: str) -> None:
+        m = self._store.replay.status
+        if m is None:
+            return
+        if what == "off":
+            self._order(pb.ReplayCommand.ACTION_LOOP)
+        elif what == "from here":
+            self._order(pb.ReplayCommand.ACTION_LOOP, m.position_s, max(m.loop_until_s, m.length_s))
+        elif m.position_s > m.loop_from_s:
+            self._order(pb.ReplayCommand.ACTION_LOOP, m.loop_from_s, m.position_s)
+
+    def _remember(self, mark: bool) -> None:
+        name, text = self._chosen(), self._note.value.strip()
+        if not name or not (text or mark):
+            return
+        with self._store.lock:
+            device = self._store.device(name)
+            at_ns = (
+                device.utc0_ns + int(device.t_newest * 1e9)
+                if device is not None
+                else time.time_ns()
+            )
+        kind = pb.Note.KIND_MARK if mark else pb.Note.KIND_NOTE
+        note = pb.Note(
+            header=pb.Header(device=name, utc_ns=at_ns),
+            text=text[:2000],
+            kind=kind,
+            at_utc_ns=at_ns,
+        )
+        try:
+            self._feed.note(name, note)
+            self._note.value = ""
+        except ConnectionError as error:
+            self._client.add_notification(
+                "The note was not kept", str(error), color="red", auto_close_seconds=6.0
+            )
+
+
+def clock(seconds: float, digits: int = 1) -> str:
+    """Seconds as m:ss.s, with hours where there are any."""
+    sign, seconds = ("−" if seconds < 0 else ""), abs(seconds)
+    minutes, rest = divmod(round(seconds, digits), 60)
+    hours, minutes = divmod(int(minutes), 60)
+    tail = f"{rest:0{3 + digits}.{digits}f}"
+    return f"{sign}{hours}:{minutes:02d}:{tail}" if hours else f"{sign}{minutes}:{tail}"

@@ -1,0 +1,171 @@
+"""Orders over the bus, each with its answer or the reason of its refusal: both ends of it.
+
+An order is a query on a key of messages.contract.topics: a command as payload, one answer back. A
+service that takes no order (it is stopping, the bytes are no command) says why in an error reply;
+the one who asked gets that reason as it was said, and never "does not answer" for it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import zenoh
+from google.protobuf.message import DecodeError, Message
+
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import control_key, recorder_control_key, replay_control_key
+
+REASON_LENGTH = 500  # characters of a refusal that are passed on
+
+C = TypeVar("C", bound=Message)
+A = TypeVar("A", bound=Message)
+
+
+class OrderError(RuntimeError):
+    """An order that was not carried out; the text says why, fit for a person to read."""
+
+
+class Refused(OrderError):
+    """The service was asked and says why it does not take the order."""
+
+
+class NoAnswer(OrderError):
+    """Nobody answered in time, or not in a way that can be read; the text says what to look at."""
+
+
+@dataclass(frozen=True)
+class Kind(Generic[C, A]):
+    """One kind of orders: who takes them, where, and what goes there and back."""
+
+    who: str
+    command: type[C]
+    answer: type[A]
+    look: str  # what to look at when nobody answers
+    patience_s: float
+    key: Callable[[str, str], str]  # of (prefix, device)
+
+
+RECORDER = Kind(
+    "the recorder",
+    pb.RecorderCommand,
+    pb.RecorderStatus,
+    "see that `gyrofree record` runs and reaches the router",
+    10.0,  # it may have to close a file
+    lambda prefix, device: recorder_control_key(prefix),
+)
+ESTIMATOR = Kind(
+    "the estimator",
+    pb.EstimatorCommand,
+    pb.Reply,
+    "see that `gyrofree estimator` runs and reaches the router",
+    20.0,  # a fit takes seconds, and the order waits for the samples before it
+    lambda prefix, device: control_key(prefix, device, "estimator-control"),
+)
+BOARD = Kind(
+    "the gateway",
+    pb.BoardCommand,
+    pb.Reply,
+    "see that `gyrofree gateway` runs and reaches the router",
+    8.0,  # a self-test of the sensors takes up to 4 s
+    lambda prefix, device: control_key(prefix, device, "board-control"),
+)
+REPLAY = Kind(
+    "the replay",
+    pb.ReplayCommand,
+    pb.ReplayStatus,
+    "it has ended",
+    5.0,
+    lambda prefix, device: replay_control_key(prefix),
+)
+
+
+def give(
+    session: zenoh.Session | None,
+    prefix: str,
+    kind: Kind[C, A],
+    command: C,
+    device: str = "",
+    timeout_s: float | None = None,
+) -> A:
+    """Give an order and wait for its answer, by default as long as this kind of orders may take.
+
+    `device` for the kinds that are for one board or its estimators. Raises Refused with the
+    service's own reason, NoAnswer without an answer, TopicError for a name that cannot be a
+    device's.
+    """
+    if session is None:
+        raise NoAnswer(f"{kind.who}: no connection to the router yet")
+    key = kind.key(prefix, device)
+    patience_s = kind.patience_s if timeout_s is None else timeout_s
+    try:
+        replies = session.get(key, payload=command.SerializeToString(), timeout=patience_s)
+        for reply in replies:
+            return _read(reply, kind, patience_s)
+    except zenoh.ZError as error:
+        raise NoAnswer(f"{kind.who}: the order cannot be sent: {error}") from None
+    raise NoAnswer(f"{kind.who} does not answer: {kind.look}")
+
+
+def _read(reply: zenoh.Reply, kind: Kind[C, A], patience_s: float) -> A:
+    """The answer in a reply; raises Refused or NoAnswer."""
+    if reply.ok is None:
+        if reply.replier_id is None:  # by Zenoh itself, when the time was over
+            raise NoAnswer(f"{kind.who} did not answer within {patience_s:g} s: {kind.look}")
+        reason = reply.err.payload.to_bytes().decode(errors="replace")[:REASON_LENGTH]
+        raise Refused(f"{kind.who}: {reason}")
+    payload = reply.ok.payload.to_bytes()
+    try:
+        return kind.answer.FromString(payload)
+    except DecodeError:
+        raise NoAnswer(
+            f"{kind.who} answered with {len(payload)} bytes that are no {kind.answer.__name__}: is"
+            " it of another version?"
+        ) from None
+
+
+class Order(Generic[C, A]):
+    """An order that came: `answer` or `refuse` it, once, from any thread, at once or later."""
+
+    def __init__(self, query: zenoh.Query, device: str, command: C) -> None:
+        """`device`: the second name of the key that was asked."""
+        self._query = query
+        self.device = device
+        self.command = command
+
+    def answer(self, message: A) -> None:
+        """It has been carried out, or the message says why not."""
+        self._query.reply(str(self._query.key_expr), message.SerializeToString())
+
+    def refuse(self, reason: str) -> None:
+        """It is not looked at, for this reason."""
+        self._query.reply_err(reason.encode())
+
+
+def take(
+    session: zenoh.Session,
+    prefix: str,
+    kind: Kind[C, A],
+    handler: Callable[[Order[C, A]], None],
+    device: str = "",
+) -> zenoh.Queryable:
+    """Call handler(order) on Zenoh's thread for each order; undeclare the result at the end.
+
+    `device` "*" takes the orders for any device. Bytes that are no command, and orders for several
+    devices at once, are refused here.
+    """
+
+    def on_query(query: zenoh.Query) -> None:
+        asked = str(query.key_expr)
+        payload = query.payload.to_bytes() if query.payload is not None else b""
+        try:
+            command = kind.command.FromString(payload)
+        except DecodeError:
+            reason = f"{len(payload)} bytes are no {kind.command.__name__}"
+            query.reply_err(reason.encode())
+            return
+        if "*" in asked:
+            query.reply_err(f"an order is for one device, not for {asked}".encode())
+            return
+        handler(Order(query, asked.split("/")[1], command))
+
+    return session.declare_queryable(kind.key(prefix, device), on_query)
