@@ -6,15 +6,17 @@ import errno
 import logging
 import socket
 import threading
-from collections.abc import Collection
 from typing import Any
 
 import uvicorn
 
+from dashboard.data.feed import Feed
+from dashboard.data.store import Store
+from dashboard.desk import Desk
 from dashboard.settings import DashboardSettings
 from dashboard.web.app import create_app
 from dashboard.web.auth import Gate
-from dashboard.web.control import BusWatch, RecorderControl, Replay
+from dashboard.web.control import Replay
 from dashboard.web.front import Front
 from dashboard.web.jobs import Jobs
 from dashboard.web.users import UserStore, load_users
@@ -127,22 +129,23 @@ def run(
                 "serving %s without TLS: passwords cross the network readable; see docs",
                 settings.url,
             )
-        session = open_client(bus, stop)
-        try:
+        with open_client(bus, stop) as session:
+            store, desk, watched = Store(), Desk(session, bus.prefix), threading.Event()
             try:
-                handle = scene.start(bus, settings)
+                handle = scene.start(settings, store, desk, watched)
             except scene.SceneError as error:
                 raise PortTaken(errno.EADDRINUSE, str(error)) from None
+            feed = Feed(session, bus.prefix, store, watched)
             front = Front(
                 settings=settings,
                 gate=Gate(settings, UserStore(settings.users)),
                 catalogue=Catalogue(settings.sessions_root),
                 scene_port=lambda: handle.port,
-                watch=BusWatch(session, bus.prefix),
-                recorder=RecorderControl(session, bus.prefix),
+                store=store,
+                desk=desk,
                 replay=replay,
                 jobs=jobs,
-                open_widgets=lambda: _open_widgets(handle),
+                open_widgets=handle.viewer_uuids,
             )
             log.info("dashboard at %s", settings.url)
             try:
@@ -155,11 +158,4 @@ def run(
                 front.readings.close()
                 front.uploads.close()
                 handle.stop()
-        finally:
-            session.close()
-
-
-def _open_widgets(handle: Any) -> Collection[str]:
-    """Widgets a viewer may use, as far as the scene names them; none otherwise."""
-    named = getattr(handle, "viewer_uuids", None)
-    return named() if named is not None else ()
+                feed.stop()

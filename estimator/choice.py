@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from estimator.settings import EstimatorSettings, LayoutSettings
+from inertial.attitude.filters import ATTITUDES
 from inertial.calibration.card import Card, CardError, read_card
+from inertial.navigation.navigation import NAVIGATORS
 from inertial.rate.beliefs import Beliefs
 
 
@@ -31,6 +33,23 @@ def check_names(key: str, names: list[str], known: dict[str, Any]) -> None:
             raise UnknownEstimator(
                 f"[estimator] {key}: no estimator {name!r}; want some of {', '.join(known)}"
             )
+
+
+def check_settings(settings: EstimatorSettings) -> None:
+    """Raises UnknownEstimator for a name that is none or a file that cannot be read: at the start,
+    not at the first sample.
+    """
+    check_names("rate", settings.rate, rate_estimators())
+    check_names("navigators", settings.navigators, NAVIGATORS)
+    check_names("attitudes", settings.attitudes, ATTITUDES)
+    check_names("gyro_free_navigation", settings.gyro_free_navigation, NAVIGATORS)
+    if settings.gyro_free_navigation:
+        check_names("gyro_free_rate", [settings.believed_rate], dict.fromkeys(settings.rate))
+    for layout in (settings.layout, *settings.layouts.values()):
+        if layout.file:
+            make_layout(layout)
+    for path in filter(None, (settings.calibration, *settings.calibrations.values())):
+        load_card(path)
 
 
 def beliefs(settings: EstimatorSettings) -> Beliefs:

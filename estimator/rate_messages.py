@@ -4,16 +4,13 @@ This runs for every sample. What the samples of a batch share is put into bytes 
 filter wrote into a row goes from there into the message as it stands.
 """
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 
-from estimator.convert import moment
-from estimator.packed import Doubles, RowFields
-from inertial.rate import products_track as track
-from inertial.rate.track_state import TrackState
+from estimator.convert.header import moment
+from estimator.packed import Doubles
 from messages.contract import gyrofree_pb2 as pb
 
 MOST_SHARED = 64  # combinations of what few samples change; a clock that is adjusted makes new ones
@@ -32,31 +29,6 @@ _ARRAYS = Doubles(
     "bias",
     "bound_sigma_radps",
 )
-
-
-@cache
-def _fields(products: int, bounded: bool) -> RowFields:
-    """Where the fields stand in a filter's row; those that a sample does not have are left out."""
-    columns = {
-        "omega_ib_b_radps": (track.OMEGA, 3),
-        "omega_covariance": (track.P, 9),
-        "alpha_b_radps2": (track.ALPHA, 3),
-        "f_b_mps2": (track.F, 3),
-        "q_nb": (track.Q_NB, 4),
-        "angle_z_rad": (track.ANGLE, 1),
-        "p_n_m": (track.P_N, 3),
-        "v_n_mps": (track.V_N, 3),
-        "bias": (track.BIAS, 12),
-    }
-    if products:
-        columns |= {
-            "innovation": (track.INNOVATION, products),
-            "innovation_sigma": (track.SIGMA, products),
-            "nis": (track.NIS, 1),
-        }
-    if bounded:
-        columns["bound_sigma_radps"] = (track.BOUND, 3)
-    return RowFields(pb.RateEstimate, **columns)
 
 
 class RateMessages:
@@ -80,10 +52,9 @@ class RateMessages:
             card,
         )
         self._shared = {} if shared is None else shared
-        self._wires: dict[tuple[Any, ...], tuple[bytes, Any]] = {}
 
     def estimate(self, row: int, index: int, name: str, state: Any) -> pb.RateEstimate:
-        """RateState or TrackState after sample `index`, which is `row` of the batch, as
+        """RateState after sample `index`, which is `row` of the batch, as
         published.
         """
         key = (
@@ -128,32 +99,21 @@ class RateMessages:
         return message.SerializeToString()
 
     def _numbers(self, state: Any) -> bytes:
-        if not isinstance(state, TrackState):
-            bound = state.bound_sigma
-            message = pb.RateEstimate(angle_z_rad=state.angle_z, nis=state.nis)
-            return message.SerializeToString() + _ARRAYS.wire(
-                state.omega_b,
-                state.P,
-                state.alpha_b,
-                state.f_b,
-                state.q_nb,
-                state.innovation,
-                state.innovation_sigma,
-                state.p_n,
-                state.v_n,
-                state.bias,
-                _NONE if bound is None else bound,
-            )
-        fields = _fields(state.nis_dof, state.bounded)
-        key = (
-            id(state.rows),
-            state.nis_dof,
-            state.bounded,
-        )  # the states of a batch share their rows
-        found = self._wires.get(key)
-        if found is None:
-            found = self._wires[key] = (fields.wire(state.rows), state.rows)
-        return found[0][fields.size * state.at : fields.size * (state.at + 1)]
+        bound = state.bound_sigma
+        message = pb.RateEstimate(angle_z_rad=state.angle_z, nis=state.nis)
+        return message.SerializeToString() + _ARRAYS.wire(
+            state.omega_b,
+            state.P,
+            state.alpha_b,
+            state.f_b,
+            state.q_nb,
+            state.innovation,
+            state.innovation_sigma,
+            state.p_n,
+            state.v_n,
+            state.bias,
+            _NONE if bound is None else bound,
+        )
 
 
 class BoardMessages:

@@ -24,6 +24,19 @@ TITLES = {
 }
 XYZ = COLOURS[:3]
 
+PAGE = """<!doctype html><html lang="en"><meta charset="utf-8">
+<title>The published table test, reproduced</title>
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<style>
+body{font:15px/1.5 system-ui,sans-serif;max-width:64rem;margin:2rem auto;padding:0 1rem;color:#222}
+table{border-collapse:collapse;margin:1rem 0}
+th,td{padding:.3rem .8rem;border-bottom:1px solid #ddd;text-align:right}
+tr>th:first-child{text-align:left;font-weight:500}img{max-width:100%}figure{margin:2rem 0}
+figcaption{color:#555}
+</style>
+<h1>The published table test, reproduced</h1>
+"""
+
 
 def draw(out: Path, s: "Session", result: dict[str, Any]) -> list[dict[str, str]]:
     """Write the seven pictures; file, title and caption of each. Raises OSError."""
@@ -270,15 +283,9 @@ def write_index(out: Path, result: dict[str, Any]) -> None:
         f"<th>{name}</th>" for name in ("", "paper", "paper's way here", "ours here", "truth")
     )
     (out / "index.html").write_text(
-        f"""<!doctype html><html lang="en"><meta charset="utf-8"><title>The published table test, reproduced</title>
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<style>body{{font:15px/1.5 system-ui,sans-serif;max-width:64rem;margin:2rem auto;padding:0 1rem;color:#222}}
-table{{border-collapse:collapse;margin:1rem 0}}
-th,td{{padding:.3rem .8rem;border-bottom:1px solid #ddd;text-align:right}}
-tr>th:first-child{{text-align:left;font-weight:500}}img{{max-width:100%}}figure{{margin:2rem 0}}
-figcaption{{color:#555}}</style>
-<h1>The published table test, reproduced</h1>
-<p>Session: {html.escape(result["session"])}, {result["samples"]} samples at {result["rate_hz"]:g} Hz.
+        PAGE
+        + f"""<p>Session: {html.escape(result["session"])}, {result["samples"]} samples at
+{result["rate_hz"]:g} Hz.
 The numbers of the paper are Hoseini and Moradi, 2017; it prints no errors of rate and angle.</p>
 <table><tr>{head}</tr>{"".join(rows)}</table>
 {figures}</html>

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.navigation.fix import RTK_FIXED, Fix
-from inertial.navigation.navigation import NAVIGATORS, Mode, NavigatorConfig
+from inertial.navigation.navigation import Mode
 
 Array = NDArray[np.float64]
 
@@ -62,13 +62,7 @@ def _fix(row: dict[str, float], key: int, withheld: bool) -> Fix:
     )
 
 
-def score_drive(
-    imu_csv: Path,
-    gnss_csv: Path,
-    every: int = 4,
-    estimator: str = "huber-nhc",
-    config: NavigatorConfig | None = None,
-) -> dict[str, Any]:
+def score(drive: Drive, navigator: Any) -> dict[str, Any]:
     """Errors at the RTK fixes the filter never saw, from 20 s after navigation began.
 
     Returns RMS: horizontal_m, vertical_m, velocity_mps (3-D), heading_vs_course_deg (above 4 m/s);
@@ -76,14 +70,6 @@ def score_drive(
     the mean NIS of the used fixes per degree of freedom, and us_per_epoch: CPU time of everything,
     corrections included, per IMU sample.
     """
-    drive = read_drive(imu_csv, gnss_csv, every)
-    return score(
-        drive, NAVIGATORS[estimator](config or NavigatorConfig(lever_arm_b=CAR_LEVER_ARM_B))
-    )
-
-
-def score(drive: Drive, navigator: Any) -> dict[str, Any]:
-    """As score_drive, for a drive already read and any navigator."""
     position, velocity, heading, nis, unscored = [], [], [], [], 0
     began = math.inf
     fixes = iter(drive.fixes)

@@ -1,6 +1,5 @@
-"""The live picture: a viser server with the 3-D scene and the docked panels, fed from the bus.
+"""The live picture: a viser server with the 3-D scene and the docked panels, of dashboard/data.
 
-data/     messages become rows: feed, store, the declared tables and their rings
 drawing/  shapes, colours, number formats, charts and their decimation
 panels/   one module for each page of charts and each box on the left
 scene     the nodes of the 3-D scene of one browser

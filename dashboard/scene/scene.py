@@ -31,8 +31,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import viser
 
-from dashboard.scene.data.device import Device
-from dashboard.scene.data.track import Track
+from dashboard.data.device import Device
+from dashboard.data.track import Track
 from dashboard.scene.drawing import bodies, camera
 from dashboard.scene.drawing import geometry as geo
 from dashboard.scene.drawing.axis_arrows import AxisArrows

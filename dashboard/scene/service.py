@@ -1,6 +1,4 @@
-"""start(): the viser server on the loopback, the feed, and the two loops that bring browsers up to
-date.
-"""
+"""start(): the viser server on the loopback, and the two loops that bring browsers up to date."""
 
 import contextlib
 import io
@@ -15,19 +13,15 @@ from typing import Protocol
 import viser
 from viser._messages import ShareUrlDisconnect, ShareUrlRequest
 
-from dashboard.scene.data.feed import Feed
-from dashboard.scene.data.store import Store
+from dashboard.data.store import Store
+from dashboard.desk import Desk
 from dashboard.scene.style import LEFT_WIDTH, css
 from dashboard.scene.view import View
-from messages.bus.session import BusSettings
-from messages.contract import gyrofree_pb2 as pb
 
 log = logging.getLogger(__name__)
 
 POSE_S = 1 / 25  # period of poses
 PANEL_S = 1 / 4  # period of charts and tables
-
-RecordCall = Callable[[pb.RecorderCommand], pb.RecorderStatus]
 
 
 class SceneSettings(Protocol):
@@ -46,17 +40,14 @@ class SceneHandle:
     """
 
     def __init__(
-        self, server: viser.ViserServer, feed: Feed, store: Store, on_record: RecordCall | None
+        self, server: viser.ViserServer, store: Store, desk: Desk, watched: threading.Event
     ) -> None:
         self.port = server.get_port()
-        self.store = store
-        self.feed = feed
-        self._server = server
-        self._on_record = on_record or feed.recorder
+        self._server, self._store, self._desk = server, store, desk
         self._views: dict[int, View] = {}
         self._lock = threading.Lock()
         self._stop = threading.Event()
-        self._watched = feed.watched
+        self._watched = watched
         server.on_client_connect(self._connected)
         server.on_client_disconnect(self._disconnected)
         self._threads = [
@@ -91,16 +82,15 @@ class SceneHandle:
             return len(self._views)
 
     def stop(self) -> None:
-        """End loops, feed and server."""
+        """End loops and server."""
         self._stop.set()
         self._watched.set()  # wakes the loops
         for thread in self._threads:
             thread.join(timeout=5.0)
-        self.feed.stop()
         self._server.stop()
 
     def _connected(self, client: viser.ClientHandle) -> None:
-        view = View(client, self.store, self.feed, self._on_record)
+        view = View(client, self._store, self._desk)
         with self._lock:
             self._views[client.client_id] = view
             self._watched.set()
@@ -132,17 +122,15 @@ class SceneHandle:
 
 
 def start(
-    bus: BusSettings,
     settings: SceneSettings,
-    store: Store | None = None,
-    on_record: RecordCall | None = None,
+    store: Store,
+    desk: Desk,
+    watched: threading.Event | None = None,
     host: str = "127.0.0.1",
 ) -> SceneHandle:
-    """Serve the scene at settings.viser_port of `host`.
+    """Serve the scene at settings.viser_port of `host`; `watched` is set while a browser looks.
 
-    `on_record` gets the orders of the record buttons and returns the recorder's answer or raises
-    ConnectionError; by default the recorder is asked on the bus. Raises SceneError when the port is
-    taken.
+    Raises SceneError when the port is taken.
     """
     # A browser may go while it is brought up to date; its view is dropped a moment later.
     warnings.filterwarnings(
@@ -162,8 +150,7 @@ def start(
             " or set it to 0"
         )
     _dress(server)
-    store = store or Store()
-    return SceneHandle(server, Feed(bus, store, threading.Event()), store, on_record)
+    return SceneHandle(server, store, desk, watched or threading.Event())
 
 
 def _dress(server: viser.ViserServer) -> None:

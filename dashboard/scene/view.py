@@ -4,16 +4,14 @@ and page.
 
 import threading
 import time
-from collections.abc import Callable
 
 import viser
 
-from dashboard.scene.data.device import Device
-from dashboard.scene.data.feed import Feed
-from dashboard.scene.data.store import Store
+from dashboard.data.device import Device
+from dashboard.data.store import Store
+from dashboard.desk import Desk
 from dashboard.scene.panels import PAGES, Devices, Position, Record, Snapshot, Tilt, Timeline
 from dashboard.scene.scene import LAYERS, Choice, SceneView
-from messages.contract import gyrofree_pb2 as pb
 
 WINDOWS = {"10 s": 10.0, "30 s": 30.0, "60 s": 60.0, "5 min": 300.0, "10 min": 600.0}
 TRACK_S = 0.2  # trajectories grow five times a second
@@ -28,10 +26,9 @@ class View:
         self,
         client: viser.ClientHandle,
         store: Store,
-        feed: Feed,
-        on_record: Callable[[pb.RecorderCommand], pb.RecorderStatus],
+        desk: Desk,
     ) -> None:
-        self._client, self._store, self._feed = client, store, feed
+        self._client, self._store, self._desk = client, store, desk
         self._choice = Choice()
         self._device_name = ""
         self._device_chosen = False  # by the person, or by the replay that it began
@@ -48,9 +45,9 @@ class View:
         self._theme()
         self.scene = SceneView(client, self._choice)
         with client.atomic():
-            self._build_left(on_record)
+            self._build_left()
             self._build_right()
-            self._timeline = Timeline(client, feed, store, lambda: self._device_name)
+            self._timeline = Timeline(client, desk, store, lambda: self._device_name)
 
     @property
     def own_uuids(self) -> frozenset[str]:
@@ -88,7 +85,7 @@ class View:
             if device is None:
                 router = "no router: is `gyrofree router` running?"
                 text = "no device has spoken yet: is `gyrofree gateway` running?"
-                self._devices.waiting(text if self._feed.connected else router)
+                self._devices.waiting(text if self._desk.connected else router)
                 return
             if device.generation != self._generation and self._paused_at is not None:
                 self._pause(False)  # the frozen window belongs to a time axis that is gone
@@ -108,7 +105,7 @@ class View:
 
     # --- building
 
-    def _build_left(self, on_record: Callable) -> None:
+    def _build_left(self) -> None:
         gui = self._client.gui
         gui.set_panel_label("gyrofree")
         self._chooser = gui.add_dropdown("Device", ("–",), visible=False)
@@ -123,7 +120,7 @@ class View:
             "Pause", icon=viser.Icon.PLAYER_PAUSE, color="gray", hint="Key P"
         )
         self._pause_button.on_click(lambda _: self._pause(self._paused_at is None))
-        self._record = Record(self._client, on_record)
+        self._record = Record(self._client, self._desk.recorder)
         with gui.add_folder("View", expand_by_default=False):
             self._build_controls()
         self._commands()
@@ -158,7 +155,7 @@ class View:
             page(self._client, folder) for page, folder in zip(PAGES, self._folders, strict=True)
         ]
         for page in self._pages:
-            page.feed = self._feed
+            page.desk = self._desk
         panel.dock_right()
         panel.set_width(470)
         self._open(0)

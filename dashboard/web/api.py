@@ -10,9 +10,11 @@ from fastapi import APIRouter, Depends, HTTPException, Query, Request
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field
 
+from dashboard.data.device import Device
 from dashboard.web.auth import Role
-from dashboard.web.control import ControlError, Device
+from dashboard.web.control import ControlError
 from dashboard.web.front import Asker, Front, asker, front_of, needs
+from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
 from sessions.library.catalogue import SessionError, SessionInfo
 
@@ -116,17 +118,25 @@ class SessionOut(BaseModel):
     downloadable: bool
 
 
-def device_out(device: Device, age_s: float, stale: bool) -> DeviceOut:
+def device_out(device: Device, stale_s: float) -> DeviceOut:
     """One device as JSON; a device that never sent a link status has zeros and says so in
-    `message`.
+    `message`. Call under the store's lock.
     """
-    link, board = device.link or pb.LinkStatus(), device.board or pb.BoardInfo()
+    heard, described = device.get("link"), device.get("board")
+    link = heard.message if heard else pb.LinkStatus()
+    board = described.message if described else pb.BoardInfo()
+    age_s = heard.age() if heard else min(latest.age() for latest in device.latest.values())
+    stale = age_s > stale_s
     source = link.header.source or board.header.source
+    states = [
+        (name, device.get("estimator", name).message)
+        for name in sorted(device.estimators("estimator"))
+    ]
     estimators = [
         EstimatorOut(
             name=name, state=s.state, message=s.message, us_per_sample=s.us_per_sample, gaps=s.gaps
         )
-        for name, s in sorted(device.estimators.items())
+        for name, s in states
     ]
     return DeviceOut(
         name=device.name,
@@ -137,7 +147,7 @@ def device_out(device: Device, age_s: float, stale: bool) -> DeviceOut:
         stale=stale,
         connected=link.connected and not stale,
         port=link.port,
-        message=link.message if device.link else "no link status yet",
+        message=link.message if heard else "no link status yet",
         sample_rate_hz=link.sample_rate_hz,
         latency_p99_s=link.latency_p99_s,
         clock_skew_ppm=link.clock_skew_ppm,
@@ -249,13 +259,13 @@ def recording_out(front: Front) -> RecordingOut:
         message="the recorder has not been heard of",
         replaying=replayed.parent.name if replayed else "",
     )
-    heard = front.watch.recorder() if front.watch else None
+    heard = front.store.recorder if front.store else None
     if heard is None:
         return out
-    age, status = heard
+    age = heard.age()
     if age > RECORDER_STALE_S:
         return out.model_copy(update={"message": f"the recorder has been silent for {age:.0f} s"})
-    return out.model_copy(update={"available": True} | _recorder_fields(status))
+    return out.model_copy(update={"available": True} | _recorder_fields(heard.message))
 
 
 def _recorder_fields(status: pb.RecorderStatus) -> dict[str, Any]:
@@ -274,11 +284,12 @@ def order_recorder(
     front: Front, action: int, user: str, name: str = "", note: str = ""
 ) -> RecordingOut:
     """Start or stop; HTTP 503 when the recorder does not answer, 409 when it says no."""
-    if front.recorder is None:
+    if front.desk is None:
         raise HTTPException(503, "this dashboard has no connection to a recorder")
     try:
-        status = front.recorder.order(action, user, name, note)
-    except ControlError as error:
+        command = pb.RecorderCommand(action=action, name=name, note=note, user=user)
+        status = front.desk.recorder(command)
+    except OrderError as error:
         raise HTTPException(503, str(error)) from None
     if status.recording != (action == pb.RecorderCommand.ACTION_START):
         raise HTTPException(409, status.message or "the recorder did not do it")
@@ -302,7 +313,7 @@ def start_replay(front: Front, session: str, speed: float, at_s: float = 0.0) ->
 @routes.get("/health", summary="Sign of life; needs no sign-in")
 def health(request: Request) -> Health:
     front = front_of(request)
-    return Health(status="ok", scene=front.scene_port() > 0, bus=front.watch is not None)
+    return Health(status="ok", scene=front.scene_port() > 0, bus=front.desk is not None)
 
 
 @routes.get("/me", summary="The signed-in user and his CSRF token")
@@ -313,10 +324,11 @@ def me(who: SignedIn) -> Me:
 @routes.get("/devices", summary="All devices with the state of their line and their estimators")
 def devices(request: Request, who: SignedIn) -> list[DeviceOut]:
     front = front_of(request)
-    if front.watch is None:
+    if front.store is None:
         return []
-    found = [(device, device.age_s) for device in front.watch.devices()]
-    return [device_out(device, age, age > front.settings.stale_s) for device, age in found]
+    with front.store.lock:
+        found = [front.store.devices[name] for name in front.store.names()]
+        return [device_out(device, front.settings.stale_s) for device in found if device.spoken_of]
 
 
 @routes.get("/recording", summary="State of the recorder and of a replay")

@@ -6,9 +6,11 @@ from dataclasses import dataclass, field
 
 from fastapi import HTTPException, Request
 
+from dashboard.data.store import Store
+from dashboard.desk import Desk
 from dashboard.settings import DashboardSettings
 from dashboard.web.auth import Gate, Role, Session, User, same_token
-from dashboard.web.control import BusWatch, RecorderControl, Replay
+from dashboard.web.control import Replay
 from dashboard.web.jobs import Jobs
 from dashboard.web.readings import Readings
 from dashboard.web.uploads import Uploads
@@ -19,16 +21,16 @@ audit = logging.getLogger("dashboard.audit")
 
 @dataclass
 class Front:
-    """Everything the web side talks to. Without bus (watch, recorder) or replay the pages say that
-    it is not there.
+    """Everything the web side talks to. Without bus (store, desk) or replay the pages say that it
+    is not there.
     """
 
     settings: DashboardSettings
     gate: Gate
     catalogue: Catalogue
     scene_port: Callable[[], int]
-    watch: BusWatch | None = None
-    recorder: RecorderControl | None = None
+    store: Store | None = None
+    desk: Desk | None = None
     replay: Replay | None = None
     jobs: Jobs | None = None
     readings: Readings = field(default_factory=Readings)

@@ -145,7 +145,8 @@ class RateBoard:
         by_name = []
         for name, estimator in self._estimators.items():
             began = time.perf_counter_ns()  # told by EstimatorStatus, touches no estimate
-            states = estimator.feed(t_s, f_axis, asked)
+            columns = estimator.feed(t_s, f_axis)
+            states = [columns.state(k) for k in asked]
             self.last[name] = states[-1]
             self.cost_ns[name] += time.perf_counter_ns() - began
             self.cost_samples[name] += n

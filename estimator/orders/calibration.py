@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator import convert
+from estimator.convert.header import as_list, sample_header
+from estimator.convert.samples import Samples
 from inertial.calibration.card import Card, CardError, read_card, write_card
 from inertial.calibration.fit import CalibrationError
 from inertial.calibration.guided import FITTED, SAVED, Session
@@ -48,7 +49,7 @@ class CalibrationDesk:
         self.used: dict[str, Card | None] = {}  # by device; absent: as the settings say
 
     def feed(
-        self, batch: pb.AccelBatch, samples: convert.Samples, layout: Layout
+        self, batch: pb.AccelBatch, samples: Samples, layout: Layout
     ) -> pb.CalibrationStatus | None:
         """A batch of a device: axis readings at nominal scale; a status twice a second while a
         calibration runs.
@@ -104,7 +105,7 @@ class CalibrationDesk:
         if device not in self._headers:
             return None
         header = pb.Header.FromString(self._headers[device])
-        message = pb.CalibrationStatus(header=convert.sample_header(header, 0.0))
+        message = pb.CalibrationStatus(header=sample_header(header, 0.0))
         used = self.used.get(device)
         message.card = self._saved.get(device, "") or (used.id if used is not None else "")
         if session is None:
@@ -114,13 +115,13 @@ class CalibrationDesk:
         message.instruction, message.message = session.instruction, session.message
         message.progress, message.good_enough = session.progress, session.good_enough
         for up_b, samples, scatter in session.poses:
-            message.poses.add(up_b=convert.as_list(up_b), samples=samples, scatter_mps2=scatter)
+            message.poses.add(up_b=as_list(up_b), samples=samples, scatter_mps2=scatter)
         if session.fit is not None:
-            message.bias_sigma_mps2[:] = convert.as_list(session.fit.bias_sigma)
-            message.scale_sigma[:] = convert.as_list(session.fit.scale_sigma)
+            message.bias_sigma_mps2[:] = as_list(session.fit.bias_sigma)
+            message.scale_sigma[:] = as_list(session.fit.scale_sigma)
             message.residual_mps2 = float(np.sqrt(np.mean(session.fit.residual**2)))
         if session.next_up is not None:
-            message.next_up_b[:] = convert.as_list(session.next_up)
+            message.next_up_b[:] = as_list(session.next_up)
         return message
 
     # --- the orders

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator import convert
 from estimator.choice import UnknownEstimator
+from estimator.convert.header import sample_header
 from estimator.settings import EstimatorSettings
 from inertial.attitude.axis_map import IMU, AxisMap, Figures, MapError, read_map, write_map
 from inertial.attitude.wiring import (
@@ -116,7 +116,7 @@ class WiringDesk:
             return None
         header = self._batch(device, source).header
         used = self.used.get(device)
-        message = pb.WiringStatus(header=convert.sample_header(header, 0.0), source=source)
+        message = pb.WiringStatus(header=sample_header(header, 0.0), source=source)
         message.map = used.id if used is not None else ""
         session = self._sessions.get(device)
         if session is None:

@@ -135,7 +135,7 @@ def _estimated(settings, rows, session: str, note: str, root: Path) -> Path:
     """A session of the rows with the estimates on them."""
     import tempfile
 
-    from estimator.service import Pipeline
+    from estimator.pipeline import Pipeline
     from sessions.replay.rerun import estimates_again, write_session
 
     configuration = settings.model_dump(mode="json")
@@ -176,7 +176,8 @@ def rerun(
     The new estimates stand beside the old ones under their own names, so that live view, report and
     export compare them on one time axis.
     """
-    from estimator.service import Pipeline, UnknownEstimator
+    from estimator.choice import UnknownEstimator
+    from estimator.pipeline import Pipeline
     from sessions.replay.rerun import estimates_again, rerun_id, write_session
 
     settings = settings_of(config)

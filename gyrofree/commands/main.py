@@ -202,10 +202,11 @@ def estimator(config: Config = None, verbose: Verbose = False) -> None:
 
     def body(stop: threading.Event) -> None:
         from estimator import service
+        from estimator.choice import UnknownEstimator
 
         try:
             service.run(settings.estimator, settings.bus, stop)
-        except service.UnknownEstimator as error:
+        except UnknownEstimator as error:
             raise ConfigError(str(error)) from None
 
     run_service(body, verbose)

@@ -50,7 +50,7 @@ def replay(
         raise fail(str(error)) from None
     if check:
         raise typer.Exit(player.check(settings, path, as_json))
-    from estimator.service import UnknownEstimator
+    from estimator.choice import UnknownEstimator
 
     options = player.Options(speed, at, paused, stay, tuple(rate or ()), overlay)
     try:

@@ -55,7 +55,8 @@ def write_configuration(plan: Plan) -> Path:
     path = plan.folder / "gyrofree.toml"
     plan.folder.mkdir(parents=True, exist_ok=True)
     path.write_text(
-        f"""# Written by `gyrofree demo`; start any of its services by hand with --config on this file.
+        f"""# Written by `gyrofree demo`.
+# Start any of its services by hand with --config on this file.
 [bus]
 router = "tcp/127.0.0.1:{plan.bus_port}"
 listen = ["tcp/127.0.0.1:{plan.bus_port}"]

@@ -56,7 +56,7 @@ def check(settings: Settings, path: Path, as_json: bool) -> int:
     """Run the estimators over the recorded samples; exit code 0 when every estimate is the recorded
     one.
     """
-    from estimator.service import Pipeline
+    from estimator.pipeline import Pipeline
     from sessions.replay.reproduce import reproduce
 
     with Console(stderr=True).status(
@@ -93,7 +93,7 @@ class Options:
 
 def run(settings: Settings, path: Path, options: Options, stop: threading.Event) -> None:
     """Play a recording on the bus and obey the orders on <prefix>/replay/control."""
-    from estimator.service import Pipeline
+    from estimator.pipeline import Pipeline
     from messages.bus import orders
     from messages.bus.session import Publishers, open_client
     from messages.contract.topics import REPLAY

@@ -15,7 +15,7 @@ def score_session(settings: EstimatorSettings, path: Path) -> list[dict[str, Any
     """Rows of sessions.replay.reprocess.COLUMNS for every boot and estimator of a recording; raises
     what reading raises.
     """
-    from estimator.service import Pipeline
+    from estimator.pipeline import Pipeline
     from sessions.recording.manifest import read_manifest
     from sessions.replay.rerun import estimates_again, write_session
     from sessions.report.analysis import analyse

@@ -89,7 +89,6 @@ class WiringSession:
         self._offered = False  # a third turn makes sense
 
     # --- data
-    # -----------------------------------------------------------------------------------------------------
 
     def feed(self, period_s: float, values: Array) -> None:
         """Samples (n, columns), period_s apart, in order."""
@@ -104,7 +103,6 @@ class WiringSession:
             self._back("samples were lost: once more")
 
     # --- where it stands
-    # ------------------------------------------------------------------------------------------
 
     @property
     def pose(self) -> int:
@@ -147,7 +145,6 @@ class WiringSession:
         return AXES[k], self.map.sign[k] < 0
 
     # --- inside
-    # ---------------------------------------------------------------------------------------------------
 
     def _sample(self, row: Array) -> None:
         n = max(4, round(WINDOW_S / self._period))

@@ -104,11 +104,6 @@ class Fit:
             sigma.append(np.sqrt(np.linalg.eigvalsh(spread)[-1]) / self.scale[i])
         return np.array(sigma)
 
-    @property
-    def position_sigma(self) -> Array:
-        """(N, 3) m."""
-        return np.array([np.sqrt(np.diag(self.axis_covariance(i))[4:7]) for i in range(self.axes)])
-
 
 def start(layout: Layout, poses: Poses | None, steps: Sequence[Steps]) -> Parameters:
     """Nominal axes; directions of gravity from the readings."""

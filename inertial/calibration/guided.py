@@ -72,7 +72,6 @@ class Session:
         self._spoilt = False
 
     # --- data
-    # -----------------------------------------------------------------------------------------------------
 
     def feed(self, t_s: Array, f_axis: Array) -> None:
         """Samples: times (n,) s, axis readings (n, N) m/s^2 at nominal scale, in order."""
@@ -109,7 +108,6 @@ class Session:
             self.state, self.message = WAITING, "samples were lost: take this one again"
 
     # --- orders
-    # ---------------------------------------------------------------------------------------------------
 
     def solve(self) -> Fit:
         """Fit everything collected; raises CalibrationError when there is too little of it."""
@@ -140,7 +138,6 @@ class Session:
         )
 
     # --- where it stands
-    # ------------------------------------------------------------------------------------------
 
     @property
     def poses(self) -> list[tuple[Array, int, float]]:
@@ -186,7 +183,6 @@ class Session:
         return pose
 
     # --- inside
-    # ---------------------------------------------------------------------------------------------------
 
     def _sample(self, t: float, f: Array, period: float) -> None:
         if self._run is not None:

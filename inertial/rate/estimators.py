@@ -5,9 +5,8 @@ Deterministic: the same samples give the same bits. Frames and units as everywhe
 north-east-down, SI, quaternions w x y z.
 """
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,58 +16,24 @@ from inertial.layouts.layout import Layout
 from inertial.rate import bound, least_squares, products_ekf, sight, tachometer
 from inertial.rate import products_run as frame
 from inertial.rate import products_track as track
+from inertial.rate.batch import Phase, RateColumns, RateState
 from inertial.rate.observed import sensor
 from inertial.rate.samples import Samples
-from inertial.rate.track_state import KEEP_STILL, TOLD, WAITING, TrackState
 
 Array = NDArray[np.float64]
 
 
-@dataclass(slots=True)  # not frozen: that would cost as much as the filter
-class RateState:
-    """Rotation and motion by one estimator, at one sample. Arrays are parts of one row: read them,
-    do not write.
-
-    TrackState offers the same and stands for it wherever a RateState is wanted.
+class RateEstimator(Protocol):
+    """What a rate estimator offers. It is made of a layout, its settings (`default` or a variant of
+    it; only where there is one) and the calibration's id, in this order.
     """
 
-    omega_b: Array  # rad/s, (3,), of b against inertial
-    P: Array  # (rad/s)^2, (3, 3), covariance of omega_b
-    alpha_b: Array  # rad/s^2, (3,)
-    f_b: Array  # m/s^2, (3,), specific force of the centre, bias removed
-    q_nb: Array  # (4,)
-    angle_z: float  # rad, integral of omega_z since the start
-    innovation: Array  # of this sample's correction; empty when there was none
-    innovation_sigma: Array
-    nis: float  # normalised innovation squared
-    nis_dof: int  # its degrees of freedom; 0 without correction
-    still: bool  # the still detector's word
-    p_n: Array  # m, (3,), inertial navigation from the end of the first standstill, no aiding
-    v_n: Array  # m/s, (3,)
-    # equivalent biases: omega' rad/s^2 (3), p m/s^2 (3), and products (6) where estimated
-    bias: Array
-    phase: str = ""  # for people: "finding biases: keep still", ...
-    innovation_unit: str = ""
-    sight: tuple[int, int, int] = (
-        0,
-        0,
-        0,
-    )  # of sight.VALID, AMBIGUOUS, BLIND, by component of omega
-    sight_reason: str = ""  # why a component is not valid
-    bound_sigma: Array | None = None  # rad/s, (3,), posterior Cramer-Rao bound along the estimate
-    excluded: int = 0  # bit k: axis k was not used
-    calibration: str = ""  # id of the calibration card that the readings were corrected by
-    aid: str = ""  # "tachometer" once omega was corrected by it; not to be scored against it
-
-
-class RateEstimator(Protocol):
-    """What a rate estimator offers."""
-
     name: str
+    # settings that calibration and [estimator] change parts of; None: it takes none
+    default: products_ekf.Config | None
 
-    def feed(self, t_s: Array, f_axis: Array, wanted: Sequence[int]) -> list[RateState]:
-        """Take samples read at t_s (n,), s, of the board's clock: readings (n, N), m/s^2; states
-        after `wanted` rows.
+    def feed(self, t_s: Array, f_axis: Array) -> RateColumns:
+        """Take samples read at t_s (n,), s, of the board's clock: readings (n, N), m/s^2.
 
         The same bits as step() one by one. Raises ValueError as step() does, and then takes none of
         them.
@@ -95,6 +60,12 @@ class RateEstimator(Protocol):
         """
         ...
 
+    def tacho_axis(self, axis_b: Sequence[float]) -> None:
+        """Axis in b that tachometer rates are about, any length. Raises ValueError for no
+        direction. Estimators that take no aid ignore it.
+        """
+        ...
+
     def exclude(self, mask: int) -> None:
         """Go on without the axes whose bits are set; 0 takes all back. The axes in use are solved
         anew.
@@ -104,27 +75,23 @@ class RateEstimator(Protocol):
         ...
 
 
-EMPTY = np.zeros(0)
-EMPTY.setflags(write=False)
-LOST = "; the filter lost its covariance and began anew: this motion or layout is not for it"
-
-
 class _Stepping:
     """One sample as a batch of one: the same compiled loop, so the same bits."""
 
-    def feed(self, t_s: Array, f_axis: Array, wanted: Sequence[int]) -> list[RateState]:
+    def feed(self, t_s: Array, f_axis: Array) -> RateColumns:
         """See RateEstimator.feed."""
         raise NotImplementedError
 
     def step(self, index: int, t_s: float, f_axis: Array) -> RateState:
         """See RateEstimator.step."""
-        return self.feed(np.array([t_s]), np.asarray(f_axis)[None], (0,))[0]
+        return self.feed(np.array([t_s]), np.asarray(f_axis)[None]).state(0)
 
 
 class LeastSquaresRate(_Stepping):
     """Estimator "least-squares": the paper's equations and Runge-Kutta (least_squares.py)."""
 
     name = "least-squares"
+    default = None
 
     def __init__(
         self,
@@ -139,40 +106,38 @@ class LeastSquaresRate(_Stepping):
         self._core = least_squares.LeastSquares(layout, config)
         self._taken = Samples()
 
-    def feed(self, t_s: Array, f_axis: Array, wanted: Sequence[int]) -> list[RateState]:
+    def feed(self, t_s: Array, f_axis: Array) -> RateColumns:
         """See RateEstimator.feed."""
         rows = self._core.rows(*self._taken.take(self._core.layout, t_s, f_axis))
-        return [self._state(rows[k]) for k in wanted]
-
-    def _state(self, row: Array) -> RateState:
-        samples, still, moving_s = row[least_squares.ROW_SAMPLES :].tolist()
-        y, x = row[: least_squares.ROW_P], row[least_squares.ROW_X : least_squares.ROW_BIAS]
-        P, waiting = row[least_squares.ROW_P : least_squares.ROW_X].reshape(3, 3), samples == 0.0
-        spread = math.sqrt(max(row[least_squares.ROW_P : least_squares.ROW_X : 4].tolist()))
-        blind = moving_s > 0.0 and spread > sight.BLIND_SIGMA
-        reason = f"integration only, now {spread * sight.DEG:.0f} deg/s uncertain" if blind else ""
-        return RateState(
-            omega_b=y[least_squares.OMEGA],
+        y, n = rows[:, : least_squares.ROW_P], len(rows)
+        x = rows[:, least_squares.ROW_X : least_squares.ROW_BIAS]
+        P = rows[:, least_squares.ROW_P : least_squares.ROW_X].reshape(n, 3, 3)
+        waiting = rows[:, least_squares.ROW_SAMPLES] == 0.0
+        moving = rows[:, least_squares.ROW_MOVING_S] > 0.0
+        worst = np.max(np.diagonal(P, axis1=1, axis2=2), axis=1)
+        phase = np.where(moving, Phase.INTEGRATING, Phase.STILL_AT_START).astype(np.uint8)
+        phase[waiting] = Phase.WAITING
+        blind = waiting | (moving & (worst > sight.BLIND_SIGMA**2))
+        return RateColumns(
+            omega_b=y[:, least_squares.OMEGA],
             P=P,
-            alpha_b=x[:3],
-            f_b=x[3:],
-            q_nb=y[least_squares.Q_NB],
-            angle_z=float(y[least_squares.ANGLE]),
-            innovation=EMPTY,
-            innovation_sigma=EMPTY,
-            nis=0.0,
-            nis_dof=0,
-            still=still > 0.0,
-            p_n=y[least_squares.P_N],
-            v_n=y[least_squares.V_N],
-            bias=row[least_squares.ROW_BIAS : least_squares.ROW_SAMPLES],
-            phase=KEEP_STILL
-            if waiting
-            else "still at the start"
-            if moving_s == 0.0
-            else "integrating",
-            sight=sight.ALL_BLIND if blind or waiting else sight.ALL_VALID,
-            sight_reason=WAITING if waiting else reason,
+            alpha_b=x[:, :3],
+            f_b=x[:, 3:],
+            q_nb=y[:, least_squares.Q_NB],
+            angle_z=y[:, least_squares.ANGLE],
+            innovation=np.zeros((n, 0)),
+            innovation_sigma=np.zeros((n, 0)),
+            nis=np.zeros(n),
+            nis_dof=np.zeros(n, np.uint8),
+            still=rows[:, least_squares.ROW_STILL] > 0.0,
+            p_n=y[:, least_squares.P_N],
+            v_n=y[:, least_squares.V_N],
+            bias=rows[:, least_squares.ROW_BIAS : least_squares.ROW_SAMPLES],
+            phase=phase,
+            sight=np.repeat(np.where(blind, sight.BLIND, sight.VALID), 3).reshape(n, 3),
+            sign_variance=np.zeros(n),
+            bound_sigma=np.zeros((n, 3)),
+            aided=np.zeros(n, np.bool_),
             excluded=self._core.excluded,
             calibration=self.calibration,
         )
@@ -185,6 +150,9 @@ class LeastSquaresRate(_Stepping):
 
     def tacho(self, t_s: float, rate: float, sigma: float, signed: bool = True) -> None:
         """See RateEstimator.tacho: no aid."""
+
+    def tacho_axis(self, axis_b: Sequence[float]) -> None:
+        """See RateEstimator.tacho_axis: no aid."""
 
     def exclude(self, mask: int) -> None:
         """See RateEstimator.exclude."""
@@ -218,35 +186,58 @@ class ProductsRate(_Stepping):
             config.unseen_rate**2 * np.eye(3)
         ).ravel()  # of a standing body, which may have begun to turn
         self._m = int(self.core.sensor["m"])
-        self._reports, self._axis_b, self._aid = tachometer.Reports(), np.array([0.0, 0.0, 1.0]), ""
+        self._reports, self._axis_b, self._aided = (
+            tachometer.Reports(),
+            np.array([0.0, 0.0, 1.0]),
+            False,
+        )
 
-    def feed(self, t_s: Array, f_axis: Array, wanted: Sequence[int]) -> list[TrackState]:
+    def feed(self, t_s: Array, f_axis: Array) -> RateColumns:
         """See RateEstimator.feed."""
         t_s, f_axis = self._taken.take(self.core.layout, t_s, f_axis)
-        parts, aids, row = [], [], 0
+        parts, aided, row = [], np.zeros(len(t_s), np.bool_), 0
         while row < len(t_s):
             if self._reports:
                 self._take_reports()
-            end = (
-                row + 1 if self._reports else len(t_s)
-            )  # while a report waits, its time may come with any sample
+            # while a report waits, its time may come with any sample
+            end = row + 1 if self._reports else len(t_s)
             parts.append(self.core.rows(t_s[row:end], f_axis[row:end], self._bound))
-            aids += [self._aid] * (end - row)
+            aided[row:end] = self._aided
             row = end
-        return self._states(parts[0] if len(parts) == 1 else np.concatenate(parts), aids, wanted)
+        return self._columns(parts[0] if len(parts) == 1 else np.concatenate(parts), aided)
 
-    def _states(self, rows: Array, aids: list[str], wanted: Sequence[int]) -> list[TrackState]:
-        said, mask = rows.take(TOLD, axis=1).tolist(), self.core.excluded
-        for k, (_, still, started, *_) in enumerate(said):
-            if still and started:
-                rows[k, track.P : track.P + 9] += self._unseen
-        states = [
-            TrackState(rows, k, said[k], self._m, aids[k], mask, self.calibration) for k in wanted
-        ]
-        for state in states if self.core.lost else ():
-            if not state.started:
-                state.sight_reason += LOST
-        return states
+    def _columns(self, rows: Array, aided: NDArray[np.bool_]) -> RateColumns:
+        still, started = rows[:, track.STILL] > 0.0, rows[:, track.STARTED] > 0.0
+        two, m = rows[:, track.TWO] > 0.0, self._m
+        rows[still & started, track.P : track.P + 9] += self._unseen
+        nis = np.where(started, rows[:, track.NIS], 0.0)
+        phase = np.where(still, Phase.STILL, Phase.TURNING).astype(np.uint8)
+        phase[two], phase[~started] = Phase.TWO_SIGNS, Phase.WAITING
+        return RateColumns(
+            omega_b=rows[:, track.OMEGA : track.OMEGA + 3],
+            P=rows[:, track.P : track.P + 9].reshape(-1, 3, 3),
+            alpha_b=rows[:, track.ALPHA : track.ALPHA + 3],
+            f_b=rows[:, track.F : track.F + 3],
+            q_nb=rows[:, track.Q_NB : track.Q_NB + 4],
+            angle_z=rows[:, track.ANGLE],
+            innovation=rows[:, track.INNOVATION : track.INNOVATION + m],
+            innovation_sigma=rows[:, track.SIGMA : track.SIGMA + m],
+            nis=nis,
+            nis_dof=np.where(nis != 0.0, m, 0).astype(np.uint8),
+            still=still,
+            p_n=rows[:, track.P_N : track.P_N + 3],
+            v_n=rows[:, track.V_N : track.V_N + 3],
+            bias=rows[:, track.BIAS : track.BIAS + 12],
+            phase=phase,
+            sight=rows[:, track.SIGHT : track.SIGHT + 3].astype(np.uint8),
+            sign_variance=rows[:, track.SIGN],
+            bound_sigma=rows[:, track.BOUND : track.BOUND + 3],
+            aided=aided,
+            innovation_unit="(rad/s)^2",
+            excluded=self.core.excluded,
+            calibration=self.calibration,
+            began_anew=self.core.lost > 0,
+        )
 
     def skip(self, n: int) -> None:
         """See RateEstimator.skip; the next step predicts across the gap."""
@@ -276,7 +267,7 @@ class ProductsRate(_Stepping):
         core = self.core
         for report in self._reports.due(float(core.memory["clock"][frame.LAST_S])):
             if tachometer.correct(core.memory, core.watch, core.sensor, self._axis_b, report):
-                self._aid = tachometer.NAME
+                self._aided = True
 
     def run_batch(self, t_s: Array, f_axis: Array) -> track.Track:
         """All samples at once: times (n,) s, growing, readings (n, N) m/s^2; the same bits as

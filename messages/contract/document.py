@@ -4,8 +4,9 @@ from messages.contract.topics import markdown
 
 INTRODUCTION = """# Topics of the bus
 
-Made from messages/contract/topics.py by `make docs`; do not edit. A key is `<prefix>/<device>/<topic>`, with one more
-part where there is one topic per estimator. Types are defined, with units and frames, in messages/contract/gyrofree.proto.
+Made from messages/contract/topics.py by `make docs`; do not edit. A key is
+`<prefix>/<device>/<topic>`, with one more part where there is one topic per estimator. Types are
+defined, with units and frames, in messages/contract/gyrofree.proto.
 
 """
 

@@ -18,11 +18,21 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 from scipy.io import savemat
 
 from messages.contract.topics import GNSS, LOG, NAV, parse
-from sessions.export.columns import Column, Value
-from sessions.export.table import Progress, Selection, Survey, rows, silent, survey, tables
+from sessions.export.columns import Column
+from sessions.export.table import (
+    Block,
+    Progress,
+    Selection,
+    Survey,
+    blocks,
+    silent,
+    survey,
+    tables,
+)
 from sessions.export.track import write_gpx, write_kml
 from sessions.recording.mcap_log import Damage, McapLog, read
 
@@ -55,9 +65,19 @@ def to_csv(
                 stack.enter_context(files[key].open("w", newline="", encoding="utf-8"))
             )
             writers[key].writerow([column.name for column in columns.names])
-        for key, row in rows(path, found, selection, _second_half(progress)):
-            writers[key].writerow(["" if cell != cell else cell for cell in row])
+        for key, block in blocks(path, found, selection, _second_half(progress)):
+            columns = found.columns[key].names
+            cells = [_cells(column, block[column.name]) for column in columns]
+            writers[key].writerows(zip(*cells, strict=True))
     return list(files.values())
+
+
+def _cells(column: Column, values: NDArray[Any]) -> list[float | int | str]:
+    """A column for CSV: nothing for NaN, whole numbers without a point."""
+    cells: list[float | int | str] = values.tolist()
+    if values.dtype.kind != "f":
+        return cells
+    return ["" if v != v else int(v) if column.whole else v for v in cells]
 
 
 def to_parquet(
@@ -73,8 +93,8 @@ def to_parquet(
             groups[key] = stack.enter_context(
                 _RowGroups(files[key], columns.names, {"key": key, "source": path.name})
             )
-        for key, row in rows(path, found, selection, _second_half(progress)):
-            groups[key].add(row)
+        for key, block in blocks(path, found, selection, _second_half(progress)):
+            groups[key].add(block)
     return list(files.values())
 
 
@@ -85,7 +105,8 @@ class _RowGroups:
         types = [(column.name, pa.string() if column.text else pa.float64()) for column in columns]
         self._schema = pa.schema(types, metadata=metadata)
         self._writer = pq.ParquetWriter(path, self._schema, compression="zstd")
-        self._rows: list[list[Value]] = []
+        self._blocks: list[pa.RecordBatch] = []
+        self._rows = 0
 
     def __enter__(self) -> "_RowGroups":
         return self
@@ -94,24 +115,24 @@ class _RowGroups:
         self._flush()
         self._writer.close()
 
-    def add(self, row: list[Value]) -> None:
-        """One row more."""
-        self._rows.append(row)
-        if len(self._rows) >= ROW_GROUP:
+    def add(self, block: Block) -> None:
+        """Some rows more."""
+        arrays = [
+            pa.array(
+                block[field.name].astype(np.float64 if field.type == pa.float64() else object),
+                type=field.type,
+            )
+            for field in self._schema
+        ]
+        self._blocks.append(pa.RecordBatch.from_arrays(arrays, schema=self._schema))
+        self._rows += len(self._blocks[-1])
+        if self._rows >= ROW_GROUP:
             self._flush()
 
     def _flush(self) -> None:
-        if not self._rows:
-            return
-        arrays = [
-            pa.array(
-                [float(cell) for cell in cells] if field.type == pa.float64() else cells,
-                type=field.type,
-            )
-            for field, cells in zip(self._schema, zip(*self._rows, strict=True), strict=True)
-        ]
-        self._writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
-        self._rows = []
+        if self._blocks:
+            self._writer.write_table(pa.Table.from_batches(self._blocks), ROW_GROUP)
+        self._blocks, self._rows = [], 0
 
 
 def to_mat(

@@ -5,14 +5,16 @@ rows.
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from google.protobuf.message import DecodeError, Message
 from numpy.typing import NDArray
 
 from messages.contract.topics import Topic, TopicError, parse
-from sessions.export.columns import TIME, Column, Columns, Value
+from sessions.export.columns import TIME, Column, Columns
 from sessions.recording.mcap_log import Damage, Recorded, read
+from sessions.recording.samples import Gathering, decode
 
 Progress = Callable[[float, str], None]  # share done 0 to 1, what is being done
 
@@ -63,7 +65,7 @@ def messages(
             continue
         if selection.takes(topic):
             try:
-                yield row, topic, topic.type.FromString(row.payload)
+                yield row, topic, decode(topic, row.payload)
             except DecodeError:
                 yield row, topic, None
 
@@ -92,19 +94,37 @@ def survey(path: Path, selection: Selection = Selection(), progress: Progress = 
     return found
 
 
-def rows(
+Block = dict[str, NDArray[Any]]  # column name -> (n,) numbers or str
+
+
+def blocks(
     path: Path, found: Survey, selection: Selection = Selection(), progress: Progress = silent
-) -> Iterator[tuple[str, list[Value]]]:
-    """Second reading: (bus key, row) in the order of recording. Raises OSError."""
+) -> Iterator[tuple[str, Block]]:
+    """Second reading: (bus key, some rows of it), the rows of a key in the order of recording.
+
+    Raises OSError.
+    """
     total, done = max(1, sum(found.counts.values())), 0
+    ready: list[tuple[str, Block]] = []
+    gathering = {
+        key: Gathering(
+            columns.topic,
+            lambda taken, key=key, columns=columns: ready.append((key, columns.table(taken))),
+        )
+        for key, columns in found.columns.items()
+    }
     for row, _, message in messages(path, selection, Damage()):
-        if message is None or row.key not in found.columns:
+        if message is None or row.key not in gathering:
             continue
-        for cells in found.columns[row.key].rows(message, row.log_ns):
-            yield row.key, cells
+        gathering[row.key].add(message, row.log_ns)
+        yield from ready
+        ready.clear()
         done += 1
         if done % 2000 == 0:
             progress(done / total, "writing")
+    for one in gathering.values():
+        one.flush()
+    yield from ready
     progress(1.0, "written")
 
 
@@ -128,19 +148,19 @@ def tables(
 ) -> dict[str, Table]:
     """A whole recording in memory: bus key -> table. Raises OSError."""
     found = survey(path, selection, lambda done, what: progress(done * 0.4, what))
-    columns = {key: columns.names for key, columns in found.columns.items()}
-    cells: dict[str, list[list[Value]]] = {key: [] for key in columns}
-    for key, row in rows(
+    parts: dict[str, list[Block]] = {key: [] for key in found.columns}
+    for key, block in blocks(
         path, found, selection, lambda done, what: progress(0.4 + done * 0.6, "reading")
     ):
-        cells[key].append(row)
-    return {key: _table(columns[key], cells[key]) for key in columns}
+        parts[key].append(block)
+    return {key: _table(columns.names, parts[key]) for key, columns in found.columns.items()}
 
 
-def _table(columns: list[Column], cells: list[list[Value]]) -> Table:
-    by_column = list(zip(*cells, strict=True)) if cells else [() for _ in columns]
+def _table(columns: list[Column], parts: list[Block]) -> Table:
     data = {
-        column.name: np.array(values, dtype=str if column.text else np.float64)
-        for column, values in zip(columns, by_column, strict=True)
+        column.name: np.concatenate([part[column.name] for part in parts]).astype(
+            str if column.text else np.float64
+        )
+        for column in columns
     }
     return Table(columns, data)

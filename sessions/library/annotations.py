@@ -43,10 +43,6 @@ class Annotations(BaseModel):
     outcome: Outcome = ""
     notes: list[SessionNote] = []
 
-    def matches(self) -> str:
-        """Everything a search may find."""
-        return " ".join([self.title, *self.tags, self.outcome, *(note.text for note in self.notes)])
-
 
 def read_annotations(folder: Path) -> Annotations:
     """Of a session's folder; empty where there is none. Raises SessionError for a damaged file."""

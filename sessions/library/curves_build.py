@@ -19,10 +19,21 @@ from sessions.library.curves import Curves, Line, Mark, bin_for, bins_of, load, 
 from sessions.library.curves_bins import Binner, PulseLine, TrackLine
 from sessions.library.scan import Block, Extent, Progress, extent, scan
 from sessions.recording.manifest import SessionError, name_of, read_manifest
+from sessions.recording.samples import Samples, decode, samples
 
 Array = NDArray[np.float64]
 
-WANTED: tuple[Topic, ...] = (RATE, IMU, TACHO, TRUTH, NAV, GNSS, NOTE)
+PLACE = ("latitude_deg", "longitude_deg", "height_m")
+TURN = ("omega_ib_b_radps", "angle_z_rad")
+WANTED: dict[Topic, tuple[str, ...]] = {  # and which of their fields
+    RATE: TURN,
+    IMU: ("omega_ib_b_radps",),
+    TACHO: ("omega_radps",),
+    TRUTH: TURN,
+    NAV: ("p_ned_m", *(f"origin_{name}" for name in PLACE)),
+    GNSS: ("quality", *PLACE),
+    NOTE: ("text", "author", "seconds", "at_utc_ns"),
+}
 STRAY_S = (
     5.0  # a sample whose own time lies further outside the recording is put where it was received
 )
@@ -39,7 +50,7 @@ def build(path: Path, coarse: bool = False, on_progress: Progress = lambda _: No
     found = extent(path)
     stride = max(1, found.chunks // COARSE_CHUNKS) if coarse else 1
     reading = _Reading(path, found, stride)
-    for block in scan(path, WANTED, stride, on_progress):
+    for block in scan(path, tuple(WANTED), stride, on_progress):
         reading.take(
             block
             if stride == 1
@@ -74,8 +85,7 @@ class _Reading:
         self._tracks: dict[str, TrackLine] = {}
         self._marks: list[Mark] = []
         self._clocks: set[str] = set()
-        self._periods: dict[str, float] = {}
-        self._take: dict[str, Callable[[str, list[Message], Array], None]] = {
+        self._take: dict[str, Callable[[str, Samples, Array], None]] = {
             RATE.name: self._rate,
             TRUTH.name: self._truth,
             IMU.name: self._imu,
@@ -91,14 +101,15 @@ class _Reading:
         decoded = list(_decoded(address.topic, block))
         if not decoded:
             return
-        found = [message for _, message in decoded]
-        name = f"{address.device}/{address.topic.name}" + (
+        topic, (log_ns, found) = address.topic, zip(*decoded, strict=True)
+        read = samples(topic, found, log_ns, (*WANTED[topic], "run", "epoch"))
+        name = f"{address.device}/{topic.name}" + (
             f"/{address.estimator}" if address.estimator else ""
         )
-        for header in {(m.header.run, m.header.epoch) for m in (found[0], found[-1])}:
-            if address.topic is not NOTE and header[0]:
-                self._clocks.add(f"{address.device}/{header[0]}/{header[1]}")
-        self._take[address.topic.name](name, found, self._times(decoded))
+        for run, epoch in {(read.header["run"][k], read.header["epoch"][k]) for k in (0, -1)}:
+            if topic is not NOTE and run:
+                self._clocks.add(f"{address.device}/{run}/{epoch}")
+        self._take[topic.name](name, read, self._times(read))
 
     def result(self) -> Curves:
         """All of it, on one grid."""
@@ -125,16 +136,12 @@ class _Reading:
             leader_of(self._path),
         )
 
-    def _times(self, decoded: list[tuple[int, Message]]) -> Array:
+    def _times(self, read: Samples) -> Array:
         """The samples' own times, s from the first message; receive times where those cannot be."""
-        first = self._extent.first_ns
-        own = np.array(
-            [m.header.utc_ns for _, m in decoded], dtype=np.float64
-        )  # 1e18 ns has a step of 256 ns
-        own = (own - first) / 1e9
-        received = np.array([log_ns - first for log_ns, _ in decoded], dtype=np.float64) / 1e9
+        own = (read.utc_ns - self._extent.first_ns) / 1e9
+        received = (read.log_ns - self._extent.first_ns) / 1e9
         stray = (own < -STRAY_S) | (own > self._extent.seconds + STRAY_S)
-        return np.where(stray, received, own)
+        return np.where(stray, received, own) + read.after_s
 
     def _binner(self, key: str, t: Array, width: int) -> Binner:
         if key not in self._lines:
@@ -144,51 +151,44 @@ class _Reading:
             self._lines[key] = Binner(key, self._extent.seconds, self._bin_s, width)
         return self._lines[key]
 
-    def _rate(self, key: str, found: list[Message], t: Array) -> None:
-        values = np.array(
-            [(*m.omega_ib_b_radps, m.angle_z_rad) for m in found if len(m.omega_ib_b_radps) == 3]
-        )
-        if len(values) == len(t):
-            self._binner(key, t, 4).add(t, values)
+    def _rate(self, key: str, read: Samples, t: Array) -> None:
+        omega, angle = read.fields["omega_ib_b_radps"], read.fields["angle_z_rad"]
+        if (read.lengths["omega_ib_b_radps"] == 3).all():
+            self._binner(key, t, 4).add(t, np.column_stack([omega, angle]))
 
     _truth = _rate
 
-    def _imu(self, key: str, found: list[Message], t: Array) -> None:
-        batches = [np.array(m.omega_ib_b_radps).reshape(-1, 3) for m in found]
-        times = [
-            at + m.period_s * np.arange(len(b)) for at, m, b in zip(t, found, batches, strict=True)
-        ]
-        if all_times := np.concatenate(times).tolist():
-            at = np.array(all_times)
-            self._binner(key.replace("/imu", "/gyro"), at, 3).add(at, np.concatenate(batches))
+    def _imu(self, key: str, read: Samples, t: Array) -> None:
+        omega = read.fields["omega_ib_b_radps"]
+        if (read.lengths["omega_ib_b_radps"] == 3).all():
+            self._binner(key.replace("/imu", "/gyro"), t, 3).add(t, omega)
 
-    def _tacho(self, key: str, found: list[Message], t: Array) -> None:
-        pulses = self._pulses.setdefault(key, PulseLine(key))
-        pulses.add(t, np.array([m.omega_radps for m in found]))
+    def _tacho(self, key: str, read: Samples, t: Array) -> None:
+        self._pulses.setdefault(key, PulseLine(key)).add(t, read.fields["omega_radps"])
 
-    def _nav(self, key: str, found: list[Message], t: Array) -> None:
-        for at, m in zip(t.tolist(), found, strict=True):
-            if len(m.p_ned_m) == 3 and (m.origin_latitude_deg or m.origin_longitude_deg):
-                origin = (
-                    np.radians(m.origin_latitude_deg),
-                    np.radians(m.origin_longitude_deg),
-                    m.origin_height_m,
-                )
-                self._track(key, origin).add(at, *m.p_ned_m)
+    def _nav(self, key: str, read: Samples, t: Array) -> None:
+        latitude, longitude, height = (read.fields[f"origin_{name}"] for name in PLACE)
+        known = (read.lengths["p_ned_m"] == 3) & ((latitude != 0) | (longitude != 0))
+        for k in np.flatnonzero(known):
+            origin = (np.radians(latitude[k]), np.radians(longitude[k]), float(height[k]))
+            self._track(key, origin).add(float(t[k]), *read.fields["p_ned_m"][k].tolist())
 
-    def _gnss(self, key: str, found: list[Message], t: Array) -> None:
-        for at, m in zip(t.tolist(), found, strict=True):
-            if m.quality:
-                place = (np.radians(m.latitude_deg), np.radians(m.longitude_deg), m.height_m)
-                self._track(key, place).add_place(at, *place)
+    def _gnss(self, key: str, read: Samples, t: Array) -> None:
+        fields = read.fields
+        for k in np.flatnonzero(fields["quality"]):
+            latitude, longitude, height = (float(fields[name][k]) for name in PLACE)
+            place = (float(np.radians(latitude)), float(np.radians(longitude)), height)
+            self._track(key, place).add_place(float(t[k]), *place)
 
     def _track(self, key: str, origin: tuple[float, float, float]) -> TrackLine:
         return self._tracks.setdefault(key, TrackLine(key, origin))
 
-    def _note(self, key: str, found: list[Message], t: Array) -> None:
-        for at, m in zip(t.tolist(), found, strict=True):
-            moment = (m.at_utc_ns - self._extent.first_ns) / 1e9 if m.at_utc_ns else at
-            self._marks.append(Mark(float(moment), m.text or "mark", m.author, m.seconds))
+    def _note(self, key: str, read: Samples, t: Array) -> None:
+        fields = read.fields
+        for k, at_utc_ns in enumerate(fields["at_utc_ns"].tolist()):
+            moment = (at_utc_ns - self._extent.first_ns) / 1e9 if at_utc_ns else float(t[k])
+            text, author = fields["text"][k] or "mark", fields["author"][k]
+            self._marks.append(Mark(moment, text, author, float(fields["seconds"][k])))
 
 
 def _dark(key: str, lines: dict[str, Line]) -> NDArray[np.bool_] | None:
@@ -212,7 +212,7 @@ def leader_of(path: Path) -> str:
 def _decoded(topic: Topic, block: Block) -> Iterator[tuple[int, Message]]:
     for log_ns, payload in zip(block.log_ns, block.payloads, strict=True):
         try:
-            yield log_ns, topic.type.FromString(payload)
+            yield log_ns, decode(topic, payload)
         except DecodeError:
             continue
 

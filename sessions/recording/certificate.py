@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import BOARD, LINK, NAV, RATE, Address, TopicError, parse
 from sessions.recording.manifest import KeyCount
+from sessions.recording.samples import decode
 
 LOOK_EVERY = 200  # messages of an estimate between two looks at its calibration
 WIRE = (
@@ -107,7 +108,7 @@ class Witness:
                     self._n.get((device, address.estimator), -1) + 1
                 )
                 if n % LOOK_EVERY == 0:
-                    card = topic.type.FromString(payload).calibration
+                    card = decode(topic, payload).calibration
                     self._cards.setdefault(device, set()).update([card] if card else [])
         except DecodeError:
             pass  # counted as unreadable elsewhere

@@ -16,10 +16,9 @@ from google.protobuf.descriptor import FileDescriptor
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from mcap.records import Channel, Chunk, Message, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
-from mcap.writer import CompressionType, Writer
 
 from messages.contract.topics import Topic
-from sessions.recording.chunk_index import spill
+from sessions.recording.mcap_writer import McapWriter
 
 PROFILE = "gyrofree"
 RECORD_LIMIT = 64 * 1024**2  # bytes; a longer record is damage, not data (our chunks are 128 KiB)
@@ -76,9 +75,6 @@ class Sink:
     def tell(self) -> int:
         return self._written + len(self.pending)
 
-    def flush(self) -> None:
-        """For the MCAP writer; the file is written by push, which may fail and be repeated."""
-
     def push(self) -> None:
         """Write what is pending; raises OSError with everything unwritten kept."""
         while self.pending:
@@ -94,8 +90,7 @@ class McapLog:
     def __init__(self, fd: int, chunk_bytes: int, folder: Path | None = None) -> None:
         """folder: where the index of a long recording waits for its end."""
         self._sink = Sink(fd)
-        self._writer = Writer(self._sink, chunk_size=chunk_bytes, compression=CompressionType.ZSTD)
-        spill(self._writer, folder)
+        self._writer = McapWriter(self._sink, chunk_bytes, folder)
         self._writer.start(PROFILE)
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
@@ -116,6 +111,11 @@ class McapLog:
         return self._sink.tell()
 
     @property
+    def spilt(self) -> bool:
+        """Some of the file's index waits on the disk for its end."""
+        return self._writer.spilt
+
+    @property
     def sha256(self) -> str:
         """Hex digest of what has been written to the file."""
         return self._sink.hash.hexdigest()
@@ -125,23 +125,19 @@ class McapLog:
         if key not in self._channels:
             name = topic.type.DESCRIPTOR.full_name
             if name not in self._schemas:
-                self._schemas[name] = self._writer.register_schema(
-                    name, "protobuf", descriptor_set(topic)
-                )
-            self._channels[key] = self._writer.register_channel(
-                key, "protobuf", self._schemas[name]
-            )
+                self._schemas[name] = self._writer.schema(name, "protobuf", descriptor_set(topic))
+            self._channels[key] = self._writer.channel(key, "protobuf", self._schemas[name])
         return self._channels[key]
 
     def add(
         self, channel: int, log_ns: int, publish_ns: int, payload: bytes, sequence: int = 0
     ) -> None:
         """Append one message; MCAP's own sequence has 32 bits."""
-        self._writer.add_message(channel, log_ns, payload, publish_ns, sequence & 0xFFFFFFFF)
+        self._writer.message(channel, log_ns, publish_ns, payload, sequence & 0xFFFFFFFF)
 
     def close_chunk(self) -> None:
         """End the running chunk, so that the next push writes everything added until now."""
-        self._writer.flush()
+        self._writer.end_chunk()
 
     def push(self) -> None:
         """Write complete chunks to the file; raises OSError, nothing is forgotten then."""

@@ -21,9 +21,9 @@ from pathlib import Path
 from google.protobuf.message import Message
 
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import ACCEL, IMU, NOTE, PIPELINE_INPUTS, RATE, Address
+from messages.contract.topics import ACCEL, IMU, NOTE, PIPELINE_INPUTS, Address
 from sessions.replay.replay import INPUTS, LONGEST_NAME, SUFFIX, Input, rename, renamed
-from sessions.replay.reproduce import ESTIMATES, Pipeline, give_orders
+from sessions.replay.reproduce import ESTIMATES, Pipeline, first_used, give_orders
 from sessions.replay.source import Source
 
 log = logging.getLogger(__name__)
@@ -84,7 +84,7 @@ class Playback:
         self._batches: deque[float] = deque(
             maxlen=BATCHES
         )  # positions of the newest batches, for steps back
-        self._first = self._first_used() if make_pipeline is not None else {}
+        self._first = first_used(path, BEGINNING_S) if make_pipeline is not None else {}
         self._begin(self.source.start_ns, self._fresh())
         self._target: float | None = min(at_s, self.source.length_s) if at_s > 0.0 else None
         self._ended = False
@@ -344,15 +344,3 @@ class Playback:
             return True
         header = item.message.header
         return header.sequence >= self._first.get((item.address.device, header.run), 0)
-
-    def _first_used(self) -> dict[tuple[str, int], int]:
-        """Sequence of the first batch with a recorded estimate, by device and gateway run, near the
-        beginning.
-        """
-        first: dict[tuple[str, int], int] = {}
-        for item in Source(self._path, (RATE,)).items():
-            if self._seconds(item) > BEGINNING_S:
-                break
-            name = item.address.device, item.message.header.run
-            first[name] = min(first.get(name, item.message.for_sequence), item.message.for_sequence)
-        return first

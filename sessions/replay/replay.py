@@ -58,7 +58,6 @@ class Outlet:
         self._session = session
         self._prefix = prefix
         self._by_key: dict[str, zenoh.Publisher] = {}
-        self.waited_s = 0.0
 
     def put(self, address: Address, device: str, message: Message) -> None:
         """Publish as it is: sequence and run stay those of the recording."""
@@ -74,5 +73,4 @@ class Outlet:
             begun = time.monotonic()
             while not publisher.matching_status.matching and time.monotonic() - begun < MATCH_S:
                 time.sleep(0.002)
-            self.waited_s += time.monotonic() - begun
         publisher.put(message.SerializeToString(deterministic=True))

@@ -19,7 +19,6 @@ import pyarrow.parquet as pq
 
 Row = dict[str, Any]
 Work = Callable[[Path], list[Row]]  # an MCAP file -> its rows
-Failure = Callable[[Path, Exception], Row]
 
 COLUMNS = pa.schema(
     [

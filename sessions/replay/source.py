@@ -9,6 +9,7 @@ from mcap.reader import make_reader
 
 from messages.contract.topics import Topic, TopicError, parse
 from sessions.recording.mcap_log import Damage, read
+from sessions.recording.samples import decode
 from sessions.replay.replay import Input
 
 
@@ -48,7 +49,7 @@ class Source:
             try:
                 address = parse(key)
                 if address.topic in self._topics:
-                    yield Input(log_ns, address, address.topic.type.FromString(payload))
+                    yield Input(log_ns, address, decode(address.topic, payload))
             except (TopicError, DecodeError):
                 continue
 

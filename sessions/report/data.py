@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from messages.contract.topics import ACCEL, GNSS, INNOVATION, LINK, NAV, RATE, TACHO, TRUTH, parse
+from messages.contract.topics import ACCEL, GNSS, INNOVATION, LINK, NAV, RATE, TACHO, parse
 from sessions.export.table import Progress, Selection, Table, silent, tables
 
 Array = NDArray[np.float64]
@@ -88,8 +88,6 @@ class Run:
     seconds: float
     accel: Accel | None
     tacho: Tacho | None
-    truth_t: Array
-    truth_omega_z: Array
     rates: list[Rate] = field(default_factory=list)
     navigation: list[Navigation] = field(default_factory=list)
     corrections: list[Corrections] = field(default_factory=list)
@@ -99,7 +97,7 @@ class Run:
     link: dict[str, float] = field(default_factory=dict)  # last ledger of the line
 
 
-WANTED = frozenset(topic.name for topic in (ACCEL, TACHO, RATE, TRUTH, NAV, INNOVATION, GNSS, LINK))
+WANTED = frozenset(topic.name for topic in (ACCEL, TACHO, RATE, NAV, INNOVATION, GNSS, LINK))
 
 
 def load_run(
@@ -167,7 +165,6 @@ def _run(mine: dict[str, Table], device: str, epoch: int, boots: tuple[int, ...]
     def only(topic: str) -> Table | None:
         return by_topic[topic][0][1] if topic in by_topic else None
 
-    truth = only(TRUTH.name)
     link = only(LINK.name)
     return Run(
         device=device,
@@ -177,8 +174,6 @@ def _run(mine: dict[str, Table], device: str, epoch: int, boots: tuple[int, ...]
         seconds=float(max(ends)) - t0,
         accel=_accel(only(ACCEL.name), t0),
         tacho=_tacho(only(TACHO.name), t0),
-        truth_t=truth.data["utc_s"] - t0 if truth else np.zeros(0),
-        truth_omega_z=truth.data["omega_ib_b_radps_z"] if truth else np.zeros(0),
         rates=[_rate(name, table, t0) for name, table in by_topic.get(RATE.name, [])],
         navigation=[_navigation(name, table, t0) for name, table in by_topic.get(NAV.name, [])],
         corrections=[

@@ -11,7 +11,6 @@ import numpy as np
 from sessions.recording.manifest import Manifest
 from sessions.report.analysis import Analysis
 from sessions.report.figures import Picture
-from sessions.report.metrics import Metric
 from sessions.report.verdict import Check, Spec, overall
 
 AXES = "xyz"
@@ -318,8 +317,3 @@ def _provenance(found: Analysis, manifest: Manifest | None, sha256: str) -> list
         rows += [(f"Version of {name}", value) for name, value in sorted(manifest.versions.items())]
         rows.append(("State of the session", manifest.state))
     return rows
-
-
-def metric_rows(found: list[Metric]) -> list[tuple[str, str, str]]:
-    """All figures for the appendix: name, value, what it is."""
-    return [(metric.name, number(metric.value, 4), metric.text) for metric in found]

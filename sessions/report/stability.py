@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from sessions.report.data import Accel, Rate
+from sessions.report.data import Accel
 from sessions.report.segments import Segment
 
 Array = NDArray[np.float64]
@@ -111,9 +111,3 @@ def consistency(name: str, nis: Array, dof: Array) -> Consistency | None:
         high=float(chi2.ppf(0.975, total) / total),
         beyond=float((nis[at] > chi2.ppf(0.95, dof[at])).mean()),
     )
-
-
-def consistencies(rates: list[Rate]) -> list[Consistency]:
-    """Of every estimator that corrects."""
-    found = [consistency(rate.name, rate.nis, rate.nis_dof) for rate in rates]
-    return [one for one in found if one is not None]

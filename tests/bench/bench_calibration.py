@@ -24,7 +24,7 @@ from inertial.layouts.catalogue import find as find_layout  # noqa: E402
 from inertial.rate.beliefs import make  # noqa: E402
 from inertial.rate.estimators import ESTIMATORS  # noqa: E402
 from inertial.simulation.imperfect import MOUNTINGS, device, table_run, tumble  # noqa: E402
-from logs.array import calibrate_at_rest, read_array, score  # noqa: E402
+from tests.support.array_log import calibrate_at_rest, read_array, score  # noqa: E402
 
 SEEDS = range(1, int(os.environ.get("SEEDS", "10")) + 1)
 DATE = "2026-01-02T00:00:00Z"

@@ -14,9 +14,9 @@ import numpy as np
 from inertial.layouts.layout import CUBE
 from inertial.rate import products_ekf
 from inertial.rate.estimators import ProductsRate
-from inertial.simulation.cube_drive import cube_readings
 from inertial.simulation.drive import simulate
 from inertial.simulation.table import IDEAL
+from tests.support.cube_drive import cube_readings
 
 SETTINGS = {
     "as on a table": {},

@@ -22,8 +22,8 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 from support.bus_cut import Cable  # noqa: E402
 from support.stack import free_port  # noqa: E402
 
-from dashboard.scene.data.feed import Feed  # noqa: E402
-from dashboard.scene.data.store import Store  # noqa: E402
+from dashboard.data.feed import Feed  # noqa: E402
+from dashboard.data.store import Store  # noqa: E402
 from messages.bus.session import BusSettings, Publishers, open_client, open_router  # noqa: E402
 from messages.contract import gyrofree_pb2 as pb  # noqa: E402
 from messages.contract.topics import ACCEL, STATUS  # noqa: E402
@@ -90,7 +90,8 @@ def trial(cut_s: float, compressed: bool) -> dict:
         settings = RecorderSettings(root=Path(name) / "sessions")
         recording = threading.Thread(target=recorder.run, args=(settings, bus, stop))
         recording.start()
-        feed = Feed(bus, store, watched)
+        listener = open_client(bus)
+        feed = Feed(listener, bus.prefix, store, watched)
         spool = Spool(Path(name) / "spool")
         status = [pb.RecorderStatus()]
         with open_client(cable.bus(bus)) as session, open_client(bus) as watcher:
@@ -134,6 +135,7 @@ def trial(cut_s: float, compressed: bool) -> dict:
             held.undeclare()
             answering.undeclare()
         feed.stop()
+        listener.close()
         cable.close()
         spool.close()
         (info,) = Catalogue(settings.root).list()

@@ -32,7 +32,7 @@ from support.gyro_free_rig import (  # noqa: E402
     messages,
 )
 
-from estimator.service import Pipeline  # noqa: E402
+from estimator.pipeline import Pipeline  # noqa: E402
 from estimator.settings import EstimatorSettings  # noqa: E402
 from inertial.simulation.arm import centre  # noqa: E402
 from inertial.simulation.drive import simulate  # noqa: E402

@@ -29,6 +29,9 @@ from support.feeder import Feeder  # noqa: E402
 from support.kill_stack import line  # noqa: E402
 from support.stack import free_port  # noqa: E402
 
+from dashboard.data.feed import Feed  # noqa: E402
+from dashboard.data.store import Store  # noqa: E402
+from dashboard.desk import Desk  # noqa: E402
 from dashboard.scene.service import start  # noqa: E402
 from messages.bus.session import BusSettings, Publishers, open_client, open_router  # noqa: E402
 from messages.contract.topics import ESTIMATES, GATEWAY  # noqa: E402
@@ -38,7 +41,8 @@ from tests.system.test_browser import CHROMIUM, FLAGS  # noqa: E402
 
 DT, DEVICE = 0.01, "cube-01"
 PATIENCE_S = 60.0
-SPANS = """() => Object.values(window.__viserTestpoints?.uplots ?? {}).map((plot) => plot.chart.data?.[0] ?? [])
+SPANS = """() => Object.values(window.__viserTestpoints?.uplots ?? {})
+  .map((plot) => plot.chart.data?.[0] ?? [])
   .filter((t) => t.length > 1).map((t) => t.at(-1) - t[0])"""
 
 
@@ -125,11 +129,13 @@ def main(minutes: float = 10.0, until: str = "page") -> None:
         )
         process.start()
         ready.wait(600.0)
-        handle = start(bus, SimpleNamespace(viser_port=0))
+        session, store, watched = open_client(bus), Store(), threading.Event()
+        feed = Feed(session, bus.prefix, store, watched)
+        handle = start(SimpleNamespace(viser_port=0), store, Desk(session, bus.prefix), watched)
         try:
             line(
                 "late_history_in_dashboard",
-                seconds(lambda: reaches(handle.store, span_s)),
+                seconds(lambda: reaches(store, span_s)),
                 "s",
                 target=2.0,
             )
@@ -145,6 +151,8 @@ def main(minutes: float = 10.0, until: str = "page") -> None:
                 line(f"late_charts_{title.lower()}", value, "s", target=2.0)
         finally:
             handle.stop()
+            feed.stop()
+            session.close()
             process.kill()
             process.join()
             threading.Event().wait(0.2)

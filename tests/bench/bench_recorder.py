@@ -39,7 +39,8 @@ from messages.bus.session import BusSettings
 from sessions.recording import recorder
 from sessions.recording.settings import RecorderSettings
 stop = stop_on_signals()
-recorder.run(RecorderSettings(root=Path(sys.argv[1])), BusSettings(prefix="bench", router=sys.argv[2]), stop)
+bus = BusSettings(prefix="bench", router=sys.argv[2])
+recorder.run(RecorderSettings(root=Path(sys.argv[1])), bus, stop)
 """
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
 
-from estimator.service import Pipeline  # noqa: E402
+from estimator.pipeline import Pipeline  # noqa: E402
 from estimator.settings import EstimatorSettings  # noqa: E402
 from inertial.rate.estimators import ESTIMATORS  # noqa: E402
 from inertial.simulation.table import TableTest  # noqa: E402

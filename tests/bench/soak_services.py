@@ -167,10 +167,11 @@ def recorder(folder: Path, hours: float, done: Any) -> None:
 
 def estimator(folder: Path, hours: float, done: Any) -> None:
     """The default estimators, their saved state and their journal."""
-    from estimator.live import SavedState, Worker
-    from estimator.service import Pipeline
+    from estimator.pipeline import Pipeline
+    from estimator.saved_state import SavedState
     from estimator.settings import EstimatorSettings
     from estimator.warm import warm
+    from estimator.worker import Worker
     from messages.history.mending import Arrival
     from messages.history.spool import Spool
 
@@ -197,16 +198,23 @@ def estimator(folder: Path, hours: float, done: Any) -> None:
 
 def dashboard(bus: BusSettings, hours: float, done: Any, taken: Any) -> None:
     """The scene's server, its feed and its store, on a real router."""
+    from dashboard.data.feed import Feed
+    from dashboard.data.store import Store
+    from dashboard.desk import Desk
     from dashboard.scene.service import start
 
-    handle = start(bus, SimpleNamespace(viser_port=0))
-    handle.feed.watched.set()
-    while done.value < 0.9999 * hours:
-        time.sleep(0.01)
-        taken.value = handle.feed._taken
-        device = handle.store.device(DEVICE)
-        done.value = max(done.value, 0.0 if device is None else device.t_newest / 3600.0)
-    handle.stop()
+    store, watched = Store(), threading.Event()
+    with open_client(bus, timeout_s=60.0) as session:
+        handle = start(SimpleNamespace(viser_port=0), store, Desk(session, bus.prefix), watched)
+        watched.set()
+        feed = Feed(session, bus.prefix, store, watched)
+        while done.value < 0.9999 * hours:
+            time.sleep(0.01)
+            taken.value = feed.taken
+            device = store.device(DEVICE)
+            done.value = max(done.value, 0.0 if device is None else device.t_newest / 3600.0)
+        handle.stop()
+        feed.stop()
 
 
 def router(bus: BusSettings) -> None:

@@ -13,7 +13,11 @@ import pytest
 import zenoh
 from support.front_door import Door, open_door, wait_for
 
-from dashboard.web.control import BusWatch, ControlError, ProcessReplay, RecorderControl
+from dashboard.data.feed import Feed
+from dashboard.data.store import Store
+from dashboard.desk import Desk
+from dashboard.web.control import ControlError, ProcessReplay
+from messages.bus import orders
 from messages.bus.session import BusSettings, Publishers, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import BOARD, ESTIMATOR, LINK
@@ -165,8 +169,25 @@ def test_without_a_bus_the_answers_say_so(door: Door):
 
 def test_recorder_that_does_not_answer_is_said(bus):
     settings, session = bus
-    with pytest.raises(ControlError, match="gyrofree record"):
-        RecorderControl(session, settings.prefix).order(pb.RecorderCommand.ACTION_START, "otto")
+    desk = Desk(session, settings.prefix)
+    with pytest.raises(orders.NoAnswer, match="gyrofree record"):
+        desk.recorder(pb.RecorderCommand(action=pb.RecorderCommand.ACTION_START, user="otto"))
+
+
+def test_the_reason_of_a_refusal_reaches_the_one_who_asked(bus, tmp_path):
+    """The recorder was asked and said no: not that it does not answer."""
+    settings, session = bus
+    busy = orders.take(
+        session, settings.prefix, orders.RECORDER, lambda order: order.refuse("it is stopping")
+    )
+    desk = Desk(session, settings.prefix)
+    try:
+        with open_door(tmp_path, scene=False, desk=desk) as door, door.client("otto") as client:
+            answer = client.post("/api/recording/stop")
+            assert answer.status_code == 503
+            assert answer.json()["error"] == "the recorder: it is stopping"
+    finally:
+        busy.undeclare()
 
 
 def publish(session: zenoh.Session, stop: threading.Event) -> None:
@@ -193,15 +214,16 @@ def test_record_download_and_replay_through_the_real_recorder(bus, tmp_path):
     ]
     for thread in threads:
         thread.start()
-    seen = tmp_path / "replayed"
+    seen, store = tmp_path / "replayed", Store()
+    feed = Feed(session, settings.prefix, store, threading.Event())
     command = [
         sys.executable,
         "-c",
         f"import sys, time; open({str(seen)!r}, 'w').write(repr(sys.argv)); time.sleep(60)",
     ]
     services = {
-        "watch": BusWatch(session, settings.prefix),
-        "recorder": RecorderControl(session, settings.prefix),
+        "store": store,
+        "desk": Desk(session, settings.prefix),
         "replay": ProcessReplay(command),
     }
     try:
@@ -252,6 +274,7 @@ def test_record_download_and_replay_through_the_real_recorder(bus, tmp_path):
             assert client.post("/api/replay/stop").json()["replaying"] == ""
     finally:
         services["replay"].stop()
+        feed.stop()
         stop.set()
         for thread in threads:
             thread.join(20.0)

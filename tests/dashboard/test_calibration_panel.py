@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 import viser
 
-from dashboard.scene.data.feed import Feed
-from dashboard.scene.data.store import Store
+from dashboard.data.store import Store
+from dashboard.desk import Desk
 from dashboard.scene.panels import PAGES, Snapshot
 from dashboard.scene.panels.guided.calibration import Calibration, content, facing, picture, upright
-from estimator import live, service
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
+from estimator.worker import Worker
 from inertial.calibration.poses import candidates, plan
 from messages.bus import orders
 from messages.bus.session import BusSettings, open_client, open_router
@@ -89,7 +90,7 @@ def test_orders_reach_a_running_worker(free_port, tmp_path):
     bus = BusSettings(prefix="t", router=endpoint, listen=[endpoint])
     settings = EstimatorSettings(rate=["products-ekf"], navigators=[], attitudes=[], cards=tmp_path)
     stop, said = threading.Event(), []
-    worker = live.Worker(service.Pipeline(settings), said.append)
+    worker = Worker(Pipeline(settings), said.append)
     batch = pb.AccelBatch(
         header=pb.Header(device="cube", sequence=1), period_s=0.01, axes=12, f_mps2=[0.1] * 12
     )
@@ -98,17 +99,15 @@ def test_orders_reach_a_running_worker(free_port, tmp_path):
     thread.start()
     with open_router(bus), open_client(bus, timeout_s=20) as session:
         queryable = orders.take(session, bus.prefix, orders.ESTIMATOR, worker.take_order, "*")
-        feed = Feed(bus, Store(), threading.Event())
+        desk = Desk(session, bus.prefix)
         try:
 
             def order(action):
                 deadline = time.monotonic() + 30.0
-                while True:  # until the feed is on the bus
+                while True:  # until the queryable is known
                     try:
-                        return feed.estimator(
-                            pb.EstimatorCommand(device="cube", action=action), timeout_s=20.0
-                        )
-                    except ConnectionError:
+                        return desk.estimator(pb.EstimatorCommand(device="cube", action=action))
+                    except orders.NoAnswer:
                         assert time.monotonic() < deadline
                         time.sleep(0.05)
 
@@ -123,7 +122,6 @@ def test_orders_reach_a_running_worker(free_port, tmp_path):
             assert not order(pb.EstimatorCommand.ACTION_CALIBRATE_FIT).ok
         finally:
             queryable.undeclare()
-            feed.stop()
             worker.finish()
             thread.join(timeout=10.0)
     assert not thread.is_alive() and worker.failure is None

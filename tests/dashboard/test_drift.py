@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dashboard.scene.data.store import Store
+from dashboard.data.store import Store
 from dashboard.scene.drawing import geometry as geo
 from dashboard.scene.drawing.palette import estimator_title
 from dashboard.scene.panels import Snapshot

@@ -7,7 +7,7 @@ import pytest
 import viser
 from support.stack import free_port
 
-from dashboard.scene.data.store import Store
+from dashboard.data.store import Store
 from dashboard.scene.drawing.axis_arrows import AxisArrows, residual_colour
 from dashboard.scene.drawing.palette import GREY, SKY, VERMILLION, YELLOW
 from dashboard.scene.panels.base import Snapshot

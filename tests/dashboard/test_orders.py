@@ -14,7 +14,7 @@ ORDERING = ("Board", "Calibrate", "Map", "Wiring")
 
 
 class Desk:
-    """Stands where a panel wants the feed: keeps what it is told to pass on."""
+    """Stands where a panel wants the dashboard's desk: keeps what it is told to pass on."""
 
     def __init__(self):
         self.given = []
@@ -40,7 +40,7 @@ def test_every_button_that_orders_gives_its_order(server, title):
     told = []
     client = SimpleNamespace(gui=server.gui, add_notification=lambda *a, **k: told.append(a))
     page = next(page for page in PAGES if page.title == title)(client, server.gui.add_folder(title))
-    page.feed = Desk()
+    page.desk = Desk()
     page.chart(
         "one", "a chart", "m"
     )  # what a page draws must not stand in the way of what it orders
@@ -51,10 +51,10 @@ def test_every_button_that_orders_gives_its_order(server, title):
     ]
     assert buttons
     for button in buttons:
-        before = len(page.feed.given)
+        before = len(page.desk.given)
         for pressed in button._impl.update_cb:
             pressed(SimpleNamespace(target=button))
-        assert len(page.feed.given) > before, button.label
+        assert len(page.desk.given) > before, button.label
     assert len(told) >= len(buttons)
 
 

@@ -2,7 +2,7 @@
 
 import time
 
-from dashboard.scene.data.store import Store
+from dashboard.data.store import Store
 from dashboard.scene.panels.base import Snapshot
 from dashboard.scene.panels.motion.race import Race
 from messages.contract import gyrofree_pb2 as pb

@@ -12,12 +12,14 @@ import pytest
 import viser
 from support.feeder import UTC0_NS, Feeder, cube_attitude
 
-from dashboard.scene.data.feed import Feed
-from dashboard.scene.data.replayed import Replayed
-from dashboard.scene.data.ring import Ring
-from dashboard.scene.data.store import Store
-from dashboard.scene.data.tables import Column, Table
-from dashboard.scene.data.track import Track
+from dashboard.data.feed import Feed
+from dashboard.data.pose import ned_from_geodetic
+from dashboard.data.replayed import Replayed
+from dashboard.data.ring import Ring
+from dashboard.data.store import DEVICES, TOPICS, Store
+from dashboard.data.tables import Column, Table
+from dashboard.data.track import Track
+from dashboard.desk import Desk
 from dashboard.scene.drawing import camera, series
 from dashboard.scene.drawing import geometry as geo
 from dashboard.scene.drawing.chart import Curve, _data
@@ -26,6 +28,7 @@ from dashboard.scene.panels import PAGES, Snapshot
 from dashboard.scene.panels.base import Panel
 from dashboard.scene.panels.device.devices import Devices, counts
 from dashboard.scene.service import SceneError, start
+from messages.bus.orders import OrderError
 from messages.bus.session import BusSettings, Publishers, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
@@ -60,6 +63,12 @@ def store() -> Store:
 def bus(free_port) -> BusSettings:
     endpoint = f"tcp/127.0.0.1:{free_port}"
     return BusSettings(router=endpoint, listen=[endpoint])
+
+
+@pytest.fixture
+def nobody() -> Desk:
+    """A desk without a router."""
+    return Desk(None, "gyrofree")
 
 
 def wait_for(condition, seconds: float = 30.0) -> None:
@@ -205,9 +214,9 @@ def test_ellipsoid_axes_are_three_standard_deviations():
 
 
 def test_geodetic_differences_agree_with_the_length_of_a_degree():
-    p = geo.ned_from_geodetic(45.001, 7.0, 0.0, (45.0, 7.0, 0.0))
+    p = ned_from_geodetic(45.001, 7.0, 0.0, (45.0, 7.0, 0.0))
     assert abs(p[0] - 111.132) < 0.01  # a degree of latitude at 45 degrees is 111.132 km
-    p = geo.ned_from_geodetic(0.0, -179.9995, 12.0, (0.0, 179.9995, 10.0))
+    p = ned_from_geodetic(0.0, -179.9995, 12.0, (0.0, 179.9995, 10.0))
     assert abs(p[1] - 111.320) < 0.01 and p[2] == -2.0  # across the date line, and up is negative
 
 
@@ -317,6 +326,18 @@ def test_malformed_messages_leave_the_store_usable(store):
     assert len(store.device("cube-01").window("rate", "odd", -1, 1)[0]) == 1
 
 
+def test_a_foreign_publisher_cannot_fill_the_memory(store):
+    header = pb.Header(utc_ns=UTC0_NS)
+    for k in range(200):
+        store.put(tp.LINK, f"board-{k:03d}", "", pb.LinkStatus(header=header))
+    store.put(tp.LINK, "No Name", "", pb.LinkStatus(header=header))
+    assert len(store.devices) == DEVICES and store.refused == 200 - DEVICES + 1
+    for k in range(1000):
+        state = pb.EstimatorStatus(header=header)
+        store.put(tp.ESTIMATOR, "board-000", f"e{k}", state)
+    assert len(store.device("board-000").latest) == TOPICS
+
+
 # --- panels
 
 
@@ -404,9 +425,9 @@ def test_colours_and_numbers():
 def test_feed_takes_messages_from_the_bus(bus, store):
     watched = SimpleNamespace(is_set=lambda: True)
     with open_router(bus), open_client(bus, timeout_s=20) as session:
-        feed = Feed(bus, store, watched)
+        feed, desk = Feed(session, bus.prefix, store, watched), Desk(session, bus.prefix)
         try:
-            wait_for(lambda: feed.connected)
+            assert desk.connected
             feeder = Feeder(Publishers(session, bus.prefix))
             feeder.cube(0.0)
             wait_for(
@@ -416,41 +437,39 @@ def test_feed_takes_messages_from_the_bus(bus, store):
                 wait_for(lambda key=(topic, estimator): key in store.device("cube-01").latest)
             feeder.recorder(1.0)
             wait_for(lambda: store.recorder is not None)
-            with pytest.raises(ConnectionError, match="gyrofree record"):
-                feed.recorder(pb.RecorderCommand(), timeout_s=0.5)
+            with pytest.raises(OrderError, match="gyrofree record"):
+                desk.recorder(pb.RecorderCommand(), timeout_s=0.5)
         finally:
             feed.stop()
 
 
-def test_scene_is_served_and_idle_without_browsers(bus):
-    with open_router(bus):
-        handle = start(bus, SimpleNamespace(viser_port=0))
-        try:
-            with urllib.request.urlopen(f"http://127.0.0.1:{handle.port}/", timeout=20) as page:
-                assert page.status == 200 and b"<html" in page.read(2000)
-            assert handle.clients == 0 and handle.viewer_uuids() == frozenset()
-        finally:
-            handle.stop()
+def test_scene_is_served_and_idle_without_browsers(store, nobody):
+    handle = start(SimpleNamespace(viser_port=0), store, nobody)
+    try:
+        with urllib.request.urlopen(f"http://127.0.0.1:{handle.port}/", timeout=20) as page:
+            assert page.status == 200 and b"<html" in page.read(2000)
+        assert handle.clients == 0 and handle.viewer_uuids() == frozenset()
+    finally:
+        handle.stop()
 
 
-def test_a_port_in_use_is_an_error_with_its_remedy(bus, free_port):
-    first = start(bus, SimpleNamespace(viser_port=free_port))
+def test_a_port_in_use_is_an_error_with_its_remedy(store, nobody, free_port):
+    first = start(SimpleNamespace(viser_port=free_port), store, nobody)
     try:
         with pytest.raises(SceneError, match=f"viser_port {free_port}: already in use"):
-            start(bus, SimpleNamespace(viser_port=free_port))
+            start(SimpleNamespace(viser_port=free_port), store, nobody)
     finally:
         first.stop()
 
 
 @pytest.mark.browser
-def test_browser_shows_the_cube_as_the_truth_has_it(bus):
+def test_browser_shows_the_cube_as_the_truth_has_it(store, nobody):
     from playwright import sync_api  # here: only this test needs it
 
-    store = Store()
     feeder = Feeder(Direct(store))
     for k in range(700):
         feeder.cube(k * 0.01)
-    handle = start(bus, SimpleNamespace(viser_port=0), store)
+    handle = start(SimpleNamespace(viser_port=0), store, nobody)
     try:
         with sync_api.sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=FLAGS)

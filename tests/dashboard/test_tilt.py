@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dashboard.scene.data.store import Store
-from dashboard.scene.drawing.horizon import between, horizon_svg, roll_pitch
+from dashboard.data.pose import roll_pitch
+from dashboard.data.store import Store
+from dashboard.scene.drawing.horizon import between, horizon_svg
 from dashboard.scene.panels.device.devices import Devices
 from dashboard.scene.panels.motion.tilt import Tilt
 from messages.contract import gyrofree_pb2 as pb

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.devices.attitude import AttitudeBoard
-from estimator.service import Pipeline
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from inertial.attitude.filters import ATTITUDES
 from inertial.attitude.rotation import to_dcm

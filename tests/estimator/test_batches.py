@@ -9,7 +9,8 @@ from estimator.devices.rate import RateBoard, RateOutput
 from estimator.packed import Doubles, varint
 from inertial.layouts.layout import CUBE, LAYOUTS
 from inertial.rate import bound, bound_live, sight
-from inertial.rate.estimators import ESTIMATORS, ProductsRate, RateState
+from inertial.rate.batch import RateState
+from inertial.rate.estimators import ESTIMATORS, ProductsRate
 from inertial.rate.observed import sensor
 from inertial.rate.products_model import (
     STATES,
@@ -90,10 +91,10 @@ def test_a_batch_with_a_sample_that_cannot_be_used_is_refused_whole():
         bad = block.readings[:5].copy()
         bad[3, 2] = np.nan
         with pytest.raises(ValueError, match="axis 3 of layout cube reads nan"):
-            estimator.feed(block.t_s[:5], bad, range(5))
+            estimator.feed(block.t_s[:5], bad)
         with pytest.raises(ValueError, match="time must grow"):
-            estimator.feed(block.t_s[[0, 1, 1]], block.readings[:3], range(3))
-        assert len(estimator.feed(block.t_s[:5], block.readings[:5], (1, 4))) == 2, name
+            estimator.feed(block.t_s[[0, 1, 1]], block.readings[:3])
+        assert len(estimator.feed(block.t_s[:5], block.readings[:5])) == 5, name
 
 
 @pytest.mark.parametrize("kind", ["cube", "stars-12", "nine"])
@@ -155,7 +156,8 @@ def test_a_state_becomes_the_message_it_did():
     from estimator.rate_messages import RateMessages
 
     block, estimator = TableTest(1).block(0), ProductsRate(CUBE(0.05))
-    states = estimator.feed(block.t_s[:700], block.readings[:700], (0, 699))
+    said = estimator.feed(block.t_s[:700], block.readings[:700])
+    states = [said.state(0), said.state(699)]
     batch = pb.AccelBatch(
         header=pb.Header(device="cube", run=7, sequence=9, device_us=5, utc_ns=9), period_s=0.01
     )

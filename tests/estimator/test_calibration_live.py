@@ -7,7 +7,8 @@ import pickle
 import numpy as np
 import pytest
 
-from estimator.service import Pipeline, UnknownEstimator
+from estimator.choice import UnknownEstimator
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from inertial.calibration.card import make_card, write_card
 from inertial.calibration.fit import fit

@@ -16,7 +16,8 @@ from support.gyro_free_rig import (
     messages,
 )
 
-from estimator.service import Pipeline, UnknownEstimator
+from estimator.choice import UnknownEstimator
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from inertial.simulation.arm import ARM, arm_test, centre
 from messages.contract import gyrofree_pb2 as pb

@@ -5,9 +5,9 @@ recording knows it.
 import numpy as np
 import pytest
 
-from estimator.convert import horizon_message, innovation_message, nav_message
+from estimator.convert.navigation import horizon_message, innovation_message, nav_message
 from estimator.devices.navigation import NavBoard
-from estimator.service import Pipeline
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from inertial.navigation.fuzzy import MEMBERSHIPS
 from inertial.navigation.mute import Mute, Mutes

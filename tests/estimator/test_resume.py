@@ -6,9 +6,11 @@ import threading
 
 import pytest
 
-from estimator.live import SavedState, Worker
-from estimator.service import Output, Pipeline
+from estimator.output import Output
+from estimator.pipeline import Pipeline
+from estimator.saved_state import SavedState
 from estimator.settings import EstimatorSettings
+from estimator.worker import Worker
 from inertial.calibration.card import make_card, write_card
 from inertial.calibration.fit import fit
 from inertial.calibration.poses import collect, find, plan

@@ -12,8 +12,10 @@ import pytest
 from support.estimator_drive import DT, drive, exact
 
 from estimator import service
-from estimator.convert import BadMessage
-from estimator.service import Output, Pipeline, UnknownEstimator
+from estimator.choice import UnknownEstimator
+from estimator.convert.samples import BadMessage
+from estimator.output import Output
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings, LayoutSettings
 from estimator.stream import Stream, every, worth_a_line
 from inertial.simulation.table import TableTest

@@ -230,7 +230,8 @@ def serve(keeper):
     stop.wait()
 def elsewhere():
     sys.stdin.readline()
-    signal.pthread_kill(threading.get_ident(), signal.SIGTERM)  # poll() in the main thread is not interrupted by it
+    # poll() in the main thread is not interrupted by it
+    signal.pthread_kill(threading.get_ident(), signal.SIGTERM)
 threading.Thread(target=elsewhere, daemon=True).start()
 try:
     guard(serve)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.wire import Wire
 
-from estimator.service import Pipeline
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from gateway.board.device import DeviceLink
 from gateway.ports.reader import Chunk

@@ -4,10 +4,10 @@ gyroscopes go.
 
 import numpy as np
 import pytest
+from support.array_log import RATE_QUADRATIC, calibrate_at_rest, combination, read_array, score
 
 from inertial.layouts.catalogue import find
 from inertial.layouts.layout import GeometryError
-from logs.array import RATE_QUADRATIC, calibrate_at_rest, combination, read_array, score
 
 STILL_S, VIOLENT_S = 470.0, 488.0
 

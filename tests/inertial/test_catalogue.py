@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.optimize import check_grad
 from typer.testing import CliRunner
 
-from estimator.service import UnknownEstimator, make_layout
+from estimator.choice import UnknownEstimator, make_layout
 from estimator.settings import LayoutSettings
 from gyrofree.commands.main import app
 from inertial.layouts import catalogue, search
@@ -22,7 +22,6 @@ quick = search.Wish(starts=4)
 
 
 # --- files
-# --------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
@@ -99,7 +98,6 @@ def test_the_configuration_takes_a_name_or_a_file(tmp_path):
 
 
 # --- quality
-# ------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -152,7 +150,6 @@ def test_information_on_the_rate_is_that_of_its_products(omega):
 
 
 # --- search
-# -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -225,7 +222,6 @@ def test_wishes_that_cannot_be_are_refused():
 
 
 # --- command line
-# -------------------------------------------------------------------------------------------------
 
 
 def test_show_and_compare_print_tables_and_json(tmp_path):

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.cube_drive import cube_readings
 
 from estimator.devices.gyro_free import (
     NOISE,
@@ -19,7 +20,6 @@ from estimator.devices.gyro_free import (
 from estimator.devices.rate import RateOutput
 from inertial.layouts.layout import CUBE
 from inertial.navigation.navigation import Mode, NavigatorConfig, Solution
-from inertial.simulation.cube_drive import cube_readings
 from inertial.simulation.drive import simulate
 from inertial.simulation.table import IDEAL
 

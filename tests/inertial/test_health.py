@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import null_space
 
 from estimator.devices.rate import RateBoard
-from estimator.service import Pipeline
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from inertial.layouts.layout import CUBE, LAYOUTS, products
 from inertial.rate import parity
@@ -50,7 +50,6 @@ def named(changes):
 
 
 # --- the filter
-# -------------------------------------------------------------------------------------------------------
 
 
 def test_the_model_is_the_acceleration_field():
@@ -115,7 +114,6 @@ def test_at_rest_every_axis_of_the_cube_has_a_parity_direction_of_its_own():
 
 
 # --- faults
-# -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("profile", ["published", "wobble", "fast"])
@@ -221,7 +219,6 @@ def test_other_layouts_are_watched_as_far_as_they_can_be(name):
 
 
 # --- the way to the estimators
-# ------------------------------------------------------------------------------------
 
 
 class Told:

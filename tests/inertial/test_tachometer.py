@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from estimator.service import Pipeline
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from gyrofree.commands.main import app
 from gyrofree.running import simulate_csv

@@ -8,7 +8,8 @@ import pickle
 import numpy as np
 import pytest
 
-from estimator.service import Pipeline, UnknownEstimator
+from estimator.choice import UnknownEstimator
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from inertial.attitude.axis_map import AXES, MapError, read_map
 from inertial.attitude.rotation import to_dcm

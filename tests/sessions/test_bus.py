@@ -235,7 +235,8 @@ from messages.bus.session import BusSettings
 from sessions.recording import recorder
 from sessions.recording.settings import RecorderSettings
 stop = stop_on_signals()
-recorder.run(RecorderSettings(root=Path(sys.argv[1])), BusSettings(prefix="t", router=sys.argv[2]), stop)
+bus = BusSettings(prefix="t", router=sys.argv[2])
+recorder.run(RecorderSettings(root=Path(sys.argv[1])), bus, stop)
 """
 
 

@@ -8,7 +8,7 @@ import time
 import pytest
 from support.table_session import table_recording
 
-from estimator.service import Pipeline
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ACCEL, RATE

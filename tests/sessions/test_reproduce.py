@@ -9,6 +9,7 @@ import time
 import pytest
 
 from estimator import service
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from gyrofree.config import Settings
 from gyrofree.running.replay import Options
@@ -20,8 +21,9 @@ from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ACCEL, RATE, parse
 from sessions.library.catalogue import Catalogue
 from sessions.recording.mcap_log import read
+from sessions.recording.samples import samples
 from sessions.replay import replay
-from sessions.replay.reproduce import differing_fields, reproduce
+from sessions.replay.reproduce import compare, reproduce
 from tests.sessions.test_bus import PATIENCE, bus, client, order, recording, until
 
 SETTINGS = EstimatorSettings(rate=list(ESTIMATORS))
@@ -58,7 +60,7 @@ def compiled():
     """The estimators' compiled functions, made or taken from the cache before anything waits for
     them.
     """
-    pipeline = service.Pipeline(SETTINGS)
+    pipeline = Pipeline(SETTINGS)
     for batch in batches():
         pipeline.on(ACCEL, batch)
 
@@ -118,7 +120,7 @@ def test_a_live_session_is_reproduced_and_its_replay_gives_the_same_estimates(
     wait_for_last(seen, "cube")
     live = order(client, pb.RecorderCommand.ACTION_STOP)
 
-    report = reproduce(Catalogue(settings.root).path(live.session), service.Pipeline(SETTINGS))
+    report = reproduce(Catalogue(settings.root).path(live.session), Pipeline(SETTINGS))
     assert report.identical and report.as_dict()["identical"], report
     assert {key.rsplit("/", 1)[1] for key in report.keys} == set(SETTINGS.rate)
     assert report.inputs == BATCHES and report.refused == 0
@@ -144,7 +146,7 @@ def test_a_changed_bit_a_missing_input_and_a_late_start_are_told_apart(tmp_path)
     from sessions.recording import store
     from sessions.recording.settings import RecorderSettings
 
-    pipeline, inputs = service.Pipeline(SETTINGS), batches()[:30]
+    pipeline, inputs = Pipeline(SETTINGS), batches()[:30]
     name = SETTINGS.rate[0]
     key = RATE.key("t", "cube", name)
     session = store.start(RecorderSettings(root=tmp_path))
@@ -158,7 +160,7 @@ def test_a_changed_bit_a_missing_input_and_a_late_start_are_told_apart(tmp_path)
                 output.message.header.sequence = 7
                 session.add(T0 + n, key, output.message.SerializeToString())
     assert session.close()
-    result = reproduce(session.folder / "recording.mcap", service.Pipeline(SETTINGS)).keys[key]
+    result = reproduce(session.folder / "recording.mcap", Pipeline(SETTINGS)).keys[key]
     assert result.missing == 2 * BATCH and not result.same
     assert result.different >= 1 and result.first_difference
 
@@ -166,5 +168,9 @@ def test_a_changed_bit_a_missing_input_and_a_late_start_are_told_apart(tmp_path)
 def test_fields_that_differ_are_named_also_when_they_are_not_numbers():
     one = pb.RateEstimate(estimator="e", nis=float("nan"), q_nb=[1, 0, 0, 0])
     two = pb.RateEstimate(estimator="e", nis=float("nan"), q_nb=[1, 0, 0, 1e-16])
-    assert differing_fields(RATE, one.SerializeToString(), two.SerializeToString()) == ["q_nb"]
-    assert differing_fields(RATE, one.SerializeToString(), one.SerializeToString()) == []
+    three = pb.RateEstimate(estimator="f", nis=float("nan"), q_nb=[1, 0, 0, 0], innovation=[0.0])
+    first = samples(RATE, [one])
+    assert compare(first, samples(RATE, [one])).same
+    assert compare(first, samples(RATE, [two])).first_difference.endswith(": q_nb")
+    found = compare(first, samples(RATE, [three]))
+    assert found.first_difference.endswith(": estimator, innovation") and not found.same

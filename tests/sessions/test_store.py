@@ -1,6 +1,7 @@
 """A session's file: readable by anybody, whole after a cut, honest about the disk."""
 
 import hashlib
+import io
 import json
 import os
 import random
@@ -13,6 +14,7 @@ import pytest
 from google.protobuf import descriptor_pool, message_factory
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from mcap.reader import make_reader
+from mcap.writer import CompressionType, IndexType, Writer
 
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ACCEL, LOCATION, STATUS
@@ -20,6 +22,7 @@ from sessions.library.catalogue import Catalogue
 from sessions.recording import store as store_module
 from sessions.recording.manifest import SessionError, read_manifest
 from sessions.recording.mcap_log import Damage, McapLog, Sink, read
+from sessions.recording.mcap_writer import LIBRARY, McapWriter
 from sessions.recording.recover import recover_all, recover_session, salvage
 from sessions.recording.settings import RecorderSettings
 
@@ -127,7 +130,7 @@ def test_the_index_of_a_long_recording_waits_on_the_disk_and_the_file_is_the_sam
 ):
     files = []
     for name, held in (("memory", 1 << 30), ("disk", 500)):
-        monkeypatch.setattr("sessions.recording.chunk_index.HELD_BYTES", held)
+        monkeypatch.setattr("sessions.recording.spill.HELD_BYTES", held)
         fd = os.open(tmp_path / name, os.O_RDWR | os.O_CREAT)
         log = McapLog(fd, 4096, tmp_path)
         channel = log.open_channel(KEY, ACCEL)
@@ -135,8 +138,7 @@ def test_the_index_of_a_long_recording_waits_on_the_disk_and_the_file_is_the_sam
             log.add(channel, k, k, bytes([k]) * 100)
             if k % 5 == 4:
                 log.close_chunk()
-        spilt = log._writer._Writer__chunk_indices._spilt
-        assert (spilt is None) == (name == "memory")
+        assert log.spilt == (name == "disk")
         log.finish()
         log.push()
         os.close(fd)
@@ -149,6 +151,43 @@ def test_the_index_of_a_long_recording_waits_on_the_disk_and_the_file_is_the_sam
             range(50, 60)
         )
     assert sorted(p.name for p in tmp_path.iterdir()) == ["disk", "memory"]
+
+
+def test_what_is_written_is_what_the_library_writes(tmp_path):
+    """Byte for byte, with several channels, messages out of order and chunks of all sizes."""
+    kinds = IndexType.CHUNK | IndexType.MESSAGE
+    ours, theirs = io.BytesIO(), io.BytesIO()
+    mine = McapWriter(ours, 2000)
+    other = Writer(theirs, 2000, CompressionType.ZSTD, index_types=kinds)
+    mine.start("p")
+    other.start("p", LIBRARY)
+    rng = random.Random(7)
+    for k in range(500):
+        if k in (0, 1, 100):
+            a = mine.schema(f"s{k}", "protobuf", bytes([k]) * 50)
+            assert a == other.register_schema(f"s{k}", "protobuf", bytes([k]) * 50)
+            assert mine.channel(f"t{k}", "protobuf", a) == a
+            assert other.register_channel(f"t{k}", "protobuf", a) == a
+        channel, log_ns = rng.randint(1, a), 10**9 + rng.randrange(10**6)
+        payload = rng.randbytes(rng.choice((0, 10, 3000)))
+        mine.message(channel, log_ns, log_ns - 5, payload, k)
+        other.add_message(channel, log_ns, payload, log_ns - 5, k)
+        if k % 37 == 36:
+            mine.end_chunk()
+            other.flush()
+    mine.finish()
+    other.finish()
+    assert ours.getvalue() == theirs.getvalue()
+
+
+def test_a_file_without_a_message_is_one_the_library_reads(tmp_path):
+    out = io.BytesIO()
+    writer = McapWriter(out, 2000)
+    writer.start("p")
+    writer.channel("t", "protobuf", writer.schema("s", "protobuf", b""))
+    writer.finish()
+    summary = make_reader(io.BytesIO(out.getvalue())).get_summary()
+    assert summary.statistics.message_count == 0 and summary.channels[1].topic == "t"
 
 
 def test_chunks_stay_below_the_limit_and_reach_the_file_at_each_flush(settings):

@@ -9,7 +9,7 @@ import numpy as np
 
 from emulator.board import Board
 from emulator.world import World, parse_fault
-from estimator.service import Pipeline
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from gateway.board.device import DeviceLink
 from gateway.ports.reader import Chunk

@@ -292,19 +292,25 @@ def main() -> None:
     """Router, feeder and scene in one process, for looking."""
     from types import SimpleNamespace
 
+    from dashboard.data.feed import Feed
+    from dashboard.data.store import Store
+    from dashboard.desk import Desk
     from dashboard.scene.service import start
 
     what = sys.argv[1] if len(sys.argv) > 1 else "both"
     port = int(sys.argv[2]) if len(sys.argv) > 2 else 0
     endpoint = f"tcp/127.0.0.1:{17447 + port % 1000}"
     bus = BusSettings(router=endpoint, listen=[endpoint])
-    with open_router(bus):
-        handle = start(bus, SimpleNamespace(viser_port=port))
+    with open_router(bus), open_client(bus, timeout_s=10) as session:
+        store, watched = Store(), threading.Event()
+        feed = Feed(session, bus.prefix, store, watched)
+        handle = start(SimpleNamespace(viser_port=port), store, Desk(session, bus.prefix), watched)
         print(f"http://127.0.0.1:{handle.port}", file=sys.stderr, flush=True)
         try:
             run(bus, ("cube", "drive") if what == "both" else (what,), threading.Event())
         except KeyboardInterrupt:
             handle.stop()
+            feed.stop()
 
 
 if __name__ == "__main__":

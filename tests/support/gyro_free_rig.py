@@ -6,10 +6,10 @@ import numpy as np
 
 from inertial.layouts.layout import CUBE
 from inertial.simulation.arm import arm_test, centre
-from inertial.simulation.cube_drive import cube_readings
 from inertial.simulation.table import SensorModel
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ACCEL, GNSS
+from support.cube_drive import cube_readings
 
 LATITUDE, LONGITUDE, HEIGHT = 37.759, 45.978, 1468.0
 METRES = 111_195.0  # per degree of latitude, of a sphere: 0.2 % of 3 m do not matter

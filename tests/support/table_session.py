@@ -6,7 +6,7 @@ import functools
 import tempfile
 from pathlib import Path
 
-from estimator.service import Pipeline
+from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from gyrofree.running.importer import rows_of
 from gyrofree.running.simulate_csv import write

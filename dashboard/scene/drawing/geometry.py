@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from dashboard.data.pose import yaw_of
 from inertial.layouts.layout import CUBE
-from inertial.navigation.geodetic import ned_between
 from messages.contract import gyrofree_pb2 as pb
 
 # Rotation n (north, east, down) -> display (east, north, up): half a turn about (1, 1, 0), w x y z.
@@ -37,16 +37,6 @@ def quaternion(values) -> tuple[float, float, float, float] | None:
     if not np.isfinite(norm) or norm < 0.5:
         return None
     return tuple(float(v) for v in q / norm)
-
-
-def ned_from_geodetic(
-    latitude_deg: float, longitude_deg: float, height_m: float, origin: tuple[float, float, float]
-) -> np.ndarray:
-    """North, east, down in m from an origin (latitude deg, longitude deg, height m); for places
-    near by.
-    """
-    there, here = np.radians((latitude_deg, longitude_deg)), np.radians(origin[:2])
-    return np.array(ned_between((here[0], here[1], origin[2]), (there[0], there[1], height_m)))
 
 
 def ellipsoid(
@@ -137,14 +127,6 @@ MODES = {
     pb.NavSolution.MODE_COURSE: "waiting for speed",
     pb.NavSolution.MODE_NAVIGATING: "navigating",
 }
-
-
-def yaw_of(q_nb: Sequence[float]) -> float:
-    """Heading of q_nb (4,) w x y z, rad; NaN for none."""
-    if len(q_nb) != 4:
-        return float("nan")
-    w, x, y, z = q_nb
-    return float(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
 
 
 def facing(q_nb: Sequence[float], other: Sequence[float]) -> tuple[float, ...] | None:

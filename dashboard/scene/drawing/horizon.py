@@ -1,4 +1,4 @@
-"""Tilt for people: roll and pitch, and an artificial horizon as SVG."""
+"""Tilt for people: an artificial horizon as SVG, and how far two verticals are apart."""
 
 import math
 from typing import Any
@@ -6,15 +6,6 @@ from typing import Any
 import numpy as np
 
 SKY, GROUND, LINE, PLANE = "#56B4E9", "#8a6d3b", "#ffffff", "#E69F00"
-
-
-def roll_pitch(q_nb: Any) -> tuple[float, float]:
-    """Roll and pitch in rad of q_nb (4,), w x y z."""
-    w, x, y, z = q_nb
-    return (
-        math.atan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
-        math.asin(max(-1.0, min(1.0, 2.0 * (w * y - x * z)))),
-    )
 
 
 def between(q: Any, p: Any) -> float:

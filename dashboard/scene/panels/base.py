@@ -3,15 +3,16 @@
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import viser
 
-from dashboard.scene.data.device import Device
-from dashboard.scene.data.store import Store
+from dashboard.data.device import Device
+from dashboard.data.store import Store
+from dashboard.desk import Desk
 from dashboard.scene.drawing.chart import Chart, Curve, Shade
 from dashboard.scene.drawing.palette import estimator_colour, estimator_title
+from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
 
 log = logging.getLogger(__name__)
@@ -47,7 +48,7 @@ class Panel:
     """
 
     title = ""
-    feed: Any = None  # dashboard.scene.feed.Feed, set by the view: how a panel gives orders
+    desk: Desk  # set by the view: how a panel gives orders
     own_scene = False  # True: the page shows something else than the device in 3-D
 
     def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
@@ -58,9 +59,9 @@ class Panel:
     def order_estimator(self, title: str, command: pb.EstimatorCommand) -> None:
         """Give the order and show the person who pressed the button what came of it."""
         try:
-            reply = self.feed.estimator(command)
+            reply = self.desk.estimator(command)
             text, good = reply.message, reply.ok
-        except Exception as error:  # shown to the person who pressed the button
+        except OrderError as error:  # shown to the person who pressed the button
             log.warning("%s: %s", title, error)
             text, good = str(error), False
         title = title if good else "The estimator did not do it"

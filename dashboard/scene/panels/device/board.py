@@ -9,6 +9,7 @@ import viser
 
 from dashboard.scene.drawing.palette import age, escape, number, rows
 from dashboard.scene.panels.base import Panel, Snapshot
+from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
 
 log = logging.getLogger(__name__)
@@ -118,10 +119,10 @@ class Board(Panel):
         texts, good = [], True
         try:
             for name in names:
-                reply = self.feed.board(self._device, pb.BoardCommand(name=name, value=value))
+                reply = self.desk.board(self._device, pb.BoardCommand(name=name, value=value))
                 good = good and reply.ok
                 texts.append(reply.message)
-        except Exception as error:  # shown to the person who pressed the button
+        except OrderError as error:  # shown to the person who pressed the button
             log.warning("board: %s", error)
             texts, good = [*texts, str(error)], False
         title = "Board" if good else "The board did not do it"

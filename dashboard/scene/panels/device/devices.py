@@ -7,8 +7,8 @@ import time
 
 import numpy as np
 
+from dashboard.data.pose import roll_pitch
 from dashboard.scene.drawing.geometry import MODES
-from dashboard.scene.drawing.horizon import roll_pitch
 from dashboard.scene.drawing.palette import (
     FIX,
     REFERENCE,
@@ -166,6 +166,8 @@ class Devices(Panel):
             ]
         if s.store.dropped:
             texts.append(f"the dashboard could not keep up: {s.store.dropped} messages not shown")
+        if s.store.refused:
+            texts.append(f"{s.store.refused} messages of too many or nameless devices not shown")
         return "".join(f'<p class="gf-alert">{escape(text)}</p>' for text in texts)
 
     @staticmethod

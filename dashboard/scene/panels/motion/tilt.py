@@ -2,7 +2,8 @@
 side.
 """
 
-from dashboard.scene.drawing.horizon import between, horizon_svg, roll_pitch
+from dashboard.data.pose import roll_pitch
+from dashboard.scene.drawing.horizon import between, horizon_svg
 from dashboard.scene.drawing.palette import estimator_title, number, rows
 from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
 

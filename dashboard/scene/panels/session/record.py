@@ -8,6 +8,7 @@ from collections.abc import Callable
 import viser
 
 from dashboard.scene.drawing.palette import escape, number, rows
+from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
 
 log = logging.getLogger(__name__)
@@ -80,7 +81,7 @@ class Record:
         try:
             answer = self._call(command)
             text, good = (answer.message or answer.session or "done"), not answer.message
-        except Exception as error:  # shown to the person who pressed the button
+        except OrderError as error:  # shown to the person who pressed the button
             log.warning("recorder: %s", error)
             text, good = str(error), False
         started = action == pb.RecorderCommand.ACTION_START

@@ -9,8 +9,10 @@ from typing import Any
 
 import viser
 
-from dashboard.scene.data.store import Store
+from dashboard.data.store import Store
+from dashboard.desk import Desk
 from dashboard.scene.drawing.palette import escape
+from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
 
 log = logging.getLogger(__name__)
@@ -29,13 +31,13 @@ class Timeline:
     def __init__(
         self,
         client: viser.ClientHandle,
-        feed: Any,
+        desk: Desk,
         store: Store,
         chosen: Callable[[], str],
         dock: bool = True,
     ) -> None:
         """`chosen` names the device that this browser shows, which a note is about."""
-        self._client, self._feed, self._store, self._chosen = client, feed, store, chosen
+        self._client, self._desk, self._store, self._chosen = client, desk, store, chosen
         self._touched = 0.0
         gui = client.gui
         panel = gui.add_panel()
@@ -158,8 +160,8 @@ class Timeline:
         if not self._showing:
             return
         try:
-            self._feed.replay(pb.ReplayCommand(action=action, value=value, until=until))
-        except ConnectionError as error:
+            self._desk.replay(pb.ReplayCommand(action=action, value=value, until=until))
+        except OrderError as error:
             self._client.add_notification(
                 "The replay did not do it", str(error), color="red", auto_close_seconds=6.0
             )
@@ -217,9 +219,9 @@ class Timeline:
             at_utc_ns=at_ns,
         )
         try:
-            self._feed.note(name, note)
+            self._desk.note(name, note)
             self._note.value = ""
-        except ConnectionError as error:
+        except OrderError as error:
             self._client.add_notification(
                 "The note was not kept", str(error), color="red", auto_close_seconds=6.0
             )

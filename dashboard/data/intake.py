@@ -8,11 +8,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from dashboard.scene.data.device import Device
-from dashboard.scene.data.tables import ADC_CHANNELS
-from dashboard.scene.data.track import Track
-from dashboard.scene.drawing.geometry import ned_from_geodetic, yaw_of
-from dashboard.scene.drawing.horizon import roll_pitch
+from dashboard.data.device import Device
+from dashboard.data.pose import ned_from_geodetic, roll_pitch, yaw_of
+from dashboard.data.tables import ADC_CHANNELS
+from dashboard.data.track import Track
 from messages.contract import gyrofree_pb2 as pb
 
 FIXES_REMEMBERED = 100  # until the filter has said whether it believes them

@@ -10,14 +10,16 @@ import time
 
 from google.protobuf.message import Message
 
-from dashboard.scene.data.device import HISTORY_S, Device, Latest
-from dashboard.scene.data.intake import INTAKE
-from dashboard.scene.data.replayed import Replayed
+from dashboard.data.device import HISTORY_S, Device, Latest
+from dashboard.data.intake import INTAKE
+from dashboard.data.replayed import Replayed
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 
 LATE_JOIN_S = 2.0  # repaired stretches nearer than this are one
 MARKS = 200  # notes and marks of a device that are drawn
+DEVICES = 64  # remembered; a foreign publisher cannot fill the memory
+TOPICS = 512  # of one device, counted for each estimator
 ANEW_S = 3600.0  # a step of the time stamps ahead after which the old axis is of no use
 
 
@@ -31,6 +33,7 @@ class Store:
         self.replay = Replayed()
         self.logs: list[tuple[float, str, str]] = []  # arrived, device, text
         self.dropped = 0  # messages the feed could not keep up with
+        self.refused = 0  # messages of devices beyond DEVICES, or whose name is none
 
     def names(self) -> list[str]:
         """Devices heard so far, in the order of their names."""
@@ -102,14 +105,22 @@ class Store:
         utc_ns = message.header.utc_ns
         known = self.devices.get(name)
         if known is None:
+            if len(self.devices) >= DEVICES or not tp.NAME.fullmatch(name):
+                self.refused += 1
+                return
             known = self.devices[name] = Device(name, utc_ns)
         t = (utc_ns - known.utc0_ns) * 1e-9
         row, before = INTAKE.get(topic.name), known.get(topic.name, estimator)
+        if before is None and len(known.latest) >= TOPICS:
+            self.refused += 1
+            return
         back = before is not None and before.t - t > 1.0
         if row is not None and utc_ns and (back or t - known.t_newest > ANEW_S):
             # A replay started over, or the first time stamps were not yet those of a clock: the old
             # axis is of no use.
-            known = self.devices[name] = Device(name, utc_ns, generation=known.generation + 1)
+            states = {key: one for key, one in known.latest.items() if key[0] not in INTAKE}
+            known = Device(name, utc_ns, latest=states, generation=known.generation + 1)
+            self.devices[name] = known
             t = 0.0
         known.run = message.header.run or known.run
         known.latest[topic.name, estimator] = Latest(message, arrived, t)

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from google.protobuf.message import Message
 
-from dashboard.scene.data.ring import Ring, blank
-from dashboard.scene.data.tables import TABLES
-from dashboard.scene.data.track import Track
+from dashboard.data.ring import Ring, blank
+from dashboard.data.tables import TABLES
+from dashboard.data.track import Track
 
 LEADERS = (  # estimators that stand first wherever they run
     "products-ekf",
@@ -79,6 +79,11 @@ class Device:
     def navigates(self) -> bool:
         """Some navigation filter runs for it."""
         return any(topic == "nav" for topic, _ in self.latest)
+
+    @property
+    def spoken_of(self) -> bool:
+        """Its gateway or an estimator has said how it is."""
+        return any(topic in ("link", "board", "estimator") for topic, _ in self.latest)
 
     def estimators(self, topic: str) -> list[str]:
         """Names of the estimators heard on a topic; the leading one first."""

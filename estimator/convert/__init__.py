@@ -1,0 +1,1 @@
+"""Bus messages to arrays, and what estimators say to bus messages: pure functions."""

@@ -1,0 +1,39 @@
+"""What the devices of one pipeline share: settings, clocks, cost, orders to hold GNSS back."""
+
+from collections.abc import Callable
+
+from estimator.convert.status import status_message
+from estimator.cost import Cost
+from estimator.orders.mute import MuteDesk
+from estimator.settings import EstimatorSettings
+from estimator.stream import Stream
+from messages.contract import gyrofree_pb2 as pb
+
+
+class Common:
+    """Shared by all kinds; `clock` (ns) measures the cost per sample and touches nothing else."""
+
+    def __init__(self, settings: EstimatorSettings, clock: Callable[[], int], version: str) -> None:
+        self.settings = settings
+        self.clock = clock
+        self.cost = Cost()
+        self.mutes = MuteDesk()
+        self.clock_offset: dict[str, float] = {}  # s, UTC minus the board's clock, by device
+        self._version = version
+        self._second: dict[tuple[str, str], int] = {}
+
+    def heard(self, header: pb.Header) -> None:
+        """A batch of samples came: how far the board's clock is from UTC."""
+        self.clock_offset[header.device] = header.utc_ns * 1e-9 - header.device_us * 1e-6
+
+    def new_second(self, device: str, what: str, t_s: float) -> bool:
+        """Whether t_s is in another second than the last time for the same device and `what`."""
+        second = int(t_s)
+        changed = self._second.get((device, what)) != second
+        self._second[device, what] = second
+        return changed
+
+    def status(self, header: pb.Header, stream: Stream, name: str) -> pb.EstimatorStatus:
+        """Health of one estimator, without its state."""
+        us = self.cost.take(header.device, name)
+        return status_message(header, stream, name, us, self._version)

@@ -1,0 +1,164 @@
+"""Accelerometers on a rigid body without gyroscopes, mostly the cube.
+
+In: AccelBatch; TachoRate where the tachometer aids; fixes for navigation without gyroscopes.
+Estimators: the rate estimators of [estimator] rate, side by side (devices/rate.py), the axis health
+monitor, a guided calibration while one runs, and navigation on the cube's own rate where it is
+asked for (devices/gyro_free.py).
+Out: RateEstimate, pose, AxisHealth, CalibrationStatus, EstimatorStatus, and the messages of
+kinds/navigation.py.
+"""
+
+from typing import Any
+
+from estimator.choice import beliefs, load_card, make_layout
+from estimator.convert.header import sample_header
+from estimator.convert.samples import BadMessage, Samples, accel_samples, tacho_report
+from estimator.convert.status import rate_state
+from estimator.devices.gyro_free import GyroFreeNavigation
+from estimator.devices.navigation import NavBoard
+from estimator.devices.rate import RateBoard, RateOutput, WrongAxes
+from estimator.kinds.common import Common
+from estimator.kinds.navigation import navigated
+from estimator.orders.calibration import CalibrationDesk
+from estimator.output import Output
+from estimator.rate_messages import BoardMessages, RateMessages
+from estimator.stream import every
+from inertial.calibration.card import CardError
+from inertial.navigation.navigation import NavigatorConfig
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import AXES, CALIBRATION, ESTIMATOR, POSE, RATE
+
+POSE_HZ = 20.0
+
+
+class Cube:
+    """One device."""
+
+    def __init__(self, device: str, common: Common, desk: CalibrationDesk) -> None:
+        self._device, self._common, self._desk = device, common, desk
+        self._board: RateBoard | None = None
+        self._messages: BoardMessages | None = None
+        self._gyro_free: GyroFreeNavigation | None = None
+
+    def begin_anew(self) -> None:
+        """Another calibration card is in use: the estimators begin anew with the next batch."""
+        self._board = None
+
+    @property
+    def navigation(self) -> NavBoard | None:
+        """Where fixes of this device go; None where it does not navigate."""
+        return None if self._gyro_free is None else self._gyro_free.board
+
+    def take(self, batch: pb.AccelBatch) -> list[Output]:
+        """Estimates and poses of a batch and, once per second of data, the health of each
+        estimator; raises convert.samples.BadMessage.
+        """
+        samples = accel_samples(batch)
+        board, messages = self._ready()
+        states = self._feed(board, batch, samples)
+        out = self._estimates(batch, board, messages, states)
+        out += self._health(batch, samples, board, messages)
+        status = self._desk.feed(batch, samples, board.wiring)
+        if status is not None:
+            out.append(Output(CALIBRATION, self._device, "", status))
+        self._common.heard(batch.header)
+        if self._gyro_free is not None:
+            navigation = self._gyro_free
+            said = navigation.feed(batch.header.epoch, batch.period_s, samples.t_s, states)
+            out += navigated(self._common, batch, samples, navigation.board, said, navigation.names)
+        return out
+
+    def tacho(self, message: pb.TachoRate) -> None:
+        """Correct the rate by the tachometer; raises convert.samples.BadMessage."""
+        if self._board is not None:
+            self._board.tacho(*tacho_report(message))
+
+    def expect_fixes(self) -> None:
+        """The device has GNSS: navigate on its own rate from now on, where that is asked for."""
+        s = self._common.settings
+        if self._board is None or self._gyro_free is not None or not s.gyro_free_navigation:
+            return
+        self._gyro_free = GyroFreeNavigation(
+            self._device,
+            NavigatorConfig(lever_arm_b=s.vehicle_of(self._device).lever_arm_b_m),
+            s.gyro_free_navigation,
+            s.nav_limit_hz,
+            s.believed_rate,
+            s.rate_limit_hz,
+        )
+        self._common.mutes.attend(self._device, self._gyro_free.board)
+
+    def _ready(self) -> tuple[RateBoard, BoardMessages]:
+        """The rate estimators with the calibration card in use; raises BadMessage for a card of
+        another layout.
+        """
+        if self._board is None or self._messages is None:
+            s, device = self._common.settings, self._device
+            path = s.card_of(device)
+            card = self._desk.used.get(device, load_card(path) if path is not None else None)
+            layout = make_layout(s.layout_of(device))
+            try:
+                self._board = RateBoard(device, layout, s.rate, s.rate_limit_hz, card, beliefs(s))
+            except CardError as error:
+                raise BadMessage(f"{device}: {error}") from None
+            self._messages = BoardMessages(device, self._board.layout)
+        return self._board, self._messages
+
+    def _feed(self, board: RateBoard, batch: pb.AccelBatch, samples: Samples) -> list[RateOutput]:
+        common = self._common
+        started = common.clock()
+        try:
+            states = board.feed(
+                batch.header.epoch,
+                batch.first_index,
+                batch.period_s,
+                samples.t_s,
+                samples.values,
+                batch.stale_mask,
+            )
+        except WrongAxes as error:
+            raise BadMessage(str(error)) from None
+        common.cost.add(self._device, common.clock() - started, len(samples.t_s))
+        return states
+
+    def _estimates(
+        self,
+        batch: pb.AccelBatch,
+        board: RateBoard,
+        messages: BoardMessages,
+        states: list[RateOutput],
+    ) -> list[Output]:
+        """States as messages, and poses now and then."""
+        device, step, out = self._device, every(batch.period_s, POSE_HZ), []
+        card = "" if board.card is None else board.card.id
+        estimates = RateMessages(batch, card, messages.shared)
+        for row, index, name, state in states:
+            out.append(Output(RATE, device, name, estimates.estimate(row, index, name, state)))
+            if index % step == step - 1:
+                utc_ns = out[-1].message.header.utc_ns
+                out.append(Output(POSE, device, name, messages.pose(name, utc_ns, state.q_nb)))
+        return out
+
+    def _health(
+        self, batch: pb.AccelBatch, samples: Samples, board: RateBoard, messages: BoardMessages
+    ) -> list[Output]:
+        """Of the axes, a few times per second of data, and of each estimator, once."""
+        common, device, out = self._common, self._device, []
+        last_s = float(samples.t_s[-1])
+        axes_due = common.new_second(device, "axes", AXES.rate * last_s)
+        due = common.new_second(device, "accel", last_s)
+        if not (axes_due or due):
+            return []
+        header = sample_header(batch.header, (len(samples.t_s) - 1) * batch.period_s)
+        if axes_due:
+            out.append(Output(AXES, device, "", messages.axes(header, board.health, last_s)))
+        if due:
+            for name in common.settings.rate:
+                out.append(Output(ESTIMATOR, device, name, self._status(header, board, name)))
+        return out
+
+    def _status(self, header: pb.Header, board: RateBoard, name: str) -> pb.EstimatorStatus:
+        status: Any = self._common.status(header, board.stream, name)
+        status = rate_state(status, board.last[name])
+        status.layout, status.us_per_sample = board.layout.name, board.cost_us(name)
+        return status
