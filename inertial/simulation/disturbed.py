@@ -1,4 +1,4 @@
-"""What a laboratory adds to a turning table: vibration, lost samples, drifting biases, a rocking base.
+"""What a laboratory adds to a turning table: vibration, lost samples, drifting biases, rocking.
 
     vibration   the whole table shakes along one direction within a band: what a motor, a fan, a
                 pump or a lorry outside the window does

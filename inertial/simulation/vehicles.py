@@ -1,5 +1,5 @@
-"""Vehicles that are no car: what an ideal inertial unit feels in an aircraft, on a walker, in a body
-that rolls; and a car in a city whose receiver hears nothing for a minute.
+"""Vehicles that are no car: what an ideal inertial unit feels in an aircraft, on a walker, in a
+body that rolls; and a car in a city whose receiver hears nothing for a minute.
 
 A navigator that takes every vehicle for a car is to be tried on these. Motion is written down in n
 and carried to specific force and rate by drive_path.felt (E-60 to E-63), which knows none of the
@@ -76,8 +76,8 @@ def _random_steps(
 
 
 def aircraft(seed: int, seconds: float = 300.0, still: float = 20.0) -> Motion:
-    """A light aeroplane: take-off, climb, coordinated turns banked to 45 deg, a wind of 8 m/s that it
-    crabs into, an angle of attack of some degrees.
+    """A light aeroplane: take-off, climb, coordinated turns banked to 45 deg, a wind of 8 m/s that
+    it crabs into, an angle of attack of some degrees.
     """
     draw = np.random.default_rng([seed, 31])
     t = STEP * np.arange(round(seconds / STEP) + 1)
