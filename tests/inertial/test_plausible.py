@@ -51,7 +51,7 @@ def test_right_units_are_not_doubted_and_wrong_ones_are_named(seed):
         (10.0, None),
         (0.01, None),
         (2.5e-4, None),
-        (20.0, "want seconds"),
+        (20.0, "t_ms"),
         (1e4, "t_us"),
         (1e7, "t_ns"),
         (1e-7, "want seconds"),
