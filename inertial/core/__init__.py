@@ -17,3 +17,6 @@ BUILD = native.__name__.rpartition("_")[2]
 """Which build was taken: "plain" or "v3"."""
 VERSION: str = native.VERSION
 """Digest of the sources it was built from: equal digests give equal bits."""
+
+navigation = native.navigation
+"""Strapdown, error model, filters (inertial/navigation)."""

@@ -56,5 +56,6 @@ MatrixOut to_numpy(const Eigen::MatrixBase<Derived>& m) {
 
 // One for each subject; module.cpp calls them all.
 void bind_elementary(nb::module_& m);
+void bind_navigation(nb::module_& m);
 
 }  // namespace gyrofree

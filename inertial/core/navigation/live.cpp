@@ -1,0 +1,86 @@
+#include "navigation/live.hpp"
+
+#include <algorithm>
+
+#include "common/rotation.hpp"
+
+namespace gyrofree::navigation {
+namespace {
+
+constexpr double SAME_TIME_S = 1e-9;
+constexpr std::size_t BEFORE_ANCHOR = 2;      // samples that the first one after the anchor looks at
+constexpr std::size_t DROPPED_AT_ONCE = 512;  // so that dropping costs nothing per sample
+
+}  // namespace
+
+void Live::feed(Samples samples) {
+  for (const Sample& sample : samples) {
+    keep(sample);
+    if (!navigating) continue;
+    head_next = run_to(head, model, settings.rules, history, head_next, history.size(), FOREVER);
+    follow();
+  }
+}
+
+// Brings the anchor within reach: fixes older than two seconds come too late.
+void Live::follow() {
+  const double until = history.back().t - LATEST_S;
+  if (anchor.time >= until - ANCHOR_STEP_S) return;
+  anchor_next = run_to(anchor, model, settings.rules, history, anchor_next, after(until), FOREVER);
+}
+
+void Live::keep(const Sample& sample) {
+  if (navigating && anchor_next > BEFORE_ANCHOR + DROPPED_AT_ONCE) drop(anchor_next - BEFORE_ANCHOR);
+  if (!navigating && history.size() == MOST_SAMPLES) drop(MOST_SAMPLES - KEPT_SAMPLES);
+  history.push_back(sample);
+}
+
+void Live::drop(std::size_t count) {
+  history.erase(history.begin(), history.begin() + static_cast<std::ptrdiff_t>(count));
+  anchor_next -= std::min(anchor_next, count);
+  head_next -= std::min(head_next, count);
+}
+
+void Live::begin(const Leg& leg, const Memory& start) {
+  anchor = head = leg;
+  memory = start;
+  navigating = true;
+  anchor_next = head_next = after(leg.time);
+  head_next = run_to(head, model, settings.rules, history, head_next, history.size(), FOREVER);
+}
+
+void Live::stop() {
+  navigating = false;
+  history.clear();
+  anchor_next = head_next = 0;
+}
+
+bool Live::too_late(double t) const { return t < anchor.time - SAME_TIME_S; }
+
+FixResult Live::take(const Fix& fix) {
+  Leg trial = anchor;
+  std::size_t k = anchor_next;
+  const FixResult out = take_at(trial, model, settings, memory, history, k, history.size(), fix);
+  if (!was_used(out.status)) return out;
+  anchor = head = trial;
+  anchor_next = k;
+  head_next = run_to(head, model, settings.rules, history, k, history.size(), FOREVER);
+  return out;
+}
+
+std::size_t Live::after(double t) const {
+  const auto later = std::upper_bound(history.begin(), history.end(), t,
+                                      [](double time, const Sample& sample) { return time < sample.t; });
+  return static_cast<std::size_t>(later - history.begin());
+}
+
+Matrix3 Live::turned_back(const Matrix3& C_nb, const Vector3& bias_gyro, double t) const {
+  Matrix3 C = C_nb;
+  for (std::size_t i = history.size(); i-- > after(t);) {
+    const double begin = i > 0 ? std::max(t, history[i - 1].t) : t;
+    C = C * turn_matrix((bias_gyro - history[i].omega_b) * (history[i].t - begin));
+  }
+  return C;
+}
+
+}  // namespace gyrofree::navigation
