@@ -34,8 +34,8 @@ MARKS = (
 )
 
 
-class SheetError(ValueError):
-    """A table that cannot be used; names file, line and column, and says what was wanted."""
+class LogError(ValueError):
+    """A log that cannot be used; names file, line and column, and says what was wanted."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Sheet:
     header_line: int  # of the file, from 1
 
     def want(self, names: Sequence[str], purpose: str = "") -> None:
-        """Raises SheetError for a column that is not there."""
+        """Raises LogError for a column that is not there."""
         missing = [name for name in names if name not in self.header]
         if not missing:
             return
@@ -95,7 +95,7 @@ class Sheet:
             separated = (
                 f"; the line has one column only: separate columns by {_or(SEPARATORS.values())}"
             )
-        raise SheetError(
+        raise LogError(
             f"{self.path}:{self.header_line}: column {missing[0]!r} is missing"
             f"{f' ({len(missing)} of {len(names)} are)' if len(missing) > 1 else ''}, found"
             f" {found}{separated}; want {purpose or ', '.join(names)}"
@@ -104,7 +104,7 @@ class Sheet:
     def read(self, names: Sequence[str], may_miss: Sequence[str] = ()) -> Table:
         """The named columns, each once; cells of `may_miss` may be empty and become NaN.
 
-        Raises SheetError for a column that is missing, a cell that is no finite number, a row with
+        Raises LogError for a column that is missing, a cell that is no finite number, a row with
         too few cells or a line that is too long; OSError for a file that cannot be read.
         """
         self.want(names)
@@ -128,10 +128,10 @@ class Sheet:
                 yield from reader
         except pa.ArrowInvalid as error:
             if "straddling" in str(error):
-                raise SheetError(
+                raise LogError(
                     f"{self.path}: a line of more than {BLOCK >> 20} MB; want one sample a line"
                 ) from None
-            raise SheetError(self._no_number(names) or f"{self.path}: {error}") from None
+            raise LogError(self._no_number(names) or f"{self.path}: {error}") from None
 
     def _open(self, names: list[str], rows: _Rows, kind: pa.DataType) -> pa.csv.CSVStreamingReader:
         # names are ours: a column that stands twice, or has none, must not stop the reader
@@ -186,19 +186,19 @@ class Sheet:
             row, column = bad[0]
             line = int(self._lines(np.array([done + row]), rows)[0])
             name = names[must[column]]
-            raise SheetError(
+            raise LogError(
                 f"{self.path}:{line}: column {name!r}: {self._cell(line, name)!r} is no finite"
                 " number; correct it, or leave the row out: it then counts as a missing sample"
             )
 
     def _check_rows(self, rows: _Rows, done: int) -> bool:
-        """Raises SheetError for a row of a wrong number of cells; True for a last line cut off."""
+        """Raises LogError for a row of a wrong number of cells; True for a last line cut off."""
         last = done + len(rows.skipped) + len(rows.wrong)
         for number, cells, text in rows.wrong:
             if cells < len(self.header) and number - self._first == last - 1:
                 if not self._ends_with_newline():
                     return True
-            raise SheetError(
+            raise LogError(
                 f"{self.path}:{number}: {cells} cells, the header names {len(self.header)}:"
                 f" {text[:60]!r}; complete the row, or leave it out"
             )
@@ -243,7 +243,7 @@ class Sheet:
                 cell = cells[place].strip() if place < len(cells) else ""
                 if cell and cell not in MISSING and not _is_number(cell, self.decimal):
                     return (
-                        f"{self.path}:{number}: column {name!r}: {cell!r} is no number"
+                        f"{self.path}:{number}: column {name!r}: {cell!r} is no finite number"
                         f"{self._comma_hint(cell)}; correct it, or leave the row out"
                     )
         return ""
@@ -255,26 +255,26 @@ class Sheet:
 
 
 def open_sheet(path: Path) -> Sheet:
-    """Find encoding, separator, decimal sign and header. Raises SheetError, OSError."""
+    """Find encoding, separator, decimal sign and header. Raises LogError, OSError."""
     with path.open("rb") as file:
         data = file.read(FIRST_LOOK)
     encoding, text = _decoded(path, data, len(data) == FIRST_LOOK)
     lines = text.splitlines()
     number = _header_line(lines)
     if number == 0:
-        raise SheetError(f"{path}: empty; want a header line with the columns' names, and samples")
+        raise LogError(f"{path}: empty; want a header line with the columns' names, and samples")
     line = lines[number - 1]
     separator = max(SEPARATORS, key=lambda s: _count(line, s))
     names = next(csv.reader([line], delimiter=separator))
     header = tuple(name.strip().strip('"') for name in names)
     if all(_is_number(name, ".") for name in header):
-        raise SheetError(
+        raise LogError(
             f"{path}:{number}: numbers where the columns' names were expected ({line[:40]!r}); want"
             " a header line above the samples"
         )
     twice = [name for name in header if name and header.count(name) > 1]
     if twice:
-        raise SheetError(
+        raise LogError(
             f"{path}:{number}: column {twice[0]!r} stands there twice; rename or remove one"
         )
     decimal = _decimal(lines[number:], separator)
@@ -298,9 +298,9 @@ def _decoded(path: Path, data: bytes, more: bool) -> tuple[str, str]:
         for encoding, zeros in (("utf-16-le", data[1::2]), ("utf-16-be", data[0::2])):
             if zeros and zeros.count(0) > 0.4 * len(zeros):
                 return encoding, codecs.getincrementaldecoder(encoding)("replace").decode(data)
-        raise SheetError(f"{path}: not a text file (it holds zero bytes); want CSV")
+        raise LogError(f"{path}: not a text file (it holds zero bytes); want CSV")
     if more and b"\n" not in data and b"\r" not in data:
-        raise SheetError(f"{path}:1: a line of more than {FIRST_LOOK >> 10} kB; want CSV")
+        raise LogError(f"{path}:1: a line of more than {FIRST_LOOK >> 10} kB; want CSV")
     try:
         return "utf-8", codecs.getincrementaldecoder("utf-8")().decode(data, final=not more)
     except UnicodeDecodeError:

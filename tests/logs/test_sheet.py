@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from logs.sheet import SheetError, open_sheet
+from logs.sheet import LogError, open_sheet
 
 NAMES = ("t_s", "fx_mps2", "Temp °C")
 numbers = st.floats(-1e6, 1e6, allow_nan=False).map(lambda v: round(v, 6))
@@ -76,7 +76,7 @@ def test_the_same_numbers_however_they_are_written(tmp_path_factory, pair):
 def test_what_cannot_be_used_is_named_with_its_place(tmp_path, data, words):
     path = tmp_path / "log.csv"
     path.write_bytes(data)
-    with pytest.raises(SheetError) as caught:
+    with pytest.raises(LogError) as caught:
         read(path)
     for word in (str(path), *words):
         assert word in str(caught.value), caught.value
