@@ -115,7 +115,7 @@ class Readings:
         with self._slots:
             try:
                 process = subprocess.Popen(
-                    [*nice, sys.executable, "-m", "sessions.library.curves_build", str(path)],
+                    [*nice, sys.executable, "-P", "-m", "sessions.library.curves_build", str(path)],
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.PIPE,
                     stderr=subprocess.PIPE,

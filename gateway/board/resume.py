@@ -12,12 +12,12 @@ between.
 
 import struct
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 from google.protobuf.message import DecodeError, Message
 
 from firmware_protocol.frames import Acc12, Adc, Imu6
-from firmware_protocol.ledger import Ledger
+from gateway.board.outgoing import Put
 from gateway.ports.reader import Chunk
 from gateway.samples.batch import Batch
 from messages.contract import gyrofree_pb2 as pb
@@ -25,9 +25,6 @@ from messages.contract.topics import ACCEL, ADC, BY_NAME, GNSS, IMU, LOCATION, T
 from messages.history.journal import Journal
 from messages.history.journal_file import Record
 from messages.history.spool import Spool, entry_of
-
-if TYPE_CHECKING:
-    from gateway.board.device import DeviceLink, Put
 
 REACH_S = 12.0  # a board says HELLO every ten seconds
 REACH_BYTES = 1 << 20
@@ -40,7 +37,7 @@ TOPIC_OF = {Acc12: ACCEL, Imu6: IMU, Adc: ADC}
 class Past:
     """What an earlier life has published of each topic, to publish on behind it."""
 
-    def __init__(self, spool: Spool, put: "Put") -> None:
+    def __init__(self, spool: Spool, put: Put) -> None:
         self._put = put
         self._last: dict[
             str, tuple[int, int]
@@ -118,16 +115,11 @@ def unseen(past: Past, journal: Journal) -> list[Record]:
     return [record for record in found if record.monotonic_ns >= since]
 
 
-def resume(link: "DeviceLink", past: Past, records: list[Record]) -> None:
-    """Bring `link` to where the raw `records` end, and publish what they hold that has not been
-    published.
+def again(past: Past, records: list[Record]) -> Iterator[tuple[Put | None, Chunk]]:
+    """The raw `records` as reads, each with where its messages go: nowhere as long as they were
+    published for sure, then to `past`, which passes over what it knows.
     """
     for record in records:
         sure = record.monotonic_ns < past.read_ns - MARGIN_S * 1e9
-        link.publish_with(None if sure else past.put, past)
-        link.take(Chunk(record.channel, record.data, record.monotonic_ns))
-    link.publish_with(None)
-    # This run counts from here, with half a frame in hand.
-    link.ledger = Ledger(epoch=link.ledger.epoch, seq=link.ledger.seq, reboots=link.ledger.reboots)
-    link.ledger.received(link.deframer.pending)
-    link.report.message()  # rates and latency from here on
+        chunk = Chunk(record.channel, record.data, record.monotonic_ns)
+        yield None if sure else past.put, chunk

@@ -3,7 +3,6 @@
 import importlib.metadata
 import json
 import logging
-import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -46,7 +45,7 @@ from gyrofree.commands.options import (
 from gyrofree.commands.replay import replay
 from gyrofree.config import ConfigError
 from gyrofree.running.process import EXIT_CONFIG as CONFIG
-from gyrofree.running.process import EXIT_FAILED, fail, run_service
+from gyrofree.running.process import EXIT_FAILED, command, fail, run_service
 
 log = logging.getLogger(__name__)
 
@@ -237,9 +236,9 @@ def dashboard(config: Config = None, verbose: Verbose = False) -> None:
         from dashboard.web.control import ProcessReplay
         from dashboard.web.jobs import Jobs
 
-        replayer = [sys.executable, "-m", "gyrofree", "replay", "--stay"]
-        replayer += ["--config", str(config)] if config else []
-        jobs = Jobs([sys.executable, "-m", "gyrofree"], ["--config", str(config)] if config else [])
+        options = ["--config", str(config)] if config else []
+        replayer = command("replay", "--stay", *options)
+        jobs = Jobs(command(), options)
         service.run(
             settings.dashboard, settings.bus, stop, replay=ProcessReplay(replayer), jobs=jobs
         )

@@ -28,6 +28,15 @@ SETTLED = 8.0  # s after the start: imports and compiled functions are loaded
 log = logging.getLogger(__name__)
 
 
+def command(*arguments: str) -> list[str]:
+    """How a process of the product starts another one: `gyrofree ARGUMENTS`.
+
+    With -P nothing that lies in the working folder is imported: a person's own `estimator.py` or
+    `numpy.py` there is theirs alone.
+    """
+    return [sys.executable, "-P", "-m", "gyrofree", *arguments]
+
+
 def start_logging(verbose: bool = False) -> None:
     """One line per event on stderr; below a supervisor without time, which the supervisor writes
     itself.

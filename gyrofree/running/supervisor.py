@@ -10,7 +10,6 @@ import logging
 import os
 import signal
 import subprocess
-import sys
 import threading
 import time
 from dataclasses import dataclass, field
@@ -18,7 +17,7 @@ from dataclasses import dataclass, field
 from rich.console import Console
 from rich.text import Text
 
-from gyrofree.running.process import EXIT_CONFIG, EXIT_TAKEN
+from gyrofree.running.process import EXIT_CONFIG, EXIT_TAKEN, command
 
 PAUSE_FIRST = 0.05  # s; while a gateway is away its board's samples are lost
 PAUSE_LONGEST = 5.0  # s
@@ -65,7 +64,7 @@ class Supervisor:
         self._stopping = False
 
     def add(self, name: str, *arguments: str, waits_for: tuple[str, str] | None = None) -> None:
-        """Have `python -m gyrofree ARGUMENTS` as a child called `name`.
+        """Have `gyrofree ARGUMENTS` as a child called `name`.
 
         waits_for: another child and a text of its log, before which this one is not started; at
         most LONGEST_WAIT.
@@ -121,7 +120,7 @@ class Supervisor:
         return clean
 
     def _command(self, child: Child) -> list[str]:
-        return [sys.executable, "-m", "gyrofree", *child.arguments]
+        return command(*child.arguments)
 
     def _spawn(self, child: Child) -> None:
         child.started = time.monotonic()

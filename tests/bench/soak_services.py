@@ -88,13 +88,13 @@ def gateway(folder: Path, hours: float, done: Any) -> None:
 
     settings = GatewaySettings(journal=folder, journal_bytes=KEPT_BYTES, published_bytes=KEPT_BYTES)
     link = DeviceLink(DeviceSettings(name=DEVICE, port="none"), settings)
-    link.publish_with(Publishers(None, "p", link.spool).put)
+    link.out.direct(Publishers(None, "p", link.spool).put)
     link.readers = [SimpleNamespace(connected=True, message="", reconnects=0)]
     begin_ns, t_s = time.monotonic_ns(), [0.0]
 
     def write(data: bytes) -> bool:
         now_ns = begin_ns + round(t_s[0] * 1e9)
-        link.journal.append(BOARD, data, now_ns, now_ns + link.wall_offset_ns)
+        link.journal.append(BOARD, data, now_ns, now_ns + link.wall.offset_ns)
         link.take(Chunk(BOARD, data, now_ns))
         return True
 
@@ -105,8 +105,8 @@ def gateway(folder: Path, hours: float, done: Any) -> None:
         t_s[0] = k / RATE_HZ
         board.take(BoardAccel(t_s[0], tuple(counts[k % len(counts)])))
         if k % RATE_HZ == 0:
-            link.look(True, begin_ns + round(t_s[0] * 1e9))
-            link._publish(LINK, link.report.message(), None, k * 1000)
+            link.watch.look(True, begin_ns + round(t_s[0] * 1e9))
+            link.out.publish(LINK, link.report.message(link.readers, 0), k * 1000)
             done.value = t_s[0] / 3600.0
     link.journal.close()
     link.spool.close()

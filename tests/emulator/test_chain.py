@@ -96,9 +96,9 @@ def test_the_rate_of_the_table_through_image_gateway_and_estimator(rig, profile)
         [0] * 3 + [17e-6] * 3 + [0] * 3 + [17e-6] * 3
     )
     assert (
-        chain.link.ledger.lost_frames
-        == chain.link.ledger.bad_chunks
-        == chain.link.ledger.lost_samples
+        chain.link.decoder.ledger.lost_frames
+        == chain.link.decoder.ledger.bad_chunks
+        == chain.link.decoder.ledger.lost_samples
         == 0
     )
 
@@ -112,7 +112,7 @@ def test_faults_of_the_world_have_names_on_the_bus_and_the_ledger_balances(rig):
     )
     chain = rig(test=TableTest(seed=2, profile="still"), faults=world)
     chain.run(8.4)
-    ledger = chain.link.ledger
+    ledger = chain.link.decoder.ledger
     faults = chain.faults()
     assert {"sensor-3-dead", "uart-stall"} <= faults.keys() and "reboot" not in faults
     dead = [m for m in chain.seen["accel"] if 4.0 < m.header.device_us * 1e-6 < 5.0]
@@ -121,7 +121,7 @@ def test_faults_of_the_world_have_names_on_the_bus_and_the_ledger_balances(rig):
     assert back and all(
         m.stale_mask == 0 for m in back
     )  # started anew within a second, and used again
-    status = chain.link.status
+    status = chain.link.state.status
     assert status.dropped > 50 and ledger.device_dropped == status.dropped == ledger.lost_frames
     assert ledger.link_lost == 0
     assert (
@@ -130,7 +130,7 @@ def test_faults_of_the_world_have_names_on_the_bus_and_the_ledger_balances(rig):
     )
     chain.run(10.0)
     assert "reboot" in chain.faults() and ledger.reboots == 1
-    assert ledger.unaccounted(chain.link.deframer.pending) == 0
+    assert ledger.unaccounted(chain.link.decoder.pending) == 0
 
 
 def test_a_clock_200_ppm_fast_is_found_by_the_pulses_and_by_the_host(rig):
@@ -240,7 +240,7 @@ def test_through_a_real_pty_the_gateway_and_the_bus(image, tmp_path, free_port):
 def test_hello_names_four_sensors_and_the_emulator(rig):
     chain = rig()
     chain.run(0.2)
-    hello = chain.link.hello
+    hello = chain.link.state.hello
     assert (
         isinstance(hello, Hello)
         and hello.board_id == 3

@@ -25,7 +25,7 @@ def link(tmp_path: Path):
         device = DeviceSettings(name="analogue", port="file:///dev/null", **settings)
         link = DeviceLink(device, GatewaySettings(journal=tmp_path / "journal", devices=[device]))
         said = []
-        link._put = lambda topic, name, message: said.append((topic, message))
+        link.out.direct(lambda topic, name, message: said.append((topic, message)))
         made.append(link)
         return link, said
 

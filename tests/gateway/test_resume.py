@@ -13,7 +13,7 @@ import pytest
 from firmware_protocol.codec import encode
 from firmware_protocol.frames import Acc12, Gps, Tacho
 from gateway.board.device import DeviceLink
-from gateway.board.resume import Past, resume, unseen
+from gateway.board.resume import Past, unseen
 from gateway.ports.keeper import Keeper, Left
 from gateway.ports.reader import Chunk, Reader
 from gateway.settings import DeviceSettings, GatewaySettings
@@ -66,7 +66,8 @@ class Life:
     def __init__(self, folder: Path) -> None:
         device = DeviceSettings(name="cube", port="file:///dev/null")
         self.link = DeviceLink(device, GatewaySettings(journal=folder, devices=[device]))
-        self.link._put = Publishers(None, "p", self.link.spool).put
+        self.put = Publishers(None, "p", self.link.spool).put
+        self.link.out.direct(self.put)
 
     def read(self, data: bytes, at_ns: int, decode: bool = True) -> None:
         self.link.journal.append(BOARD, data, at_ns, time.time_ns() - time.monotonic_ns() + at_ns)
@@ -103,10 +104,9 @@ def again(folder) -> Life:
     life, held = Life(folder), Held()
     link = life.link
     link.readers = [Reader(link.device.port, 0, BOARD, link.journal, link.queue, held)]
-    put = link._put
-    past = Past(link.spool, put)
-    resume(link, past, unseen(past, link.journal))
-    link.publish_with(put)
+    past = Past(link.spool, life.put)
+    link.resume(past, unseen(past, link.journal))
+    link.out.direct(life.put)
     link.readers.pop().close()
     os.close(held.into)
     return life
@@ -133,7 +133,7 @@ def test_at_whatever_byte_it_was_killed_each_sample_is_published_once(tmp_path, 
             deaths.pop(0)
             life.die()
             life = again(tmp_path)
-    life.link._send_held()
+    life.link.samples.flush()
     said = life.published()
     samples = [
         i
@@ -148,12 +148,12 @@ def test_at_whatever_byte_it_was_killed_each_sample_is_published_once(tmp_path, 
     tacho = [m.header.device_us for name, m in said if name == "tacho"]
     assert tacho == sorted(set(tacho)) and len(tacho) > 15
     assert (
-        life.link.ledger.lost_samples
-        == life.link.ledger.lost_frames
-        == life.link.ledger.bad_chunks
+        life.link.decoder.ledger.lost_samples
+        == life.link.decoder.ledger.lost_frames
+        == life.link.decoder.ledger.bad_chunks
         == 0
     )
-    assert life.link.ledger.unaccounted(life.link.deframer.pending) == 0
+    assert life.link.decoder.ledger.unaccounted(life.link.decoder.pending) == 0
     life.die()
 
 

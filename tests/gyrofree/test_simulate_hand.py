@@ -37,7 +37,7 @@ class Bench:
             device, GatewaySettings(journal=folder / "journal", devices=[device])
         )
         self.heard = []
-        self.link._put = lambda topic, name, message: self.heard.append((topic, message))
+        self.link.out.direct(lambda topic, name, message: self.heard.append((topic, message)))
         self.pipeline = Pipeline(
             EstimatorSettings(navigators=[], attitudes=["vqf"], axes=folder / "axes")
         )

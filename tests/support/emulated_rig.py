@@ -57,7 +57,7 @@ class Rig:
         )
         self.link = DeviceLink(settings.devices[0], settings)
         self.link.readers = [HostPort(self.board)]
-        self.link._put = lambda topic, device, message: self._published(topic.name, message)
+        self.link.out.direct(lambda topic, device, message: self._published(topic.name, message))
         self.pipeline = Pipeline(EstimatorSettings(rate=rate)) if rate else None
         self.seen: dict[str, list] = defaultdict(list)
         self.wire = bytearray()
@@ -83,7 +83,7 @@ class Rig:
             self.link.orders.step(self.board.now_s)
             if self.board.now_s - self._second >= 1.0:
                 self._second = self.board.now_s
-                self.link.look(True, self.now_ns)
+                self.link.watch.look(True, self.now_ns)
 
     def order(self, name: str, value: int = 0, ask: bool = False, wait_s: float = 5.0) -> pb.Reply:
         """Order something and live until it is answered."""
