@@ -2,7 +2,7 @@
 
 A log in another unit looks like a log: its rates are wrong by a factor and nothing crashes. Three
 things are known of every board, wherever it stands: at rest it reads one g, it samples more often
-than once in ten seconds, and gravity turns in the body as the gyroscope says. What contradicts them
+than four times a second, and gravity turns in the body as the gyroscope says. What contradicts them
 is said in a sentence that names the likely unit. SI throughout.
 """
 
@@ -19,7 +19,7 @@ WINDOW = 25  # samples of a quiet window
 QUIETEST = 0.05  # share of the windows that stand for rest: the quietest ones
 FAR = 0.12  # relative error of one g that no bias explains
 NEAR = 0.06  # relative distance at which a factor is named
-LONGEST_PERIOD_S = 10.0
+LONGEST_PERIOD_S = 0.25  # the slowest output rate of an ADXL345 is 6.25 Hz
 SHORTEST_PERIOD_S = 2e-5
 TURNING = 0.02  # rad, of gravity over a window; less tells nothing of a rate's unit
 ALIKE = 0.7  # correlation of both turns, below which acceleration rules
@@ -54,7 +54,7 @@ def doubt_of_time(period_s: float, name: str = "t_s") -> Doubt | None:
                 f"{name}: {period_s:.4g} s between samples; in {unit} it would be {hertz:.4g} Hz:"
                 f" name the column t_{unit}, or divide it by {1.0 / size:.0f}",
             )
-    return Doubt("time", f"{name}: {period_s:.4g} s between samples; want seconds, below 10")
+    return Doubt("time", f"{name}: {period_s:.4g} s between samples; want seconds, below 0.25")
 
 
 def quiet_mean(values: Array, window: int = WINDOW) -> Array:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.attitude.filters import ATTITUDES
-from logs.attitude_log import LogError, Trial, read_trials
+from logs.attitude_log import Trial, read_trials
+from logs.sheet import LogError
 
 Array = NDArray[np.float64]
 

@@ -24,7 +24,8 @@ from inertial.rate.estimators import ESTIMATORS, ProductsRate
 from inertial.rate.sight import ALL_BLIND
 from inertial.rate.tachometer import SUFFIX
 from logs.cube_axes import examine
-from logs.cube_log import CubeLog, LogError, read_log
+from logs.cube_log import CubeLog, read_log
+from logs.sheet import LogError
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]

@@ -56,13 +56,17 @@ class CubeLog:
     counts: NDArray[np.int64] | None  # (n, N), where the log has counts
     lsb_mps2: float  # m/s^2 per count; 0 for a log in m/s^2
     index: NDArray[np.int64]  # (n,), sample numbers with the gaps counted
-    period_s: float
-    jitter_s: float  # RMS of the stamps about even times
+    timing: Timing
     gaps: tuple[Gap, ...]
     tacho: Array | None  # (n,) rad/s
     omega_b: Array | None  # (n, 3) rad/s, truth
     q_nb: Array | None  # (n, 4), truth
     cut_off: bool = False  # the last line was half written and is left out
+
+    @property
+    def period_s(self) -> float:
+        """Between samples, s."""
+        return self.timing.period_s
 
     @property
     def seconds(self) -> float:
@@ -96,8 +100,7 @@ def read_log(path: Path, names: Sequence[str], lsb_mg: float | None = None) -> C
         counts=_whole(path, table, values, names) if lsb else None,
         lsb_mps2=lsb,
         index=timing.index,
-        period_s=timing.period_s,
-        jitter_s=timing.jitter_s,
+        timing=timing,
         gaps=_gaps(timing, table),
         tacho=table[TACHO] if TACHO in table else None,
         omega_b=_columns(table, TRUE_RATE),

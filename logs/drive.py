@@ -83,7 +83,7 @@ def run_drive(
 
     One fix in `every` is given; outages (start, length in s from the first fix) are a second run
     each filter makes. Lengths in m, speeds in m/s, angles in rad; None where nothing is known.
-    Raises BadLog for files that cannot be used, UnknownFilter for a name, OSError.
+    Raises LogError for files that cannot be used, UnknownFilter for a name, OSError.
     """
     names = list(filters) if filters else list(USUAL)
     for name in names:

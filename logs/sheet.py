@@ -97,7 +97,7 @@ class Sheet:
             )
         raise LogError(
             f"{self.path}:{self.header_line}: column {missing[0]!r} is missing"
-            f"{f' ({len(missing)} of {len(names)} are)' if len(missing) > 1 else ''}, found"
+            f"{f' ({len(missing)} of {len(names)} are)' if 1 < len(missing) < len(names) else ''}, found"
             f" {found}{separated}; want {purpose or ', '.join(names)}"
         )
 

@@ -48,7 +48,7 @@ def test_right_units_are_not_doubted_and_wrong_ones_are_named(seed):
 @pytest.mark.parametrize(
     ("period", "word"),
     [
-        (10.0, None),
+        (10.0, "t_ms"),
         (0.01, None),
         (2.5e-4, None),
         (20.0, "t_ms"),
