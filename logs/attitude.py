@@ -22,6 +22,7 @@ def run_attitude(
     *,
     filters: list[str] | None = None,
     plot: Path | None = None,
+    units_as_named: bool = False,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Run filters over one log, or every log of a folder, and score their inclination where the
@@ -39,7 +40,7 @@ def run_attitude(
             raise LogError(f"no attitude filter {name!r}; want some of {', '.join(ATTITUDES)}")
     if not names:
         raise LogError(f"no attitude filter named; want some of {', '.join(ATTITUDES)}")
-    trials = read_trials(Path(log))
+    trials = read_trials(Path(log), units_as_named)
     logs, errors = {}, {}
     for k, trial in enumerate(trials):
         figures = {}

@@ -38,23 +38,23 @@ class Trial:
         return float((self.t[-1] - self.t[0]) / (len(self.t) - 1))
 
 
-def read_trials(log: Path) -> list[Trial]:
+def read_trials(log: Path, units_as_named: bool = False) -> list[Trial]:
     """A .csv or .mat, or every one of a folder. Raises LogError with the file and what it lacks."""
     if log.is_dir():
         files = sorted(f for f in log.iterdir() if f.suffix in (".csv", ".mat"))
         if not files:
             raise LogError(f"{log}: no .csv or .mat files in this folder")
-        return [_read(file) for file in files]
-    return [_read(log)]
+        return [_read(file, units_as_named) for file in files]
+    return [_read(log, units_as_named)]
 
 
-def _read(file: Path) -> Trial:
+def _read(file: Path, units_as_named: bool) -> Trial:
     if not file.is_file():
         raise LogError(f"{file}: no such file")
     if file.suffix == ".mat":
         return _read_mat(file)
     if file.suffix == ".csv":
-        return _read_csv(file)
+        return _read_csv(file, units_as_named)
     raise LogError(f"{file}: want .csv (columns {', '.join(SAMPLES + TRUTH)}) or BROAD's .mat")
 
 
@@ -72,13 +72,13 @@ def _read_mat(file: Path) -> Trial:
     return _trial(file, t, content["imu_acc"], content["imu_gyr"], q, moving)
 
 
-def _read_csv(file: Path) -> Trial:
+def _read_csv(file: Path, units_as_named: bool) -> Trial:
     sheet = open_sheet(file)
     table = read_si(sheet, [*QUANTITIES, *TRUTH], [SCORED], TRUTH)
     timing_of(sheet, table)
     f, w = (np.column_stack([table[name] for name in QUANTITIES[a:b]]) for a, b in ((1, 4), (4, 7)))
     q = np.column_stack([table[name] for name in TRUTH])
-    refuse(file, [doubt_of_gravity(f), doubt_of_rate(table["t"], f, w)], as_named=False)
+    refuse(file, [doubt_of_gravity(f), doubt_of_rate(table["t"], f, w)], units_as_named)
     scored = table[SCORED] > 0 if SCORED in table else np.ones(len(q), dtype=bool)
     return _trial(file, table["t"], f, w, q, scored)
 

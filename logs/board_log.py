@@ -26,7 +26,7 @@ from inertial.plausible import doubt_of_gravity, doubt_of_rate
 from inertial.timing import Timing
 from logs.cube_log import LSB_MG, read_log
 from logs.drive_log import IMU, read_fixes
-from logs.quantities import read_si, refuse, timing_of
+from logs.quantities import read_si, refuse, said_of, timing_of
 from logs.sheet import LogError, Sheet, open_sheet
 
 Array = NDArray[np.float64]
@@ -135,22 +135,3 @@ def centre_force(f_axis: Array) -> Array:
     """Specific force (n, 3) of a cube's centre, m/s^2, from its twelve axes (n, 12) (E-5)."""
     layout = CUBE(HALF_SIDE)
     return f_axis @ layout.theta_b / (len(layout.theta_b) / 3.0)
-
-
-def said_of(path: Path, timing: Timing, cut_off: bool) -> list[str]:
-    """What of a log's times a person should know."""
-    said = []
-    if timing.missing:
-        longest = max(timing.holes, key=lambda hole: hole.missing)
-        said.append(
-            f"{path}: {timing.missing} samples are missing in {len(timing.holes)} holes, the"
-            f" longest {longest.seconds:.3f} s after {longest.t_s:.3f} s"
-        )
-    if timing.jitter_s > 0.05 * timing.period_s and timing.jitter_s > timing.resolution_s:
-        said.append(
-            f"{path}: times jitter by {timing.jitter_s * 1e3:.2f} ms about a period of"
-            f" {timing.period_s * 1e3:.3f} ms: samples are taken as even"
-        )
-    if cut_off:
-        said.append(f"{path}: the last line was cut off; the rows before it are used")
-    return said

@@ -24,6 +24,7 @@ from inertial.navigation.navigation import NavigatorConfig
 from inertial.navigation.smoother import SMOOTHERS, SmoothRun, smooth_drive
 from inertial.navigation.strapdown import rotation_vector
 from logs.drive_log import DriveLog, DriveTruth, read_drive_log
+from logs.quantities import said_of
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
@@ -76,6 +77,7 @@ def run_drive(
     outages: Sequence[tuple[float, float]] = (),
     filters: Sequence[str] | None = None,
     truth: Path | None = None,
+    units_as_named: bool = False,
     plot: Path | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
@@ -93,7 +95,7 @@ def run_drive(
             )
     tell = progress or (lambda done, what: None)
     tell(0.0, "reading")
-    log = read_drive_log(folder, imu, gnss, truth)
+    log = read_drive_log(folder, imu, gnss, truth, units_as_named)
     fed = [replace(fix, withheld=k % every != 0) for k, fix in enumerate(log.fixes)]
     results = run_all(log, fed, names, lambda done, what: tell(0.05 + 0.6 * done, what))
     ends: dict[str, list[float | None]] = {name: [] for name in names}
@@ -116,7 +118,11 @@ def run_drive(
         tell(0.97, "drawing")
         draw(plot, log, {name: r for name, r in results.items() if r is not None}, scores)
     tell(1.0, "")
-    return {"filters": {name: scores[name] for name in names}, "default": DEFAULT}
+    return {
+        "filters": {name: scores[name] for name in names},
+        "default": DEFAULT,
+        "notes": [*log.notes, *said_of(folder / imu, log.timing, False)],
+    }
 
 
 def run_all(

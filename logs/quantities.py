@@ -98,6 +98,25 @@ def refuse(path: Path, doubts: Sequence[Doubt | None], as_named: bool) -> list[s
     return said
 
 
+def said_of(path: Path, timing: Timing, cut_off: bool) -> list[str]:
+    """What of a log's times a person should know."""
+    said = []
+    if timing.missing:
+        longest = max(timing.holes, key=lambda hole: hole.missing)
+        said.append(
+            f"{path}: {timing.missing} samples are missing in {len(timing.holes)} holes, the"
+            f" longest {longest.seconds:.3f} s after {longest.t_s:.3f} s"
+        )
+    if timing.jitter_s > 0.05 * timing.period_s and timing.jitter_s > timing.resolution_s:
+        said.append(
+            f"{path}: times jitter by {timing.jitter_s * 1e3:.2f} ms about a period of"
+            f" {timing.period_s * 1e3:.3f} ms: samples are taken as even"
+        )
+    if cut_off:
+        said.append(f"{path}: the last line was cut off; the rows before it are used")
+    return said
+
+
 def _usual(quantity: str) -> str:
     stem = quantity.rstrip("xyzned") if quantity[:1] in "fwv" and len(quantity) == 2 else quantity
     unit = USUAL.get(stem) or USUAL.get(quantity[:1] if len(quantity) == 2 else quantity)

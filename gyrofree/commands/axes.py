@@ -42,8 +42,8 @@ def axes(
     [estimator.axis_maps] to use it.
     """
     from inertial.attitude.axis_map import AxisMap, Figures, write_map
-    from logs.sheet import LogError
     from logs.axes_log import detect
+    from logs.sheet import LogError
 
     figures = Figures(zero_g_v, accel_v_per_g / 9.80665, 0.0, math.degrees(gyro_v_per_dps))
     try:

@@ -22,6 +22,14 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON on standard out
 Speed = Annotated[float, typer.Option(min=0.1, max=100.0, help="Seconds of the log per second.")]
 
 
+UnitsAsNamed = Annotated[
+    bool,
+    typer.Option(
+        "--units-as-named", help="Take numbers that look like another unit for what they are named."
+    ),
+]
+
+
 def settings_of(path: Path | None) -> Settings:
     """The configuration a command was given; ends the command with one line per fault."""
     try:

@@ -63,7 +63,9 @@ def origin_of(source: BoardLog) -> float:
 
 def _samples(source: BoardLog) -> Iterator[Item]:
     period_s = source.timing.period_s
-    for row, (t_s, index) in enumerate(zip(source.t_s.tolist(), source.index.tolist(), strict=True)):
+    for row, (t_s, index) in enumerate(
+        zip(source.t_s.tolist(), source.index.tolist(), strict=True)
+    ):
         if source.kind == "imu":
             imu = pb.ImuBatch(first_index=index, period_s=period_s)
             imu.f_b_mps2.extend(source.f_b[row].tolist())

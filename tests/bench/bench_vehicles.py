@@ -49,7 +49,9 @@ def errors(name: str, drive) -> dict[str, np.ndarray]:
                 truth.height[at] - s.height,
             ]
         )
-        turn = Rotation.from_quat(s.q_nb, scalar_first=True).as_matrix() @ truth.C_nb[at].T  # error rotation in n
+        turn = (
+            Rotation.from_quat(s.q_nb, scalar_first=True).as_matrix() @ truth.C_nb[at].T
+        )  # error rotation in n
         position.append(p)
         heading.append(np.arctan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1]))
         tilt.append(np.hypot(turn[0, 2], turn[1, 2]))

@@ -9,6 +9,7 @@ from itertools import accumulate
 from pathlib import Path
 
 import pytest
+from gateway.virtual.player import LOG_EPOCH_S
 
 from firmware_protocol.codec import FLAG_SIMULATED, Deframer, Frame, encode
 from firmware_protocol.frames import Acc12
@@ -16,7 +17,6 @@ from gateway import service
 from gateway.gnss.ubx import Epoch, ubx_bytes
 from gateway.settings import DeviceSettings, GatewaySettings
 from gateway.virtual.board_link import PtyLink, TcpLink
-from gateway.virtual.player import LOG_EPOCH_S
 from gateway.virtual.virtual_board import (
     PLAYED,
     SIMULATED,
