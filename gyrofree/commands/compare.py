@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Column, Table
 
-from gyrofree.commands.options import AsJson, Config, settings_of, show_table
+from gyrofree.commands.options import AsJson, Config, file_of, settings_of, show_table
 from gyrofree.commands.run import progress_bar
 from gyrofree.running.process import EXIT_CONFIG, fail
 
@@ -56,7 +56,6 @@ def compare(
     re-estimation (`gyrofree rerun`). Quality `ambiguous` means that another offset fits as well, as
     with repeated motion: then give --offset.
     """
-    from gyrofree.commands.sessions import file_of
     from sessions.library.compare import CompareError, as_dict
     from sessions.library.compare import compare as lay_over
     from sessions.library.curves_build import ensure

@@ -13,16 +13,22 @@ import typer
 from pydantic import ValidationError
 
 from estimator.settings import EstimatorSettings
-from gyrofree.commands.options import AsJson, Config, UnitsAsNamed, settings_of
+from gyrofree.commands.options import (
+    AsJson,
+    Config,
+    SessionOrFile,
+    catalogue_of,
+    file_of,
+    settings_of,
+)
 from gyrofree.commands.run import progress_bar
-from gyrofree.commands.sessions import AnySession, catalogue_of, file_of
 from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
 from messages.contract.topics import TopicError, check_name
 from sessions.recording.manifest import SessionError, name_of
 
 
 def export(
-    session: AnySession,
+    session: SessionOrFile,
     form: Annotated[
         str, typer.Option("--format", "-f", help="csv, parquet, mat, kml, gpx or mcap.")
     ] = "csv",
@@ -65,7 +71,7 @@ def export(
 
 
 def report(
-    session: AnySession,
+    session: SessionOrFile,
     out: Annotated[
         Path | None, typer.Option(help="Folder for HTML, PDF and JSON; default ./report-<session>.")
     ] = None,
@@ -156,7 +162,7 @@ def _estimated(settings, rows, session: str, note: str, root: Path) -> Path:
 
 
 def rerun(
-    session: AnySession,
+    session: SessionOrFile,
     estimators: Annotated[
         str, typer.Option(help="Rate estimators to run, separated by commas.")
     ] = "",

@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -10,6 +10,9 @@ from rich.table import Table
 
 from gyrofree.config import ConfigError, Settings, load_or_default
 from gyrofree.running.process import EXIT_CONFIG, fail
+
+if TYPE_CHECKING:
+    from sessions.library.catalogue import Catalogue
 
 Config = Annotated[
     Path | None,
@@ -19,6 +22,10 @@ Config = Annotated[
 ]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Log details too.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON on standard output.")]
+SessionId = Annotated[
+    str, typer.Argument(help="Id of a session; `gyrofree sessions list` shows them.")
+]
+SessionOrFile = Annotated[str, typer.Argument(help="Id of a session, or path of an MCAP file.")]
 Speed = Annotated[float, typer.Option(min=0.1, max=100.0, help="Seconds of the log per second.")]
 
 
@@ -36,6 +43,23 @@ def settings_of(path: Path | None) -> Settings:
         return load_or_default(path)
     except ConfigError as error:
         raise fail(str(error), EXIT_CONFIG) from None
+
+
+def catalogue_of(settings: Settings) -> "Catalogue":
+    """The sessions of this configuration."""
+    from sessions.library.catalogue import Catalogue
+
+    return Catalogue(Path(settings.recorder.root))
+
+
+def file_of(settings: Settings, session: str) -> Path:
+    """MCAP file of an id or path; ends the command where there is none."""
+    from gyrofree.running import replay
+
+    try:
+        return replay.find(settings, session)
+    except LookupError as error:
+        raise fail(str(error)) from None
 
 
 def console_of(width: int = 160) -> Console:

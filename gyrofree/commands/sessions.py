@@ -4,21 +4,26 @@ compared, handed on.
 
 import json
 import sys
-import time
 from dataclasses import asdict
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.table import Column, Table
 
+from gyrofree.commands.annotate import note, tag
 from gyrofree.commands.compare import compare
-from gyrofree.commands.options import AsJson, Config, settings_of, show_table
+from gyrofree.commands.options import (
+    AsJson,
+    Config,
+    SessionId,
+    catalogue_of,
+    settings_of,
+    show_table,
+)
 from gyrofree.commands.run import progress_bar
-from gyrofree.config import Settings
-from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
-from sessions.library.annotations import SessionNote, add_note, change_annotations, read_annotations
+from gyrofree.running.process import EXIT_FAILED, fail
+from sessions.library.annotations import read_annotations
 from sessions.library.catalogue import Catalogue
 from sessions.recording.manifest import SessionError
 
@@ -28,25 +33,6 @@ app = typer.Typer(
     help="Recorded sessions: list, look, verify, delete.",
 )
 app.command("compare")(compare)
-Session = Annotated[
-    str, typer.Argument(help="Id of a session; `gyrofree sessions list` shows them.")
-]
-AnySession = Annotated[str, typer.Argument(help="Id of a session, or path of an MCAP file.")]
-
-
-def catalogue_of(settings: Settings) -> Catalogue:
-    """The sessions of this configuration."""
-    return Catalogue(Path(settings.recorder.root))
-
-
-def file_of(settings: Settings, session: str) -> Path:
-    """MCAP file of an id or path; ends the command where there is none."""
-    from gyrofree.running import replay
-
-    try:
-        return replay.find(settings, session)
-    except LookupError as error:
-        raise fail(str(error)) from None
 
 
 @app.command("list")
@@ -127,7 +113,7 @@ def _percent(share: float | None) -> str:
 
 
 @app.command()
-def show(session: Session, as_json: AsJson = False, config: Config = None) -> None:
+def show(session: SessionId, as_json: AsJson = False, config: Config = None) -> None:
     """Everything that is known of one session: topics, losses, versions, notes."""
     catalogue = catalogue_of(settings_of(config))
     try:
@@ -168,12 +154,13 @@ def show(session: Session, as_json: AsJson = False, config: Config = None) -> No
         cells = (count.messages, count.lost, count.restarts, count.repeated, count.unreadable)
         table.add_row(key, *map(str, cells))
     show_table(table)
-    for note in notes.notes:
-        print(f"{'all' if note.at_s is None else f'{note.at_s:.2f} s'}  {note.author}: {note.text}")
+    for one in notes.notes:
+        when = "all" if one.at_s is None else f"{one.at_s:.2f} s"
+        print(f"{when}  {one.author}: {one.text}")
 
 
 @app.command()
-def verify(session: Session, as_json: AsJson = False, config: Config = None) -> None:
+def verify(session: SessionId, as_json: AsJson = False, config: Config = None) -> None:
     """Read a session whole: its hash, every message, every count. Exit code 1 when something is
     amiss.
     """
@@ -207,7 +194,7 @@ def verify(session: Session, as_json: AsJson = False, config: Config = None) -> 
 
 @app.command()
 def delete(
-    session: Session,
+    session: SessionId,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,
     as_json: AsJson = False,
     config: Config = None,
@@ -279,61 +266,5 @@ def retain(
     )
 
 
-@app.command()
-def note(
-    session: Session,
-    text: Annotated[str, typer.Argument(help="The remark.")],
-    at: Annotated[
-        float | None, typer.Option(help="s from the session's start; default: about all of it.")
-    ] = None,
-    author: Annotated[str, typer.Option(help="Who says so.")] = "",
-    as_json: AsJson = False,
-    config: Config = None,
-) -> None:
-    """Add a remark to a session; the recording itself is never changed."""
-    folder = catalogue_of(settings_of(config)).root / session
-    try:
-        notes = add_note(
-            folder, SessionNote(text=text, author=author, at_s=at, written_utc_ns=time.time_ns())
-        ).notes
-    except (ValueError, OSError) as error:
-        raise fail(str(error)) from None
-    if as_json:
-        print(json.dumps([one.model_dump(mode="json") for one in notes], indent=2))
-    else:
-        print(f"{session}: {len(notes)} note{'' if len(notes) == 1 else 's'}")
-
-
-@app.command()
-def tag(
-    session: Session,
-    add: Annotated[list[str] | None, typer.Option(help="Tag to add; may be given again.")] = None,
-    remove: Annotated[list[str] | None, typer.Option(help="Tag to take away.")] = None,
-    title: Annotated[str | None, typer.Option(help="New title.")] = None,
-    outcome: Annotated[str | None, typer.Option(help="pass, fail, incomplete, or empty.")] = None,
-    as_json: AsJson = False,
-    config: Config = None,
-) -> None:
-    """Title, tags and outcome of a session."""
-    folder = catalogue_of(settings_of(config)).root / session
-
-    def change(was):
-        tags = (set(was.tags) | set(add or ())) - set(remove or ())
-        new = {
-            "tags": sorted(tags),
-            "title": was.title if title is None else title,
-            "outcome": was.outcome if outcome is None else outcome,
-        }
-        return type(was).model_validate(was.model_dump() | new)
-
-    try:
-        changed = change_annotations(folder, change)
-    except (ValueError, OSError) as error:
-        raise fail(str(error).splitlines()[0], EXIT_CONFIG) from None
-    if as_json:
-        print(json.dumps(changed.model_dump(mode="json"), indent=2))
-        return
-    print(
-        f"{session}: {changed.title or 'no title'}; tags {', '.join(changed.tags) or 'none'};"
-        f" {changed.outcome}"
-    )
+app.command("note")(note)
+app.command("tag")(tag)

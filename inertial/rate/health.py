@@ -17,13 +17,10 @@ from numpy.typing import NDArray
 from inertial.layouts.layout import RANK_TOLERANCE, Layout
 from inertial.rate import axis_samples, parity
 from inertial.rate.axis_fault import AxisState, Fault
-from inertial.rate.direct import Direct
 from inertial.rate.health_config import STANDSTILL, Config, Counts, Newest
-from inertial.rate.hypotheses import Finding, History, explain, start
+from inertial.rate.hypotheses import Finding, History, Known, explain, start
 
 Array = NDArray[np.float64]
-
-_gather = Direct(axis_samples.gather)
 
 
 class HealthMonitor:
@@ -64,7 +61,6 @@ class HealthMonitor:
         self._clean_blocks = 0
 
     # --- what others ask
-    # ------------------------------------------------------------------------------------------
 
     @property
     def mask(self) -> int:
@@ -74,18 +70,15 @@ class HealthMonitor:
     def _excluded(self) -> int:
         return sum([1 << k for k, fault in enumerate(self.faults) if fault.excluded])
 
-    @property
-    def constants(self) -> tuple[Array, Array, Array, Array, Array, Array]:
-        """What parity.replay wants."""
-        return self._J, self._Q, self.bias, self.reference, self.white, self.offset
-
-    @property
-    def tuning(self) -> tuple[float, float, float]:
-        """What parity.replay wants."""
-        return self.config.sigma_alpha, self.config.sigma_force, self.config.scale
+    def _known(self) -> Known:
+        c = self.config
+        constants = parity.Constants(
+            self._J, self._Q, self.bias, self.reference, self.white, self.offset
+        )
+        tuning = parity.Tuning(c.sigma_alpha, c.sigma_force, c.scale)
+        return Known(self.layout, self.used, self.learned, constants, tuning)
 
     # --- samples
-    # --------------------------------------------------------------------------------------------------
 
     def step(self, t_s: float, f_axis: Array, stale: int = 0) -> None:
         """One sample: t_s (s, board's clock), readings (N,) m/s^2, bit k of `stale`: axis k was not
@@ -103,16 +96,17 @@ class HealthMonitor:
         f, row, parts, mask = np.ascontiguousarray(f_axis, dtype=np.float64), 0, [], self.mask
         near, marks = self._near, self._marks
         while row < len(f):
-            row = _gather(
+            row = axis_samples.gather(
                 f, row, self.per_block, near, marks, self._noise, self._limits, self._count
             )
             self._stale |= stale
             filled = int(marks[axis_samples.FILLED])
             if filled < self.per_block:
                 break
-            self._t, block = float(t_s[row - 1]), near[2] / filled
+            self._t, block = float(t_s[row - 1]), near[axis_samples.SUM] / filled
             dt, self._gap_s = filled * self.period_s + self._gap_s, 0.0
-            marks[axis_samples.FILLED], near[2], self._last = 0, 0.0, f[row - 1]
+            marks[axis_samples.FILLED], self._last = 0, f[row - 1]
+            near[axis_samples.SUM] = 0.0
             self._block(block, dt)
             self._stale = 0
             if self.mask != mask:
@@ -125,7 +119,9 @@ class HealthMonitor:
         self._gap_s += samples * self.period_s
         self._forget_samples()
         if self._x is not None:
-            self._P[:6, :6] += np.diag([(10.0 * self._gap_s) ** 2] * 3 + [100.0**2] * 3)
+            self._P[parity.MOTION, parity.MOTION] += np.diag(
+                [(10.0 * self._gap_s) ** 2] * 3 + [100.0**2] * 3
+            )
             self.history.clear()
             self._sum = 0.0
 
@@ -140,7 +136,6 @@ class HealthMonitor:
         self._count[axis_samples.SAME] = 0
 
     # --- blocks
-    # ---------------------------------------------------------------------------------------------------
 
     def _block(self, block: Array, dt: float) -> None:
         self.counts.blocks += 1
@@ -192,13 +187,12 @@ class HealthMonitor:
 
     def _check(self, block: Array, dt: float) -> None:
         c = self.config
+        known = self._known()
         if self._x is None:
-            self._x, self._P = start(
-                self.layout, block - self.bias, self.used, float(self.offset.max()) ** 0.5
-            )
+            self._x, self._P = start(known, block)
         before = (self._x, self._P)
         x, P, nis, _, residual, sigma = parity.step(
-            self._x, self._P, block, dt, self.used, self.learned, self.constants, self.tuning
+            *before, block, dt, known.used, known.learned, known.constants, known.tuning
         )
         if not math.isfinite(nis):
             return self._restart()
@@ -221,7 +215,7 @@ class HealthMonitor:
         """The readings do not fit: which axis, and what is wrong with it?"""
         c = self.config
         late = self.history.since_onset() * self.per_block * self.period_s >= c.decide_s
-        finding = explain(self, late)
+        finding = explain(self.history, self._known(), late)
         if finding is None:
             if late:
                 self._restart()
@@ -288,7 +282,7 @@ class HealthMonitor:
         fault.excluded = fault.excluded or self._spare(i)
         if fault.excluded and self.used[i]:
             self.used[i] = False
-            self._forget_fault_in_state(i)
+            self._forget_fault_in_state()
 
     def _spare(self, i: int) -> bool:
         """True when the others still see omega' and p."""
@@ -297,9 +291,9 @@ class HealthMonitor:
         J = self.layout._scaled(self.layout.J[rest])
         return len(J) >= 6 and int(np.linalg.matrix_rank(J, rtol=RANK_TOLERANCE)) == 6
 
-    def _forget_fault_in_state(self, i: int) -> None:
+    def _forget_fault_in_state(self) -> None:
         """The filter believed the axis until now: run the newest blocks again without it."""
-        again = self.history.replay_without(self, i)
+        again = self.history.replay_without(self._known())
         if again is not None:
             self._x, self._P = again
             self._sum = 0.0
@@ -320,7 +314,6 @@ class HealthMonitor:
                 fault.state, fault.text, fault.since_s = AxisState.GOOD, "", self._t
 
     # --- standstill
-    # -----------------------------------------------------------------------------------------------
 
     def _learn(self, block: Array) -> None:
         """Offsets of the axes in use from two seconds of standstill; what is along p stays p's."""
@@ -337,9 +330,7 @@ class HealthMonitor:
             trend[used] > 6.0 * np.sqrt(4.0 * self.white[used] / STANDSTILL)
         ):
             return
-        theta = self.layout.theta_b
-        p = np.linalg.lstsq(theta[used], mean[used], rcond=None)[0]
-        off = mean - theta @ p
+        off = parity.offsets_at_rest(self.layout.theta_b, mean, used)
         allowed = self.offset + self.white + (self.config.scale * 9.8) ** 2 * 0.1
         if np.any((off - self.bias)[used] ** 2 > 20.0 * allowed[used]):
             return
@@ -349,11 +340,11 @@ class HealthMonitor:
         self.learned = self.learned | used
         self.history.clear()  # states of before belong to other offsets
         self._quiet = 0
-        self._x[:3], self._P[:3, :], self._P[:, :3] = 0.0, 0.0, 0.0
-        self._P[:3, :3] = 0.1**2 * np.eye(3)
+        omega = parity.OMEGA
+        self._x[omega], self._P[omega, :], self._P[:, omega] = 0.0, 0.0, 0.0
+        self._P[omega, omega] = 0.1**2 * np.eye(3)
 
     # --- the way back
-    # ---------------------------------------------------------------------------------------------
 
     def _returns(self, block: Array) -> None:
         c = self.config

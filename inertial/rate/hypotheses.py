@@ -3,7 +3,7 @@ about the axes.
 """
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from inertial.layouts.layout import Layout
 from inertial.rate import parity
 from inertial.rate.axis_fault import AxisState
-
-if TYPE_CHECKING:
-    from inertial.rate.health import HealthMonitor
 
 Array = NDArray[np.float64]
 
@@ -39,12 +36,22 @@ SWAPPED, FLIPPED, BIASED, SUSPECT = (
 )
 
 
+class Known(NamedTuple):
+    """What the monitor knows of the axes when it asks."""
+
+    layout: Layout
+    used: NDArray[np.bool_]  # (N,)
+    learned: NDArray[np.bool_]  # (N,), offsets are known from a standstill
+    constants: parity.Constants
+    tuning: parity.Tuning
+
+
 @dataclass(frozen=True)
 class Finding:
     """The best explanation. Without axes: the state was wrong, no axis is."""
 
     axes: tuple[int, ...]
-    kind: int
+    kind: parity.Kind
     state: AxisState
     text: str
     offset: float
@@ -98,121 +105,136 @@ class History:
         x, P = self.states[-n]
         return x, P, np.array(self.blocks[-n:]), np.array(self.dt[-n:])
 
-    def replay_without(self, monitor: "HealthMonitor", i: int) -> tuple[Array, Array] | None:
-        """State now, had axis i not been used since the oldest block that is kept, at most a second
-        back.
+    def replay_without(self, known: Known) -> tuple[Array, Array] | None:
+        """State now, had only the axes in use been used since the oldest block that is kept, at
+        most a second back.
         """
         n = min(len(self.blocks), 25)
         if n == 0:
             return None
-        used = monitor.used.copy()
-        x, P = self.states[-n]
+        nothing = (parity.NONE, 0, -1, -1)
+        blocks, dt = np.array(self.blocks[-n:]), np.array(self.dt[-n:])
         *_, x, P = parity.replay(
-            x,
-            P,
-            np.array(self.blocks[-n:]),
-            np.array(self.dt[-n:]),
-            used,
-            parity.NONE,
-            0,
-            -1,
-            -1,
-            monitor.constants,
-            monitor.tuning,
+            *self.states[-n], blocks, dt, known.used, nothing, known.constants, known.tuning
         )
         self.clear()
         return x, P
 
 
-def start(layout: Layout, f: Array, used: Array, unknown: float) -> tuple[Array, Array]:
-    """First state from one block f (N,): omega from the products where they are plain, else about
-    zero (H-7).
-    """
-    x, P = np.zeros(parity.STATES), np.zeros((parity.STATES, parity.STATES))
-    x[3:9] = np.linalg.lstsq(layout.J[used], f[used], rcond=None)[0]
-    sigma = 1.0
-    if used.all() and layout.rank == 12:
-        z = (layout.field_inverse @ f)[6:]
-        noise = unknown * float(np.linalg.norm(layout.field_inverse[6:], axis=1).max())
-        outer = np.zeros((3, 3))
-        outer[np.triu_indices(3)] = z
-        values, vectors = np.linalg.eigh(outer + np.triu(outer, 1).T)
-        if values[-1] > 3.0 * noise:
-            x[:3] = np.sqrt(values[-1]) * vectors[:, -1]
-            sigma = max(0.1, noise / (2.0 * np.sqrt(values[-1])))
-    diagonal = [sigma**2] * 3 + [(200.0) ** 2] * 3 + [(20.0) ** 2] * 3 + [0.0]
-    P[np.diag_indices(parity.STATES)] = diagonal
-    return x, P
+def start(known: Known, block: Array) -> tuple[Array, Array]:
+    """First state from one block (N,) (H-7)."""
+    c = known.constants
+    unknown = float(c.offset.max()) ** 0.5
+    plain = known.layout.rank == 12
+    return parity.start(c, block - c.bias, known.used, unknown, plain)
 
 
-def explain(monitor: "HealthMonitor", late: bool) -> Finding | None:
+class Tried(NamedTuple):
+    """A hypothesis and how well it explains the blocks."""
+
+    score: float  # -2 log likelihood
+    left: float  # NIS per degree of freedom
+    axes: tuple[int, ...]
+    kind: parity.Kind
+    since: int
+    x: Array
+    P: Array
+
+
+class Trial:
+    """The blocks since the onset, run again under one hypothesis after the other."""
+
+    def __init__(self, known: Known, onset: int, found: tuple[Array, Array, Array, Array]) -> None:
+        """found: as History.from_onset gives it; onset: the block in which it began."""
+        self.known, self._onset = known, onset
+        self._first, (self._blocks, self._dt) = found[:2], found[2:]
+
+    def run(
+        self,
+        kind: parity.Kind,
+        i: int = 0,
+        j: int = -1,
+        since: int = -1,
+        first: tuple[Array, Array] | None = None,
+    ) -> Tried:
+        """One hypothesis; `first`: another state to begin with."""
+        k = self.known
+        score, nis, degrees, x, P = parity.replay(
+            *(first or self._first),
+            self._blocks,
+            self._dt,
+            k.used,
+            (kind, i, j, since),
+            k.constants,
+            k.tuning,
+        )
+        who = () if kind == parity.NONE else (i,) if j < 0 else (i, j)
+        return Tried(score, nis / max(degrees, 1), who, kind, since, x, P)
+
+    def other_starts(self) -> list[Tried]:
+        """No axis is wrong, the state was: as the first block says it, and turning the other
+        way.
+        """
+        x, P = start(self.known, self._blocks[0])
+        mirrored = x.copy()
+        mirrored[parity.OMEGA] = -x[parity.OMEGA]
+        return [self.run(parity.NONE, first=first) for first in ((x, P), (mirrored, P))]
+
+    def of_axes(self) -> list[Tried]:
+        """Every fault of one axis and of two, from the start and from the onset."""
+        k, tried = self.known, []
+        axes = np.nonzero(k.used)[0].tolist()
+        for since in (-1, self._onset) if self._onset >= 0 else (-1,):
+            for i in axes:
+                kinds = [parity.OFFSET_OF, parity.IGNORE, parity.MIRROR_ZERO]
+                kinds += [parity.MIRROR_REFERENCE] if k.learned[i] else []
+                tried += [self.run(kind, i, -1, since) for kind in kinds]
+            for a, i in enumerate(axes):
+                for j in axes[a + 1 :]:
+                    tried.append(self.run(parity.SWAP, i, j, since))
+                    if k.learned[i] and k.learned[j]:
+                        tried.append(self.run(parity.SWAP_CHANGES, i, j, since))
+        return tried
+
+
+def explain(history: History, known: Known, late: bool) -> Finding | None:
     """The likeliest explanation of the blocks since the onset (H-8); None when none fits or it is
     too early.
     """
-    found = monitor.history.from_onset()
+    found = history.from_onset()
     if found is None or (len(found[2]) < FEWEST and not late):
         return None
-    x0, P0, blocks, dt = found
-    axes = [i for i in range(monitor.layout.axes) if monitor.used[i]]
-
-    def run(
-        kind: int, i: int = 0, j: int = -1, since: int = -1, first: tuple[Array, Array] = (x0, P0)
-    ) -> tuple:
-        score, nis, degrees, x, P = parity.replay(
-            *first, blocks, dt, monitor.used, kind, i, j, since, monitor.constants, monitor.tuning
-        )
-        who = () if kind == parity.NONE else (i,) if j < 0 else (i, j)
-        return score, nis / max(degrees, 1), who, kind, since, x, P
-
-    nothing = run(parity.NONE)
-    tried = []
-    unknown = float(monitor.offset.max()) ** 0.5
-    x, P = start(monitor.layout, blocks[0] - monitor.bias, monitor.used, unknown)
-    mirrored = x.copy()
-    mirrored[:3] = -x[:3]
-    tried += [run(parity.NONE, first=(x, P)), run(parity.NONE, first=(mirrored, P))]
-    onset = len(blocks) - monitor.history.since_onset()
-    for since in (-1, onset) if onset >= 0 else (-1,):
-        for i in axes:
-            tried += [
-                run(kind, i, -1, since)
-                for kind in (parity.OFFSET_OF, parity.IGNORE, parity.MIRROR_ZERO)
-            ]
-            if monitor.learned[i]:
-                tried.append(run(parity.MIRROR_REFERENCE, i, -1, since))
-        for a, i in enumerate(axes):
-            for j in axes[a + 1 :]:
-                tried.append(run(parity.SWAP, i, j, since))
-                if monitor.learned[i] and monitor.learned[j]:
-                    tried.append(run(parity.SWAP_CHANGES, i, j, since))
-    tried.sort(key=lambda item: item[0])
+    trial = Trial(known, len(found[2]) - history.since_onset(), found)
+    nothing = trial.run(parity.NONE)
+    tried = sorted([*trial.other_starts(), *trial.of_axes()], key=lambda item: item.score)
     best = tried[0]
-    if not best[1] < FIT or nothing[0] - best[0] < BETTER:
+    if not best.left < FIT or nothing.score - best.score < BETTER:
         return None
-    half = (
-        len(best[2]) == 2 and best[1] > CLEAN
-    )  # a swap that does not explain all: one of its axes may do as well
-    one = [t for t in tried if half and len(t[2]) == 1 and t[2][0] in best[2] and t[1] < ALONE]
+    # a swap that does not explain all: one of its axes may do as well
+    half = len(best.axes) == 2 and best.left > CLEAN
+    one = [
+        t for t in tried if half and len(t.axes) == 1 and t.axes[0] in best.axes and t.left < ALONE
+    ]
     pair, best = (best, one[0]) if one else (None, best)
-    others = [t for t in tried if not set(t[2]) & set(best[2])]
-    kinds = [t for t in tried if t[2] == best[2] and _state(t[3]) != _state(best[3])] + (
-        [pair] if pair else []
-    )
-    sure = late or not others or others[0][0] - best[0] > SURE
-    told_apart = not kinds or kinds[0][0] - best[0] > KIND_SURE
-    sure &= told_apart or monitor.history.since_onset() >= KIND_BLOCKS
-    finding = _finding(monitor, best, sure, run)
+    others = [t for t in tried if not set(t.axes) & set(best.axes)]
+    kinds = [t for t in tried if t.axes == best.axes and _state(t.kind) != _state(best.kind)]
+    kinds += [pair] if pair else []
+    sure = late or not others or others[0].score - best.score > SURE
+    told_apart = not kinds or kinds[0].score - best.score > KIND_SURE
+    sure &= told_apart or history.since_onset() >= KIND_BLOCKS
+    finding = _finding(trial, best, sure)
     if pair:
-        finding = replace(finding, text=f"{finding.text}, or {_swapped(monitor, pair[2])}")
+        finding = replace(finding, text=f"{finding.text}, or {_swapped(known.layout, pair.axes)}")
     return finding
 
 
-def _finding(monitor: "HealthMonitor", best: tuple, sure: bool, run) -> Finding:
-    _, _, who, kind, since, x, P = best
-    offset = float(x[parity.OFFSET]) if kind == parity.OFFSET_OF else 0.0
-    if who:  # go on with the state of those who never used the axes
-        *_, x, P = run(parity.IGNORE, who[0], who[1] if len(who) > 1 else -1, since)
-    swapped = _swapped(monitor, who)
+def _finding(trial: Trial, best: Tried, sure: bool) -> Finding:
+    offset = float(best.x[parity.OFFSET]) if best.kind == parity.OFFSET_OF else 0.0
+    now = best
+    if best.axes:  # go on with the state of those who never used the axes
+        i, j = best.axes if len(best.axes) > 1 else (*best.axes, -1)
+        now = trial.run(parity.IGNORE, i, j, best.since)
+    swapped = _swapped(trial.known.layout, best.axes)
     text = {
         parity.NONE: "",
         parity.OFFSET_OF: f"off by {offset:+.2f} m/s²",
@@ -221,15 +243,15 @@ def _finding(monitor: "HealthMonitor", best: tuple, sure: bool, run) -> Finding:
         parity.MIRROR_REFERENCE: "changes with the wrong sign",
         parity.SWAP: swapped,
         parity.SWAP_CHANGES: swapped,
-    }[kind]
-    return Finding(who, kind, _state(kind), text, offset, sure, x, P)
+    }[best.kind]
+    return Finding(best.axes, best.kind, _state(best.kind), text, offset, sure, now.x, now.P)
 
 
-def _swapped(monitor: "HealthMonitor", who: tuple[int, ...]) -> str:
-    return "swapped: " + " and ".join(monitor.layout.axis_names[i] for i in who)
+def _swapped(layout: Layout, who: tuple[int, ...]) -> str:
+    return "swapped: " + " and ".join(layout.axis_names[i] for i in who)
 
 
-def _state(kind: int) -> AxisState:
+def _state(kind: parity.Kind) -> AxisState:
     if kind in (parity.MIRROR_ZERO, parity.MIRROR_REFERENCE):
         return FLIPPED
     if kind in (parity.SWAP, parity.SWAP_CHANGES):

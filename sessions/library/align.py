@@ -1,151 +1,126 @@
-"""When did another session do the same? Two signals laid over one another by their correlation.
-
-The signals may have different lengths and gaps (NaN). For every shift the correlation coefficient
-is that of the samples which both have, by six FFTs (D. Padfield, Masked object registration in the
-Fourier domain, IEEE Trans. Image Process. 21, 2012, in one dimension; (S-1) of
-docs/equations-sessions.md). A shift that leaves little in common may correlate by chance, so shifts
-are ranked by the test statistic of a correlation, r sqrt(e / (1 - r^2)), with the share e of both
-signals' variation that lies in what they have in common (S-2). The best is refined between samples
-by a parabola (S-3).
-"""
+"""Where a session lies on the time of another: by clock, tachometer or rate."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.ndimage import uniform_filter1d
 
-Array = NDArray[np.float64]
+from sessions.library.correlation import GOOD, Shift, correlate
+from sessions.library.curves import RATE, TACHO, Curves, Line
 
-SHARE = 0.2  # of the shorter signal that must be in common ...
-LEAST_S = 2.0  # ... and s
-GOOD = 0.8  # correlation from which an alignment is believed
-POOR = 0.5  # below it there is none
-RIVAL = 0.9  # another shift with that share of the best one's score makes it ambiguous
-FLAT = 1e-9  # share of a signal's variance below which a window of it is constant
-BEST = 0.98  # better correlations count the same: two runs are never the same to the last percent
+Array = NDArray[np.floating[Any]]
+
+MOST = 4  # sessions
+METHODS = ("auto", "clock", "tacho", "rate", "start")
+
+
+class CompareError(ValueError):
+    """Sessions that cannot be compared as asked; the text says why."""
 
 
 @dataclass(frozen=True)
-class Shift:
-    """Where the second signal lies on the first one's time axis."""
+class Overlaid:
+    """One session of a comparison."""
 
-    offset_s: float  # time of the first = time of the second + offset
-    correlation: float  # of what both have there, -1 to 1
-    overlap_s: float
-    rival_s: float | None = None  # the best other shift, and its correlation
-    rival_correlation: float | None = None
-    rival_share: float = 0.0  # its score relative to the best one's, 0 to 1
+    curves: Curves
+    offset_s: float  # time in the first session = time in this one + offset
+    by: str  # clock (the same board's and gateway's run), tacho, rate, start, or given by a person
+    shift: Shift | None = None  # what the correlation found; None where none was made
+    lead: str = ""  # key of the line that stands for the session
 
     @property
     def quality(self) -> str:
-        """good, ambiguous (another shift does as well), poor, or none."""
-        if self.correlation < POOR:
-            return "none"
-        if self.correlation < GOOD:
-            return "poor"
-        return "ambiguous" if self.rival_share > RIVAL else "good"
+        """exact (one clock), good, ambiguous, poor, none; given for a person's offset."""
+        if self.by in ("clock", "reference"):
+            return "exact"
+        if self.by == "given":
+            return "given"
+        return self.shift.quality if self.shift is not None and self.by != "start" else "none"
 
 
-def correlate(a: Array, b: Array, dt: float) -> Shift | None:
-    """The shift of b (m,) over a (n,), both sampled every dt s from their own zero, NaN where there
-    is nothing.
+def key_of(line: Line | None) -> str:
+    return line.key if line is not None else ""
 
-    None where no shift leaves max(LEAST_S, SHARE of the shorter one) of varying signal in common.
-    """
-    r, n, share, lags = correlations(a, b)
-    least = max(LEAST_S / dt, SHARE * min(np.isfinite(a).sum(), np.isfinite(b).sum()))
-    allowed = (n >= least) & np.isfinite(r)
-    if not allowed.any():
-        return None
-    r = np.where(allowed, r, -1.0)
-    bounded = np.clip(r, 0.0, BEST)
-    score = bounded * np.sqrt(share / (1.0 - bounded**2))
-    best = _top(r, int(score.argmax()))
-    step = _vertex(r, best)
-    rival = _rival(r, score, best, dt)
-    return Shift(
-        offset_s=float((lags[best] + step) * dt),
-        correlation=float(r[best]),
-        overlap_s=float(n[best] * dt),
-        rival_s=None if rival is None else float(lags[rival] * dt),
-        rival_correlation=None if rival is None else float(r[rival]),
-        rival_share=0.0 if rival is None else float(score[rival] / score[best]),
+
+def laid(a: Curves, b: Curves, method: str, given: float | None, estimator: str) -> Overlaid:
+    """Where b lies over a."""
+    lead = key_of(b.lead(estimator))
+    if given is not None:
+        return Overlaid(b, given, "given", None, lead)
+    if method in ("auto", "clock") and (offset := _by_clock(a, b, estimator)) is not None:
+        return Overlaid(b, offset, "clock", None, lead)
+    for kind in (TACHO, RATE):
+        if method not in ("auto", kind):
+            continue
+        shift = _by_correlation(a, b, kind, estimator)
+        if shift is not None and (shift.quality != "none" or method == kind):
+            return Overlaid(b, shift.offset_s, kind, shift, lead)
+    if method in ("auto", "start"):
+        return Overlaid(b, 0.0, "start", None, lead)
+    have = (
+        "they do not share a run of one gateway"
+        if method == "clock"
+        else f"one of them has no {method} that varies"
     )
+    raise CompareError(f"{b.session} cannot be aligned to {a.session} by {method}: {have}")
 
 
-def correlations(a: Array, b: Array) -> tuple[Array, Array, Array, NDArray[np.int64]]:
-    """(r, n, e, lag) at every lag, a[i + lag] over b[i]: correlation, common samples, share of the
-    variation (S-1).
+def _by_clock(a: Curves, b: Curves, estimator: str) -> float | None:
+    """Both recorded one boot of a board through one run of a gateway (or one is the other,
+    estimated again).
     """
-    size = next_fast_len(len(a) + len(b) - 1, real=True)
-
-    def spectra(x: Array) -> tuple[Array, Array, Array, float]:
-        there = np.isfinite(x)
-        level = x[there].mean() if there.any() else 0.0
-        clean = np.where(there, x - level, 0.0)
-        return (
-            rfft(there.astype(float), size),
-            rfft(clean, size),
-            rfft(clean**2, size),
-            float((clean**2).sum()),
-        )
-
-    ones_a, sum_a, square_a, whole_a = spectra(a)
-    ones_b, sum_b, square_b, whole_b = spectra(b)
-    lags = np.arange(-(len(b) - 1), len(a))
-
-    def over(x: Array, y: Array) -> Array:
-        return irfft(x * np.conj(y), size)[
-            lags
-        ]  # a negative lag counts from the end: the transform is periodic
-
-    n = np.round(over(ones_a, ones_b))
-    count = np.maximum(n, 1.0)
-    total_a, total_b = over(sum_a, ones_b), over(ones_a, sum_b)
-    spread_a = over(square_a, ones_b) - total_a**2 / count
-    spread_b = over(ones_a, square_b) - total_b**2 / count
-    common = over(sum_a, sum_b) - total_a * total_b / count
-    varies = (spread_a > FLAT * whole_a) & (spread_b > FLAT * whole_b) & (n >= 3)
-    r, share = np.full(len(lags), np.nan), np.zeros(len(lags))
-    both = np.sqrt(spread_a[varies] * spread_b[varies])
-    r[varies] = np.clip(common[varies] / both, -1.0, 1.0)
-    share[varies] = both / np.sqrt(whole_a * whole_b)
-    return r, n, share, lags
-
-
-def _top(r: Array, k: int) -> int:
-    """The highest correlation of the peak that k belongs to, as far as all of it is above BEST."""
-    if r[k] < BEST:
-        return k
-    low = np.flatnonzero(r < BEST)
-    begin = low[low < k][-1] + 1 if (low < k).any() else 0
-    end = low[low > k][0] if (low > k).any() else len(r)
-    return int(begin + r[begin:end].argmax())
-
-
-def _vertex(r: Array, k: int) -> float:
-    """Where the parabola through r[k-1], r[k], r[k+1] is highest, in steps from k (S-3)."""
-    if not 0 < k < len(r) - 1:
-        return 0.0
-    before, here, after = r[k - 1], r[k], r[k + 1]
-    bend = before - 2.0 * here + after
-    return float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
-
-
-def _rival(r: Array, score: Array, best: int, dt: float) -> int | None:
-    """The best shift outside the peak of the best one, which ends where the correlation has fallen
-    to half.
-    """
-    low = r < 0.5 * r[best]
-    left = np.flatnonzero(low[:best])
-    right = np.flatnonzero(low[best:])
-    begin = left[-1] if len(left) else 0
-    end = best + right[0] if len(right) else len(r) - 1
-    outside = np.ones(len(r), dtype=bool)
-    outside[
-        min(begin, best - int(1.0 / dt)) if begin else 0 : max(end, best + int(1.0 / dt)) + 1
-    ] = False
-    if not (outside & (score > 0.0)).any():
+    offset = (b.start_utc_ns - a.start_utc_ns) / 1e9
+    if not set(a.clocks) & set(b.clocks) or not -b.seconds < offset < a.seconds:
         return None
-    return _top(np.where(outside, r, -1.0), int(np.where(outside, score, -1.0).argmax()))
+    dt = max(a.bin_s, b.bin_s)
+    first, second = signal(a, RATE, estimator, dt), signal(b, RATE, estimator, dt)
+    if first is None or second is None:
+        return offset
+    here = resampled(second, dt, offset, len(first), dt)
+    both = np.isfinite(first) & np.isfinite(here)
+    if both.sum() < 3 or min(first[both].std(), here[both].std()) == 0.0:
+        return offset
+    # logs imported without a date share the run number 1, so the number alone proves nothing
+    return offset if np.corrcoef(first[both], here[both])[0, 1] >= GOOD else None
+
+
+def _by_correlation(a: Curves, b: Curves, kind: str, estimator: str) -> Shift | None:
+    dt = max(a.bin_s, b.bin_s)
+    first, second = signal(a, kind, estimator, dt), signal(b, kind, estimator, dt)
+    if first is None or second is None:
+        return None
+    if kind == TACHO and (np.nanmin(first) >= 0.0) != (np.nanmin(second) >= 0.0):
+        first, second = np.abs(first), np.abs(second)  # one of them does not know the direction
+    return correlate(first, second, dt)
+
+
+def signal(curves: Curves, kind: str, estimator: str, dt: float) -> Array | None:
+    """What a session is aligned by, every dt s (n,): the tachometer's rate, or |omega|, rad/s; None
+    without it.
+    """
+    if kind == TACHO:
+        line = next(iter(curves.of_kind(TACHO)), None)
+        values = None if line is None else line.mean[:, 0].astype(float)
+    else:
+        line = curves.lead(estimator)
+        values = None if line is None else np.linalg.norm(line.mean[:, :3].astype(float), axis=1)
+    if values is None or not np.isfinite(values).any():
+        return None
+    n = max(1, round(len(values) * curves.bin_s / dt))
+    return resampled(values, curves.bin_s, 0.0, n, dt)
+
+
+def resampled(values: Array, bin_s: float, offset_s: float, n: int, dt: float) -> Array:
+    """Bin means every bin_s s, moved by offset_s, as n means every dt >= bin_s s; NaN outside and
+    in gaps.
+    """
+    width = round(dt / bin_s)
+    smooth = (
+        uniform_filter1d(values, width, mode="nearest")
+        if width > 1 and not np.isnan(values).any()
+        else values
+    )
+    t = (np.arange(len(values)) + 0.5) * bin_s + offset_s
+    return np.interp((np.arange(n) + 0.5) * dt, t, smooth, left=np.nan, right=np.nan)

@@ -2,15 +2,21 @@
 alone.
 """
 
+import pickle
+
 import numpy as np
 import pytest
 from scipy.linalg import null_space
+from support import parity_twin as twin
 
 from estimator.devices.rate import RateBoard
 from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
+from inertial import core
+from inertial.core import native
+from inertial.layouts.catalogue import find
 from inertial.layouts.layout import CUBE, LAYOUTS, products
-from inertial.rate import parity
+from inertial.rate import axis_samples, parity
 from inertial.rate.estimators import VARIANTS
 from inertial.rate.health import AxisState, HealthMonitor
 from inertial.simulation.faults import FaultError, Faults, parse
@@ -52,10 +58,21 @@ def named(changes):
 # --- the filter
 
 
+def constants(layout, draw=None):
+    """Of a layout; with `draw` everything that may be known of its axes is something."""
+    n = layout.axes
+    numbers = np.zeros((4, n)) if draw is None else np.abs(draw.normal(size=(4, n))) * 0.1
+    return parity.Constants(layout.J.copy(), layout.Q.copy(), *numbers)
+
+
 def test_the_model_is_the_acceleration_field():
     cube, draw = CUBE(0.05), np.random.default_rng(2)
     x = np.concatenate([draw.normal(size=9) * 3.0, [0.7]])
-    reading, H, spread = parity._observe(x, np.zeros((10, 10)), cube.J.copy(), cube.Q.copy(), 4)
+
+    def read(x):
+        return native.health.observe(x, np.zeros((10, 10)), constants(cube), 4)
+
+    reading, H, spread = read(x)
     expected = cube.J @ x[3:9] + cube.Q @ products(x[:3])
     expected[4] += 0.7
     np.testing.assert_allclose(reading, expected, atol=1e-12)
@@ -63,11 +80,9 @@ def test_the_model_is_the_acceleration_field():
     for k in range(10):
         step = np.zeros(10)
         step[k] = 1e-6
-        high, low = (
-            parity._observe(x + s, np.zeros((10, 10)), cube.J.copy(), cube.Q.copy(), 4)[0]
-            for s in (step, -step)
+        np.testing.assert_allclose(
+            H[:, k], (read(x + step)[0] - read(x - step)[0]) / 2e-6, atol=1e-6
         )
-        np.testing.assert_allclose(H[:, k], (high - low) / 2e-6, atol=1e-6)
 
 
 def test_prediction_has_its_jacobian():
@@ -78,30 +93,120 @@ def test_prediction_has_its_jacobian():
     for k in range(10):
         step = np.zeros(10)
         step[k] = 1e-6
-        F[:, k] = (
-            parity.predict(x + step, P, dt, 0.0, 0.0)[0]
-            - parity.predict(x - step, P, dt, 0.0, 0.0)[0]
-        ) / 2e-6
-    walked = parity.predict(x, P, dt, 0.0, 0.0)[1]
-    exact = F @ P @ F.T
-    assert np.linalg.norm(walked - exact) < 0.02 * np.linalg.norm(
-        exact
-    )  # to first order in the turn of one block
+        high, low = (native.health.predict(x + s, P, dt, 0.0, 0.0)[0] for s in (step, -step))
+        F[:, k] = (high - low) / 2e-6
+    walked = native.health.predict(x, P, dt, 0.0, 0.0)[1]
+    exact = F @ P @ F.T  # to first order in the turn of one block
+    assert np.linalg.norm(walked - exact) < 0.02 * np.linalg.norm(exact)
+
+
+def believe(draw):
+    """A state and a covariance that a filter may have."""
+    x, A = draw.normal(size=10) * 2.0, draw.normal(size=(10, 10))
+    return x, A @ A.T + np.eye(10)
+
+
+@pytest.mark.parametrize("name", ["cube", "chen-6", "nine", "array-24"])
+def test_the_core_equals_its_twin(name):
+    layout, draw = find(name, 0.05), np.random.default_rng(8)
+    n, c = layout.axes, constants(layout, draw)
+    used, learned = np.ones(n, bool), draw.random(n) > 0.4
+    used[n - 1] = n <= 6
+    tuning = parity.Tuning(200.0, 4.0, 0.012)
+    x, P = believe(draw)
+    for mine, theirs in zip(
+        native.health.observe(x, P, c, 2), twin.observe(x, P, c.J, c.Q, 2), strict=True
+    ):
+        np.testing.assert_allclose(mine, theirs, rtol=1e-10, atol=1e-10)
+    block = draw.normal(size=n) * 5.0
+    args = (x, P, block, 0.04, used, learned, c, tuning)
+    for mine, theirs in zip(parity.step(*args), twin.step(*args), strict=True):
+        np.testing.assert_allclose(mine, theirs, rtol=1e-7, atol=1e-7)
+    blocks, dt = draw.normal(size=(7, n)) * 5.0, np.full(7, 0.04)
+    for kind in parity.Kind:
+        pair = kind in (parity.SWAP, parity.SWAP_CHANGES)
+        about = (kind, 1, 3 if pair else -1, 2)
+        mine = parity.replay(x, P, blocks, dt, used, about, c, tuning)
+        theirs = twin.replay(x, P, blocks, dt, used, *about, c, tuning)
+        for a, b in zip(mine, theirs, strict=True):
+            np.testing.assert_allclose(a, b, rtol=1e-6, atol=1e-6)
+
+
+def test_counters_equal_their_twin():
+    draw, n = np.random.default_rng(3), 12
+    f = np.round(draw.normal(size=(400, n)) * 0.1, 3)
+    f[50, 3], f[90, 3], f[120:180, 5], f[200:230, 7] = 4.0, -4.0, 0.125, 16.0
+    noise, limit = np.full(n, 0.1), np.full(n, 16.0)
+    found = []
+    for gather in (axis_samples.gather, twin.gather):
+        near, marks = np.zeros((3, n)), np.zeros(2, np.int64)
+        count, row, seen = axis_samples.counters(n), 0, []
+        while row < len(f):
+            row = gather(f, row, 4, near, marks, noise, limit, count)
+            marks[axis_samples.FILLED] = 0
+            seen.append((row, near.copy(), marks.copy(), count.copy()))
+            near[axis_samples.SUM] = 0.0
+        found.append(seen)
+    for mine, theirs in zip(*found, strict=True):
+        for a, b in zip(mine, theirs, strict=True):
+            np.testing.assert_array_equal(a, b)
+    assert found[0][-1][3][axis_samples.SPIKES].max() >= 0 and len(found[0]) == 100
+
+
+def test_the_first_state_is_that_of_the_motion():
+    cube = CUBE(0.05)
+    motion = np.array([30.0, -20.0, 10.0, 1.0, 2.0, -9.0])
+    for omega in ([6.0, -3.0, 2.0], [0.0, 0.0, 0.0]):
+        f = cube.J @ motion + cube.Q @ products(np.array(omega))
+        x, P = parity.start(constants(cube), f, np.ones(12, bool), 0.01, True)
+        assert min(np.abs(x[:3] - omega).max(), np.abs(x[:3] + omega).max()) < 1e-6
+        np.testing.assert_allclose(x[3:9], motion, atol=1e-6 if any(omega) else 1e-9)
+        assert P[0, 0] == (pytest.approx(0.01, rel=0.1) if any(omega) else 1.0)
+
+
+def test_both_builds_of_the_monitor_give_the_same_bits():
+    builds = [core._core_plain, getattr(core, "_core_v3", core._core_plain)]
+    layout, draw = CUBE(0.05), np.random.default_rng(8)
+    c, used = constants(layout, draw), np.ones(12, bool)
+    x, P = believe(draw)
+    blocks = draw.normal(size=(7, 12)) * 5.0
+    said = [
+        build.health.replay(
+            x, P, blocks, np.full(7, 0.04), used, (5, 1, 3, 2), c, (200.0, 4.0, 0.012)
+        )
+        for build in builds
+    ]
+    for a, b in zip(*said, strict=True):
+        assert np.asarray(a).tobytes() == np.asarray(b).tobytes()
+
+
+def test_a_monitor_goes_on_after_a_pickle_as_before_it():
+    faults = Faults([parse("a22:biased=1.5@4", NAMES)])
+    table = TableTest(1, profile="wobble")
+    block = faults.into(table.block(0))
+    whole, cut = HealthMonitor(table.layout), HealthMonitor(table.layout)
+    said = []
+    for k in range(0, 1000, 10):
+        cut = pickle.loads(pickle.dumps(cut))
+        part = (block.t_s[k : k + 10], block.readings[k : k + 10])
+        said.append((whole.feed(*part), cut.feed(*part)))
+    assert all(a == b for a, b in said) and whole.mask == 1 << NAMES.index("a22")
+    np.testing.assert_array_equal(whole.newest.residual, cut.newest.residual)
 
 
 def test_a_residual_is_the_reading_minus_what_the_others_say():
     cube, draw = CUBE(0.05), np.random.default_rng(6)
     x, P = np.zeros(10), np.diag([0.1] * 3 + [50.0] * 3 + [9.0] * 3 + [0.0])
-    f, R = draw.normal(size=12), np.full(12, 1e-3)
-    args = (R, cube.J.copy(), cube.Q.copy())
-    _, _, nis, _, residual, sigma = parity.correct(
-        x, P, f, args[0], np.ones(12, bool), args[1], args[2], -1
-    )
+    f, c = draw.normal(size=12), constants(cube)._replace(white=np.full(12, 1e-3))
+    used = np.ones(12, bool)
+    tuning = parity.Tuning(0.0, 0.0, 0.0)
+    _, _, nis, _, residual, sigma = parity.step(x, P, f, 0.0, used, ~used, c, tuning)
     assert nis > 0.0
     without = np.arange(12) != 7
-    _, H, spread = parity._observe(x, P, args[1], args[2], -1)
-    C = H @ P @ H.T + spread + np.diag(R)
-    nu = f - parity._observe(x, P, args[1], args[2], -1)[0]
+    _, P = native.health.predict(x, P, 0.0, 0.0, 0.0)
+    reading, H, spread = native.health.observe(x, P, c, -1)
+    C = H @ P @ H.T + spread + np.diag(c.white)
+    nu = f - reading
     gain = C[7, without] @ np.linalg.inv(C[np.ix_(without, without)])
     assert residual[7] == pytest.approx(nu[7] - gain @ nu[without], rel=1e-6)
     assert sigma[7] ** 2 == pytest.approx(C[7, 7] - gain @ C[without, 7], rel=1e-6)
@@ -225,10 +330,10 @@ class Told:
     """An estimator that remembers what it was told."""
 
     def __init__(self, layout) -> None:
-        self.masks = []
+        self.masks, self._real = [], VARIANTS["least-squares"](layout)
 
-    def feed(self, t_s, f_axis, wanted):
-        return [None] * len(wanted)
+    def feed(self, t_s, f_axis):
+        return self._real.feed(t_s, f_axis)
 
     def skip(self, n) -> None: ...
 

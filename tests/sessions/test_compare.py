@@ -12,9 +12,9 @@ from support.table_session import SESSION, table_recording, table_root
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import NAV, NOTE, RATE, TACHO, parse
 from sessions.library import curves as kept
-from sessions.library.align import correlate
 from sessions.library.compare import CompareError, as_dict, compare, errors
 from sessions.library.compare_figure import draw
+from sessions.library.correlation import correlate
 from sessions.library.curves_build import build, ensure, main
 from sessions.library.overlay import drawing
 from sessions.library.scan import extent, scan

@@ -1,0 +1,94 @@
+"""`gyrofree router`, `gateway`, `estimator`, `record` and `dashboard`: one service each."""
+
+import logging
+import threading
+
+from gyrofree.commands.options import (
+    Config,
+    Verbose,
+    settings_of,
+)
+from gyrofree.config import ConfigError
+from gyrofree.running.process import command, run_service
+
+log = logging.getLogger(__name__)
+
+
+def router(config: Config = None, verbose: Verbose = False) -> None:
+    """Route the bus: the Zenoh session that all others connect to."""
+    settings = settings_of(config)
+
+    def body(stop: threading.Event) -> None:
+        from messages.bus.session import open_router
+
+        with open_router(settings.bus):
+            log.info("router listens on %s", ", ".join(settings.bus.listen))
+            stop.wait()
+
+    run_service(body, verbose)
+
+
+def gateway(config: Config = None, verbose: Verbose = False) -> None:
+    """Read the boards of [[gateway.devices]], journal every byte, publish samples."""
+    settings = settings_of(config)
+
+    from gateway import service
+    from gateway.ports.keeper import Keeper
+    from gyrofree.running.guardian import guard, leave_when_alone
+
+    def body(stop: threading.Event, keeper: Keeper) -> None:
+        leave_when_alone(stop)
+        service.run(settings.gateway, settings.bus, stop, keeper)
+
+    guard(lambda keeper: run_service(lambda stop: body(stop, keeper), verbose))
+
+
+def estimator(config: Config = None, verbose: Verbose = False) -> None:
+    """Turn the samples on the bus into rate, attitude and navigation, several estimators side by
+    side.
+    """
+    settings = settings_of(config)
+
+    def body(stop: threading.Event) -> None:
+        from estimator import service
+        from estimator.choice import UnknownEstimator
+
+        try:
+            service.run(settings.estimator, settings.bus, stop)
+        except UnknownEstimator as error:
+            raise ConfigError(str(error)) from None
+
+    run_service(body, verbose)
+
+
+def record(config: Config = None, verbose: Verbose = False) -> None:
+    """Write everything on the bus to MCAP files, when told to from the dashboard or from the
+    start.
+    """
+    settings = settings_of(config)
+
+    def body(stop: threading.Event) -> None:
+        from sessions.recording import recorder
+
+        recorder.run(settings.recorder, settings.bus, stop, settings.model_dump(mode="json"))
+
+    run_service(body, verbose)
+
+
+def dashboard(config: Config = None, verbose: Verbose = False) -> None:
+    """Serve the web page with scene, charts, recordings and sign-in."""
+    settings = settings_of(config)
+
+    def body(stop: threading.Event) -> None:
+        from dashboard import service
+        from dashboard.web.control import ProcessReplay
+        from dashboard.web.jobs import Jobs
+
+        options = ["--config", str(config)] if config else []
+        replayer = command("replay", "--stay", *options)
+        jobs = Jobs(command(), options)
+        service.run(
+            settings.dashboard, settings.bus, stop, replay=ProcessReplay(replayer), jobs=jobs
+        )
+
+    run_service(body, verbose)

@@ -1,0 +1,93 @@
+"""`gyrofree simulate`: a simulated board, or a run of it as a log."""
+
+import threading
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gyrofree.commands.options import (
+    Config,
+    Fault,
+    Verbose,
+    faults_of,
+    settings_of,
+)
+from gyrofree.running.process import EXIT_CONFIG as CONFIG
+from gyrofree.running.process import fail, run_service
+
+
+def simulate(
+    link: Annotated[
+        Path | None, typer.Option(help="Make the pseudo-terminal reachable under this path.")
+    ] = None,
+    tcp: Annotated[
+        int | None, typer.Option(help="Listen on this TCP port of the loopback instead of a pty.")
+    ] = None,
+    profile: Annotated[
+        str, typer.Option(help="Motion of the table: published (or cw-ccw), wobble, fast, still.")
+    ] = "published",
+    seed: Annotated[int, typer.Option(help="Seed of biases, scale errors and noise.")] = 1,
+    device: Annotated[
+        str, typer.Option(help="Device name under which the truth is published.")
+    ] = "cube",
+    once: Annotated[bool, typer.Option(help="End after one run of the profile.")] = False,
+    arm: Annotated[
+        float | None,
+        typer.Option(
+            min=0.5,
+            max=20.0,
+            help=(
+                "The cube rides at the end of an arm of this length, m, with a receiver; instead of"
+                " --profile."
+            ),
+        ),
+    ] = None,
+    tilt: Annotated[
+        bool,
+        typer.Option(
+            "--tilt",
+            help="Be an analogue tilt board in a hand instead; it follows a guided detection.",
+        ),
+    ] = False,
+    fault: Fault = None,
+    csv: Annotated[
+        Path | None,
+        typer.Option(
+            help="Be no board: write one run with its truth to this CSV, for `gyrofree run`."
+        ),
+    ] = None,
+    layout: Annotated[
+        str, typer.Option(help="With --csv: name of a layout, or its TOML file.")
+    ] = "cube",
+    half_side: Annotated[float, typer.Option(help="With --csv: centre to face, m.")] = 0.05,
+    config: Config = None,
+    verbose: Verbose = False,
+) -> None:
+    """Be a cube on a rotating table: a board on a pseudo-terminal that speaks the real wire.
+
+    Attach a gateway to the printed port. The true motion goes to the bus as its own topic, marked
+    simulated.
+    """
+    settings = settings_of(config)
+    from inertial.simulation.profiles import named
+
+    faults = faults_of(fault)
+    try:
+        profile_name = named(profile).name
+        if csv is not None:
+            from gyrofree.running import simulate_csv
+
+            print(f"{csv}: {simulate_csv.write(csv, profile, seed, layout, half_side)} samples")
+            return
+    except (ValueError, OSError) as error:
+        raise fail(str(error), CONFIG) from None
+
+    def body(stop: threading.Event) -> None:
+        from gyrofree.running import simulate as simulator
+        from gyrofree.running import simulate_hand
+
+        options = simulator.Options(link, tcp, profile_name, seed, device, once, faults, arm or 0.0)
+        (simulate_hand if tilt else simulator).run(options, settings.bus, stop)
+
+    run_service(body, verbose)
