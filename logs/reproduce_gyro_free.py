@@ -24,6 +24,7 @@ from inertial.attitude.rotation import to_dcm
 from inertial.layouts.catalogue import find
 from inertial.layouts.layout import Layout
 from inertial.simulation.table import BLOCK, GRAVITY, TableTest
+from inertial.timing import sample_timing
 from logs import reproduce_gyro_free_pages as pages
 from logs.cube import Reference, Track, reference, run_log
 from logs.cube_log import CubeLog, read_log
@@ -97,7 +98,7 @@ def simulated(seed: int, progress: Progress = lambda done, what: None) -> Sessio
         counts=counts,
         lsb_mps2=test.sensor.count,
         index=np.arange(n),
-        period_s=test.period_s,
+        timing=sample_timing(t),
         gaps=(),
         tacho=pulse_rate(test, t),
         omega_b=np.vstack([block.omega_b for block in cut])[:n],

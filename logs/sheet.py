@@ -95,9 +95,9 @@ class Sheet:
             separated = (
                 f"; the line has one column only: separate columns by {_or(SEPARATORS.values())}"
             )
+        share = f" ({len(missing)} of {len(names)} are)" if 1 < len(missing) < len(names) else ""
         raise LogError(
-            f"{self.path}:{self.header_line}: column {missing[0]!r} is missing"
-            f"{f' ({len(missing)} of {len(names)} are)' if 1 < len(missing) < len(names) else ''}, found"
+            f"{self.path}:{self.header_line}: column {missing[0]!r} is missing{share}, found"
             f" {found}{separated}; want {purpose or ', '.join(names)}"
         )
 

@@ -17,6 +17,7 @@ from gyrofree.commands.options import (
     AsJson,
     Config,
     SessionOrFile,
+    UnitsAsNamed,
     catalogue_of,
     file_of,
     settings_of,

@@ -9,7 +9,6 @@ from itertools import accumulate
 from pathlib import Path
 
 import pytest
-from gateway.virtual.player import LOG_EPOCH_S
 
 from firmware_protocol.codec import FLAG_SIMULATED, Deframer, Frame, encode
 from firmware_protocol.frames import Acc12
@@ -25,6 +24,7 @@ from gateway.virtual.virtual_board import (
     BoardPulse,
     VirtualBoard,
 )
+from gyrofree.running.log_items import LOG_EPOCH_S
 from messages.bus.session import BusSettings, open_client, open_router, subscribe
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ACCEL, BOARD, GNSS, LINK, LOCATION, TACHO, history_key
