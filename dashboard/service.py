@@ -145,7 +145,7 @@ def run(
                 desk=desk,
                 replay=replay,
                 jobs=jobs,
-                open_widgets=handle.viewer_uuids,
+                open_labels=scene.OWN_INPUTS,
             )
             log.info("dashboard at %s", settings.url)
             try:

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.constants import GRAVITY
+
 Array = NDArray[np.float64]
 
-STANDARD_G = 9.80665  # m/s^2
 WINDOW = 25  # samples of a quiet window
 QUIETEST = 0.05  # share of the windows that stand for rest: the quietest ones
 FAR = 0.12  # relative error of one g that no bias explains
@@ -76,7 +77,7 @@ def doubt_of_gravity(f_b: Array, lsb_mg: float | None = None) -> Doubt | None:
     lsb_mg is what a count was taken for, where the log has counts.
     """
     size = float(np.median(np.linalg.norm(quiet_mean(f_b), axis=1)))
-    ratio = size / STANDARD_G
+    ratio = size / GRAVITY
     if abs(ratio - 1.0) <= FAR:
         return None
     found = f"at its quietest the body reads {size:.3g} m/s^2, {ratio:.3g} g; want 1 g"
@@ -88,11 +89,11 @@ def doubt_of_gravity(f_b: Array, lsb_mg: float | None = None) -> Doubt | None:
         return Doubt(
             "gravity", f"{found}: {fits:.3g} mg per count would fit{named}; say --lsb-mg {fits:.3g}"
         )
-    if abs(ratio * STANDARD_G - 1.0) <= FAR:
+    if abs(ratio * GRAVITY - 1.0) <= FAR:
         return Doubt("gravity", f"{found}: these are g, not m/s^2; name the columns _g")
-    if abs(ratio / STANDARD_G - 1.0) <= FAR:
+    if abs(ratio / GRAVITY - 1.0) <= FAR:
         return Doubt("gravity", f"{found}: m/s^2 was taken for g; name the columns _mps2")
-    if abs(ratio * 1e-3 - 1.0) <= FAR or abs(ratio * 1e-3 * STANDARD_G - 1.0) <= FAR:
+    if abs(ratio * 1e-3 - 1.0) <= FAR or abs(ratio * 1e-3 * GRAVITY - 1.0) <= FAR:
         return Doubt("gravity", f"{found}: these look like mg; name the columns _mg")
     return Doubt("gravity", f"{found}: check the unit and the scale of the axes")
 

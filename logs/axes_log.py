@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.attitude.axis_map import IMU, SI, AxisMap, Figures
-from inertial.attitude.wiring import FORCE_REST, RATE_REST, VOLT_REST, Board, Turn, WiringSession
+from inertial.attitude.wiring import (
+    FORCE_REST,
+    RATE_REST,
+    VOLT_REST,
+    BoardColumns,
+    GuidedWiring,
+    Turn,
+)
+from inertial.constants import GRAVITY
 from logs.attitude_log import SAMPLES
 from logs.quantities import timing_of
 from logs.sheet import LogError, open_sheet
@@ -19,7 +27,7 @@ Array = NDArray[np.float64]
 
 INPUT = re.compile(r"in(\d+)_(counts|v)")
 ACC_GYRO = Figures(
-    1.65, 0.4785 / 9.80665, 1.23, float(np.degrees(0.002))
+    1.65, 0.4785 / GRAVITY, 1.23, float(np.degrees(0.002))
 )  # LIS331AL and LPR550AL: data sheets
 VOLT_PER_COUNT = 3.3 / 4095
 WANTED = (
@@ -45,7 +53,7 @@ def detect(log: Path, figures: Figures = ACC_GYRO, volt_per_count: float = VOLT_
     """
     t, columns, values = _read(log)
     period = float(np.median(np.diff(t)))
-    session = WiringSession(_board(columns, figures, volt_per_count))
+    session = GuidedWiring(_board(columns, figures, volt_per_count))
     scale = np.array([volt_per_count if name.endswith("_counts") else 1.0 for name in columns])
     said: list[tuple[float, str]] = []
     for k in range(len(t)):
@@ -74,9 +82,9 @@ def _read(log: Path) -> tuple[Array, tuple[str, ...], Array]:
     return table["t"], columns, np.column_stack([table[name] for name in columns])
 
 
-def _board(columns: tuple[str, ...], figures: Figures, volt_per_count: float) -> Board:
+def _board(columns: tuple[str, ...], figures: Figures, volt_per_count: float) -> BoardColumns:
     if columns == SAMPLES[1:]:
-        return Board(
+        return BoardColumns(
             "imu",
             IMU,
             np.array([0.01] * 3 + [0.001] * 3),
@@ -84,6 +92,6 @@ def _board(columns: tuple[str, ...], figures: Figures, volt_per_count: float) ->
             SI,
         )
     names = tuple(f"input {INPUT.fullmatch(name)[1]}" for name in columns)
-    return Board(
+    return BoardColumns(
         "adc", names, np.full(len(names), volt_per_count), np.full(len(names), VOLT_REST), figures
     )

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.settings import EstimatorSettings
-from inertial.attitude.rotation import from_rotation_vector, level, multiply
 from inertial.calibration.card import Card, read_card
+from inertial.constants import GRAVITY
 from inertial.layouts.catalogue import find
 from inertial.layouts.layout import GeometryError, Layout
 from inertial.plausible import doubt_of_gravity
@@ -24,9 +24,10 @@ from inertial.rate.bound import IN_USE, rate_bound
 from inertial.rate.estimators import ESTIMATORS, ProductsRate
 from inertial.rate.sight import ALL_BLIND
 from inertial.rate.tachometer import SUFFIX
+from inertial.rotation import followed, level
 from logs.cube_axes import examine
 from logs.cube_log import CubeLog, read_log
-from logs.quantities import STANDARD_G, refuse, said_of
+from logs.quantities import refuse, said_of
 from logs.sheet import LogError
 
 Array = NDArray[np.float64]
@@ -160,7 +161,7 @@ def _centre_force(data: CubeLog, shape: Layout) -> Array:
 
 def _lsb(data: CubeLog) -> float | None:
     """mg that a count was taken for; None for a log in m/s^2."""
-    return data.lsb_mps2 / STANDARD_G * 1e3 if data.lsb_mps2 else None
+    return data.lsb_mps2 / GRAVITY * 1e3 if data.lsb_mps2 else None
 
 
 def run_log(
@@ -369,20 +370,17 @@ def _turned(data: CubeLog, shape: Layout, omega_b: Array) -> Array:
     turned.
     """
     n = max(1, round(0.1 / data.period_s))
-    q = np.empty((len(omega_b), 4))
-    q[0] = level(np.linalg.pinv(shape.theta_b) @ data.f_axis[:n].mean(axis=0))
-    for k in range(1, len(q)):
-        mean = 0.5 * (omega_b[k - 1] + omega_b[k])
-        q[k] = multiply(q[k - 1], from_rotation_vector((data.t_s[k] - data.t_s[k - 1]) * mean))
-    return q
+    first = level(np.linalg.pinv(shape.theta_b) @ data.f_axis[:n].mean(axis=0))
+    dt = np.diff(data.t_s[: len(omega_b)])
+    return followed(first, dt[:, None] * (0.5 * (omega_b[:-1] + omega_b[1:])))
 
 
 def _notes(data: CubeLog, truth: Reference, card: Card | None) -> list[str]:
     found = [
         (
-            f"calibration card {card.id}"
+            f"calibration file {card.id}"
             if card
-            else "no calibration card: nominal scale, positions and directions"
+            else "no calibration file: nominal scale, positions and directions"
         )
     ]
     if truth.name == "tachometer":

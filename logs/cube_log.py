@@ -20,8 +20,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.constants import GRAVITY
 from inertial.timing import Timing
-from logs.quantities import STANDARD_G, UNITS, column_of, timing_of
+from logs.quantities import UNITS, column_of, timing_of
 from logs.sheet import LogError, Sheet, Table, open_sheet
 
 Array = NDArray[np.float64]
@@ -88,7 +89,7 @@ def read_log(path: Path, names: Sequence[str], lsb_mg: float | None = None) -> C
     table.columns["t"] = table[t_name] * t_unit
     timing = timing_of(sheet, table)
     values = np.column_stack([table[name] for name in axes])
-    lsb = (LSB_MG if lsb_mg is None else lsb_mg) * 1e-3 * STANDARD_G if unit == "counts" else 0.0
+    lsb = (LSB_MG if lsb_mg is None else lsb_mg) * 1e-3 * GRAVITY if unit == "counts" else 0.0
     if unit == "counts" and not lsb > 0.0:
         raise LogError(f"{path}: {lsb_mg} mg per count, want more than 0")
     return CubeLog(

@@ -15,14 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.attitude.rotation import to_dcm
+from inertial.earth import ned_between
 from inertial.navigation.batch import FilterRun, run_filters
-from inertial.navigation.earth import ned_between
 from inertial.navigation.filters import DEFAULT, FILTERS, UnknownFilter
 from inertial.navigation.fix import RTK_FIXED, Fix
 from inertial.navigation.navigation import NavigatorConfig
 from inertial.navigation.smoother import SMOOTHERS, SmoothRun, smooth_drive
-from inertial.navigation.strapdown import rotation_vector
+from inertial.rotation import rotation_vector, to_matrix
 from logs.drive_log import DriveLog, DriveTruth, read_drive_log
 from logs.quantities import said_of
 
@@ -265,12 +264,8 @@ def against_truth(result: Result, truth: DriveTruth) -> dict[str, Any]:
     out: dict[str, Any] = {}
     parts, places = [], []
     if truth.q_nb is not None:
-        psi = np.array(
-            [
-                rotation_vector(to_dcm(truth.q_nb[k]) @ row[6:15].reshape(3, 3).T)
-                for k, row in zip(near, x, strict=True)
-            ]
-        ).reshape(-1, 3)
+        C_bn = x[:, 6:15].reshape(-1, 3, 3).transpose(0, 2, 1)
+        psi = rotation_vector(to_matrix(truth.q_nb[near]) @ C_bn)
         out["tilt_rms_rad"], out["heading_rms_rad"] = _rms(psi[:, :2]), _rms(psi[:, 2:])
         parts, places = [psi], [0, 1, 2]
     if truth.v_n is not None:
@@ -282,9 +277,7 @@ def against_truth(result: Result, truth: DriveTruth) -> dict[str, Any]:
         parts, places = [*parts, x[:, 3:6] - v], [*places, 3, 4, 5]
     if truth.position is not None:
         p = np.column_stack([np.interp(t, truth.t, column) for column in truth.position.T])
-        d = np.array([ned_between(*a, *b[:3]) for a, b in zip(p, x, strict=True)]).reshape(
-            -1, 3
-        ) * (1.0, 1.0, -1.0)
+        d = np.column_stack(ned_between(p.T, x[:, :3].T)) * (1.0, 1.0, -1.0)
         out["position_h_rms_m"], out["position_v_rms_m"] = _rms(d[:, :2]), _rms(d[:, 2:])
         parts, places = [*parts, d], [*places, 6, 7, 8]
     if len(places) == 9 and len(t):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib
 import numpy as np
 
-from inertial.navigation.earth import ned_between
+from inertial.earth import ned_between
 from inertial.navigation.filters import DEFAULT
 
 if TYPE_CHECKING:
@@ -57,10 +57,10 @@ def draw(
 def _way(ax: Any, log: "DriveLog", lead: "Result") -> None:
     first = log.fixes[0]
     origin = first.latitude, first.longitude, first.height
-    fixes = np.array([ned_between(*origin, f.latitude, f.longitude, f.height) for f in log.fixes])
-    way = np.array([ned_between(*origin, *row[:3]) for row in lead.x])
-    ax.plot(fixes[:, 1], fixes[:, 0], ".", ms=2, color="#E69F00", label="fixes")
-    ax.plot(way[:, 1], way[:, 0], lw=1.2, color=COLOURS[0], label="solution")
+    places = np.array([(f.latitude, f.longitude, f.height) for f in log.fixes])
+    fixes, way = ned_between(origin, places.T), ned_between(origin, lead.x[:, :3].T)
+    ax.plot(fixes[1], fixes[0], ".", ms=2, color="#E69F00", label="fixes")
+    ax.plot(way[1], way[0], lw=1.2, color=COLOURS[0], label="solution")
     ax.set_aspect("equal", adjustable="datalim")
     ax.set(xlabel="east, m", ylabel="north, m", title="the way")
     ax.legend()

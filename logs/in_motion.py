@@ -14,15 +14,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.constants import GRAVITY
+from inertial.earth import radii
 from inertial.navigation import estimate as est
 from inertial.navigation.alignment import Alignment, AlignmentSettings, Start
 from inertial.navigation.error_model import ImuNoise
 from inertial.navigation.filters import FILTERS, Constraints, FilterConfig
 from inertial.navigation.fix import Fix, FixSettings, fix_row
 from inertial.navigation.navigation import NavigatorConfig, first_leg
-from inertial.navigation.strapdown import euler_to_dcm, rotation_vector
+from inertial.rotation import euler_matrix, rotation_vector
 from inertial.simulation.drive import Tuning
-from inertial.simulation.drive_path import radii
 
 Array = NDArray[np.float64]
 
@@ -126,7 +127,7 @@ def align(inputs: Inputs) -> Begin:
             alignment.fix(fix.t, fix.v_n, fix.sigma_v)
             start = alignment.start(alignment.C, fix.v_n)
             if start is not None:
-                still = float(np.linalg.norm(alignment.mean_f)) if alignment.levelled else 9.80665
+                still = float(np.linalg.norm(alignment.mean_f)) if alignment.levelled else GRAVITY
                 return Begin(start, k, i + 1, still)
             k += 1
     raise ValueError(f"this drive never became fit for navigation: {alignment.text}")
@@ -165,7 +166,7 @@ def run_with_memory(
         sigma_yaw=tuning.sigma_yaw,
     )
     start = replace(
-        begin.start, C_nb=euler_to_dcm(0.0, 0.0, tuning.heading_error) @ begin.start.C_nb
+        begin.start, C_nb=euler_matrix(0.0, 0.0, tuning.heading_error) @ begin.start.C_nb
     )
     fix = inputs.fixes[begin.fix]
     model = chosen.model(config.imu)

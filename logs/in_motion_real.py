@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.earth import radii
 from inertial.navigation import estimate as est
 from inertial.navigation.fix import AUTONOMOUS, RTK_FIXED, Fix, FixSettings, fix_row
 from inertial.navigation.navigation import NavigatorConfig, first_leg
@@ -23,7 +24,6 @@ from inertial.simulation.drive import (
     Tuning,
     fix_errors,
 )
-from inertial.simulation.drive_path import radii
 from logs import in_motion
 from logs.in_motion import Errors, Inputs
 from logs.score import read_drive

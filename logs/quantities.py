@@ -10,21 +10,21 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.constants import GRAVITY
 from inertial.plausible import Doubt, doubt_of_time
 from inertial.timing import Timing, TimingError, sample_timing
 from logs.sheet import LogError, Sheet, Table
 
 Array = NDArray[np.float64]
 
-STANDARD_G = 9.80665  # m/s^2
 UNITS = {
     "s": 1.0,
     "ms": 1e-3,
     "us": 1e-6,
     "ns": 1e-9,
     "mps2": 1.0,
-    "g": STANDARD_G,
-    "mg": STANDARD_G * 1e-3,
+    "g": GRAVITY,
+    "mg": GRAVITY * 1e-3,
     "radps": 1.0,
     "degps": math.pi / 180.0,
     "dps": math.pi / 180.0,

@@ -20,10 +20,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.attitude.rotation import to_dcm
+from inertial.constants import GRAVITY, MILLI_G
 from inertial.layouts.catalogue import find
 from inertial.layouts.layout import Layout
-from inertial.simulation.table import BLOCK, GRAVITY, TableTest
+from inertial.rotation import to_matrix
+from inertial.simulation.table import BLOCK, TableTest
 from inertial.timing import sample_timing
 from logs import reproduce_gyro_free_pages as pages
 from logs.cube import Reference, Track, reference, run_log
@@ -32,7 +33,6 @@ from logs.cube_log import CubeLog, read_log
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
-MG = 1e3 / GRAVITY  # mg per m/s^2
 DEG = 180.0 / np.pi
 PER_HOUR = DEG * 3600.0  # deg/h per rad/s
 PAPER_BIAS_MG = (4.2, 2.5, 5.4)  # Table 1
@@ -216,7 +216,7 @@ def navigation_error(s: Session, name: str) -> tuple[Array, Array]:
     parts = intervals(s.still, s.log.period_s)
     start = parts[0].stop if parts else 0
     end = min(len(s.log.t_s), start + round(SECONDS / s.log.period_s) + 1)
-    C_bn = to_dcm(track.q_nb[start]).T
+    C_bn = to_matrix(track.q_nb[start]).T
     return (
         s.log.t_s[start:end] - s.log.t_s[start],
         (track.p_n[start:end] - track.p_n[start]) @ C_bn.T,
@@ -233,15 +233,15 @@ def evaluate(s: Session) -> dict[str, Any]:
         "reference": s.truth.name or None,
         "table_1_bias_mg": {
             "paper": list(PAPER_BIAS_MG),
-            "ours": (bias * MG).tolist(),
-            "true": None if s.true_bias is None else (s.true_bias * MG).tolist(),
+            "ours": (bias / MILLI_G).tolist(),
+            "true": None if s.true_bias is None else (s.true_bias / MILLI_G).tolist(),
             "told_apart_from_tilt": apart,
         },
         "estimators": {},
         "drift_deg_per_h": {"paper": PAPER_DRIFT},
         "position_27_m": {
             "paper": (
-                closed_form(np.array(PAPER_BIAS_MG) / MG, paper_drift(), np.array([SECONDS]))[
+                closed_form(np.array(PAPER_BIAS_MG) * MILLI_G, paper_drift(), np.array([SECONDS]))[
                     0
                 ].tolist()
             ),

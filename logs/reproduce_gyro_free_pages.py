@@ -12,6 +12,7 @@ matplotlib.use("Agg")  # no screen
 import matplotlib.pyplot as plt
 import numpy as np
 
+from inertial.constants import MILLI_G
 from logs.cube_plot import COLOURS, REFERENCE, STYLE
 
 if TYPE_CHECKING:
@@ -187,7 +188,7 @@ def _position(figure: Any, s: "Session", result: dict[str, Any]) -> str:
         axes.plot(
             t, np.maximum(np.linalg.norm(error, axis=1), 1e-3), color=colour, label=TITLES[name]
         )
-    paper = study.closed_form(np.array(study.PAPER_BIAS_MG) / study.MG, study.paper_drift(), t)
+    paper = study.closed_form(np.array(study.PAPER_BIAS_MG) * MILLI_G, study.paper_drift(), t)
     axes.plot(
         t,
         np.maximum(np.linalg.norm(paper, axis=1), 1e-3),

@@ -5,24 +5,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inertial.navigation.geodetic import ned_between
+from inertial.earth import ned_between
+from inertial.rotation import euler_angles, to_matrix
 
 
 def roll_pitch(q_nb: Sequence[float]) -> tuple[float, float]:
     """Roll and pitch in rad of q_nb (4,), w x y z."""
-    w, x, y, z = q_nb
-    return (
-        math.atan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
-        math.asin(max(-1.0, min(1.0, 2.0 * (w * y - x * z)))),
-    )
+    roll, pitch, _ = euler_angles(to_matrix(q_nb))
+    return float(roll), float(pitch)
 
 
 def yaw_of(q_nb: Sequence[float]) -> float:
     """Heading of q_nb (4,) w x y z, rad; NaN for none."""
-    if len(q_nb) != 4:
-        return math.nan
-    w, x, y, z = q_nb
-    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return float(euler_angles(to_matrix(q_nb))[2]) if len(q_nb) == 4 else math.nan
 
 
 def ned_from_geodetic(

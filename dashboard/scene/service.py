@@ -11,14 +11,15 @@ from collections.abc import Callable
 from typing import Protocol
 
 import viser
-from viser._messages import ShareUrlDisconnect, ShareUrlRequest
 
 from dashboard.data.store import Store
 from dashboard.desk import Desk
 from dashboard.scene.style import LEFT_WIDTH, css
-from dashboard.scene.view import View
+from dashboard.scene.view import OWN_INPUTS, View
 
 log = logging.getLogger(__name__)
+
+__all__ = ["OWN_INPUTS", "SceneError", "SceneHandle", "start"]
 
 POSE_S = 1 / 25  # period of poses
 PANEL_S = 1 / 4  # period of charts and tables
@@ -32,6 +33,16 @@ class SceneSettings(Protocol):
 
 class SceneError(RuntimeError):
     """The scene cannot be served."""
+
+
+class _Server(viser.ViserServer):
+    """Anybody could ask viser for a public tunnel to this server: that door does not exist here."""
+
+    def request_share_url(self, verbose: bool = True) -> None:
+        """Refused."""
+
+    def disconnect_share_url(self) -> None:
+        """There is nothing to end."""
 
 
 class SceneHandle:
@@ -66,14 +77,6 @@ class SceneHandle:
         ]
         for thread in self._threads:
             thread.start()
-
-    def viewer_uuids(self) -> frozenset[str]:
-        """Inputs that anybody may use, because they change only that browser's own view.
-
-        The proxy drops a viewer's message for any other one, such as the record buttons.
-        """
-        with self._lock:
-            return frozenset().union(*(view.own_uuids for view in self._views.values()))
 
     @property
     def clients(self) -> int:
@@ -139,7 +142,7 @@ def start(
     with contextlib.redirect_stdout(
         io.StringIO()
     ):  # viser prints a banner that would stand among our data
-        server = viser.ViserServer(
+        server = _Server(
             host=host, port=settings.viser_port or _free_port(host), label="gyrofree", verbose=False
         )
     if settings.viser_port and server.get_port() != settings.viser_port:
@@ -161,9 +164,6 @@ def _dress(server: viser.ViserServer) -> None:
     server.gui.add_html(css(), order=-1.0)
     server.gui.main_panel.dock_left()
     server.gui.main_panel.set_width(LEFT_WIDTH)
-    # Anybody could ask viser for a public tunnel to this server: that door does not exist here.
-    for message in (ShareUrlRequest, ShareUrlDisconnect):
-        server._websock_server.unregister_handler(message)
 
 
 def _free_port(host: str) -> int:

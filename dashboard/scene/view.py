@@ -11,12 +11,28 @@ from dashboard.data.device import Device
 from dashboard.data.store import Store
 from dashboard.desk import Desk
 from dashboard.scene.panels import PAGES, Devices, Position, Record, Snapshot, Tilt, Timeline
+from dashboard.scene.panels.base import Input
 from dashboard.scene.scene import LAYERS, Choice, SceneView
 
 WINDOWS = {"10 s": 10.0, "30 s": 30.0, "60 s": 60.0, "5 min": 300.0, "10 min": 600.0}
 TRACK_S = 0.2  # trajectories grow five times a second
 # a replay that begins this near to the opening of a page was asked for by the person at it
 ASKED_FOR_S = 60.0
+# Labels of the inputs that change this browser's own view only; anybody may use them, and an order
+# may not have a label that stands here.
+OWN_INPUTS = frozenset(
+    [
+        "Device",
+        "Pause",
+        "Window",
+        "Dark",
+        "Follow vehicle",
+        "Reset camera",
+        "Page",
+        *(f"Show {layer}" for layer in LAYERS),
+        *(label for page in PAGES for label in page.own_inputs),
+    ]
+)
 
 
 class View:
@@ -50,14 +66,10 @@ class View:
             self._timeline = Timeline(client, desk, store, lambda: self._device_name)
 
     @property
-    def own_uuids(self) -> frozenset[str]:
-        """Inputs that change nothing but this browser's own view: all except the recorder's and
-        those of orders.
-        """
-        orders = self._record.uuids.union(
-            self._timeline.uuids, *(page.uuids for page in self._pages)
-        )
-        return frozenset(self._client.gui._gui_input_handle_from_uuid) - orders
+    def orders(self) -> tuple[Input, ...]:
+        """Inputs that do more than change this browser's own view."""
+        pages = (handle for page in self._pages for handle in page.orders)
+        return *self._record.orders, *self._timeline.orders, *pages
 
     # --- ticks
 
@@ -71,7 +83,7 @@ class View:
             now = time.monotonic()
             if now - self._tracks_at > TRACK_S:
                 self._tracks_at = now
-                self.scene.update_tracks(device)
+                self.scene.trails.update(device)
 
     def tick_panels(self) -> None:
         """Summary, recorder and the page that is seen."""

@@ -27,7 +27,7 @@ def create_app(front: Front) -> ASGIApp:
     app.state.front = front
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
     app.include_router(
-        proxy.router(front.settings, front.gate, front.scene_port, front.open_widgets)
+        proxy.router(front.settings, front.gate, front.scene_port, front.open_labels)
     )
     app.include_router(api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(intake_api.routes, responses={401: {"description": "not signed in"}})

@@ -2,8 +2,7 @@
 
 viser 1.1 has no login and no roles: any client can drive any widget and can ask the server to open
 a public tunnel. So it listens on the loopback only and every message of a browser is looked at
-here. A message is one msgpack map with its class name under "type" (viser/infra/_messages.py,
-Message.deserialize); there are no batches towards the server.
+here (scene_messages.py).
 """
 
 import asyncio
@@ -13,7 +12,6 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 from urllib.parse import parse_qsl, urlencode
 
-import msgspec
 import viser
 import websockets
 from fastapi import APIRouter, Request, WebSocket
@@ -22,32 +20,20 @@ from starlette.websockets import WebSocketDisconnect
 
 from dashboard.settings import DashboardSettings
 from dashboard.web.auth import Gate, Role
+from dashboard.web.scene_messages import (
+    DROPPED_QUIETLY,
+    BadMessage,
+    Widgets,
+    may_send,
+    message_type,
+)
 
 log = logging.getLogger(__name__)
 
-VIEWER_MAY = frozenset(
-    {"ViewerCameraMessage", "FileTransferPartAck"}
-)  # the second only counts a download's progress
-OPERATOR_MAY = VIEWER_MAY | {
-    "GuiUpdateMessage",
-    "GuiButtonHoldMessage",
-    "GuiFormSubmitMessage",
-    "GuiFormDirtyMessage",
-    "CommandTriggerMessage",
-    "ScenePointerMessage",
-    "SceneNodeClickMessage",
-    "SceneNodeDragMessage",
-    "TransformControlsUpdateMessage",
-    "TransformControlsDragStartMessage",
-    "TransformControlsDragEndMessage",
-}
-DROPPED_QUIETLY = frozenset({"GetRenderResponseMessage", "LocalStorageGetItemResponseMessage"})
 FOREIGN_PARAMETERS = {
     "websocket",
     "playbackPath",
 }  # they point viser's page at other servers and files
-
-_decode = msgspec.msgpack.Decoder(dict)
 
 # viser's page is one file that unpacks itself: inline script and style, WebAssembly with generated
 # glue code (eval), workers from blobs. What this policy is for: nothing is fetched from and no
@@ -57,45 +43,6 @@ SCENE_CSP = (
     " img-src 'self' data: blob:; font-src data:; worker-src blob:; connect-src data: blob:"
     " ws://{host} wss://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )
-
-
-class BadMessage(ValueError):
-    """Bytes from a browser that are no message of viser's."""
-
-
-def message_type(data: bytes) -> tuple[str, dict]:
-    """Class name and fields of a browser's message; raises BadMessage. Nesting is bounded by
-    msgspec.
-    """
-    try:
-        fields = _decode.decode(data)
-    except (
-        msgspec.DecodeError,
-        msgspec.ValidationError,
-        RecursionError,
-        UnicodeDecodeError,
-    ) as error:
-        raise BadMessage(f"{len(data)} bytes are no msgpack map: {error}") from None
-    name = fields.get("type")
-    if not isinstance(name, str):
-        raise BadMessage("a map without a text under 'type'")
-    return name, fields
-
-
-def may_send(role: Role, name: str, fields: dict, open_widgets: Collection[str] = ()) -> bool:
-    """True when this role may send this message.
-
-    A widget update may only carry "value": viser would set any property of the widget, for all
-    browsers. open_widgets are uuids of widgets that change nothing for others (pause of one's own
-    view); viewers may use those.
-    """
-    if name == "GuiUpdateMessage":
-        updates = fields.get("updates")
-        if not isinstance(updates, dict) or set(updates) != {"value"}:
-            return False
-        uuid = fields.get("uuid")
-        return role >= Role.operator or (isinstance(uuid, str) and uuid in open_widgets)
-    return name in (OPERATOR_MAY if role >= Role.operator else VIEWER_MAY)
 
 
 class Rate:
@@ -123,7 +70,7 @@ def router(
     settings: DashboardSettings,
     gate: Gate,
     scene_port: Callable[[], int],
-    open_widgets: Callable[[], Collection[str]],
+    open_labels: Collection[str],
 ) -> APIRouter:
     """GET /scene/ and the WebSocket /scene/; scene_port gives viser's port on the loopback."""
     routes = APIRouter(include_in_schema=False)
@@ -151,7 +98,7 @@ def router(
         if gate.session_of(socket) is None:
             await socket.close(1008, "sign in first")
             return
-        await Relay(settings, gate, socket, open_widgets).run(scene_port())
+        await Relay(settings, gate, socket, open_labels).run(scene_port())
 
     return routes
 
@@ -168,9 +115,10 @@ class Relay:
         settings: DashboardSettings,
         gate: Gate,
         socket: WebSocket,
-        open_widgets: Callable[[], Collection[str]],
+        open_labels: Collection[str],
     ) -> None:
-        self._settings, self._gate, self._socket, self._open = settings, gate, socket, open_widgets
+        self._settings, self._gate, self._socket = settings, gate, socket
+        self._widgets = Widgets(open_labels)
         self._key = gate.key_of(socket)
         self._rate = Rate(settings.message_rate)
         self._refused: set[str] = set()  # names said already
@@ -230,6 +178,8 @@ class Relay:
 
     async def _to_browser(self, scene: websockets.ClientConnection) -> tuple[int, str]:
         async for message in scene:
+            if isinstance(message, bytes):
+                self._widgets.learn(message)
             try:
                 async with asyncio.timeout(self._settings.stall_s):
                     await self._socket.send_bytes(
@@ -268,7 +218,7 @@ class Relay:
             except BadMessage as error:
                 log.warning("browser of %s: %s", self._who, error)
                 return 1007, "not a message of viser's"
-            if may_send(role, name, fields, self._open()):
+            if may_send(role, name, fields, self._widgets.open):
                 await scene.send(data)
             else:
                 self._note(role, name)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from estimator.devices.navigation import NavBoard, NavOutput
 from estimator.devices.rate import RateOutput
 from estimator.stream import every
+from inertial.constants import GRAVITY
 from inertial.navigation.error_model import PSI, ImuNoise
 from inertial.navigation.navigation import NAVIGATORS, NavigatorConfig
 from inertial.navigation.strapdown import C
@@ -26,7 +27,6 @@ from inertial.navigation.strapdown import C
 Array = NDArray[np.float64]
 
 PREFIX = "gyro-free-"  # before a filter's name: its inertial unit has no gyroscopes
-GRAVITY = 9.80665  # m/s^2
 NOISE = ImuNoise(
     accel=0.1,
     gyro=math.radians(0.6),

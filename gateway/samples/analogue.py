@@ -12,8 +12,7 @@ import math
 from pydantic import BaseModel, ConfigDict, Field
 
 from firmware_protocol.frames import Adc
-
-STANDARD_GRAVITY = 9.80665  # m/s^2
+from inertial.constants import GRAVITY
 
 
 class AnalogueChannel(BaseModel):
@@ -84,7 +83,7 @@ def figures(s: AnalogueSettings) -> tuple[float, float, float, float]:
     """V at 0 g, V per m/s^2, V at rest, V per rad/s."""
     return (
         s.zero_g_v,
-        s.accel_v_per_g / STANDARD_GRAVITY,
+        s.accel_v_per_g / GRAVITY,
         s.zero_rate_v,
         math.degrees(s.gyro_v_per_dps),
     )
@@ -114,10 +113,7 @@ def imu_of(frame: Adc, s: AnalogueSettings) -> tuple[list[float], list[float]]:
 
     f_b, omega_b = [], []
     for row in frame.counts:
-        f_b += [
-            STANDARD_GRAVITY * v
-            for v in (g(row, s.accel_x), -g(row, s.accel_y), -g(row, s.accel_z))
-        ]
+        f_b += [GRAVITY * v for v in (g(row, s.accel_x), -g(row, s.accel_y), -g(row, s.accel_z))]
         omega_b += [math.radians(dps(row, c)) for c in (s.gyro_yz, s.gyro_xz, s.gyro_z)]
     return f_b, omega_b
 

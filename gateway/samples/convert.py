@@ -5,11 +5,11 @@ from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
 from firmware_protocol.codec import FLAG_SIMULATED
 from firmware_protocol.frames import Hello, Imu6, Status, field_names
 from gateway.gnss.fix import Fix
+from inertial.constants import GRAVITY
 from messages.contract import gyrofree_pb2 as pb
 
-STANDARD_GRAVITY = 9.80665  # m/s^2, CGPM 1901
 ADXL345_SCALE = (
-    3.9e-3 * STANDARD_GRAVITY
+    3.9e-3 * GRAVITY
 )  # m/s^2 per count, full resolution, data sheet rev. G; before HELLO has come
 READS_IN_TURN = {0, 3}  # board ids of the LPC1768 cube, real and emulated
 READ_S = 17e-6  # one sensor: five SPI frames of 16 bits at 4.8 MHz, and the chip select
@@ -41,7 +41,7 @@ def axis_scales(hello: Hello | None, sensors: int = 4) -> list[float]:
     """
     if hello is None:
         return [ADXL345_SCALE] * (3 * sensors)
-    scales = [s.scale_ng * 1e-9 * STANDARD_GRAVITY or ADXL345_SCALE for s in hello.sensors]
+    scales = [s.scale_ng * 1e-9 * GRAVITY or ADXL345_SCALE for s in hello.sensors]
     return [scale for scale in scales[:sensors] for _ in range(3)]
 
 

@@ -13,6 +13,7 @@ from rich.table import Table
 
 from gyrofree.commands.options import AsJson, show_table
 from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
+from inertial.constants import GRAVITY
 
 DEG = 180.0 / math.pi
 
@@ -45,7 +46,7 @@ def axes(
     from logs.axes_log import detect
     from logs.sheet import LogError
 
-    figures = Figures(zero_g_v, accel_v_per_g / 9.80665, 0.0, math.degrees(gyro_v_per_dps))
+    figures = Figures(zero_g_v, accel_v_per_g / GRAVITY, 0.0, math.degrees(gyro_v_per_dps))
     try:
         found = detect(log, figures, volt_per_count)
         if found.map is None:

@@ -16,6 +16,7 @@ from gyrofree.commands.axes import axes
 from gyrofree.commands.options import AsJson, show_table
 from gyrofree.commands.run import progress_bar
 from gyrofree.running.process import EXIT_CONFIG, fail
+from inertial.constants import MILLI_G
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -32,7 +33,6 @@ app.command()(axes)
 LayoutName = Annotated[str, typer.Option("--layout", help="Name of a layout, or its TOML file.")]
 HalfSide = Annotated[float, typer.Option(help="Built-in layouts: centre to face, m.")]
 Lsb = Annotated[float | None, typer.Option(help="Logs in counts: mg per count; default 3.9.")]
-MG = 1e3 / 9.80665  # mg per m/s^2
 DEG = 180.0 / np.pi
 
 
@@ -74,7 +74,7 @@ def plan(
         table.add_row(str(number), one["text"], " ".join(f"{v:+.2f}" for v in one["up_b"]))
     show_table(table)
     print(
-        f"each {seconds:g} s still, worst axis then: bias ±{promised['bias_sigma_mps2'] * MG:.2f}"
+        f"each {seconds:g} s still, worst axis then: bias ±{promised['bias_sigma_mps2'] / MILLI_G:.2f}"
         f" mg, scale ±{promised['scale_sigma'] * 100:.3f} %, direction"
         f" ±{promised['misalignment_sigma_rad'] * DEG:.3f}°"
     )
@@ -94,7 +94,7 @@ def fit(
     uid: Annotated[str, typer.Option(help="Unique id of its board, as it says in HELLO.")] = "",
     as_json: AsJson = False,
 ) -> None:
-    """Make a calibration card: one least squares over all poses and table steps, with
+    """Make a calibration file: one least squares over all poses and table steps, with
     uncertainties.
     """
     from inertial.calibration.card import as_dict, write_card
@@ -127,7 +127,7 @@ def fit(
 
 @app.command()
 def show(
-    card: Annotated[Path, typer.Argument(help="A calibration card.")], as_json: AsJson = False
+    card: Annotated[Path, typer.Argument(help="A calibration file.")], as_json: AsJson = False
 ) -> None:
     """Print a card: what is known of every axis, and how well."""
     from inertial.calibration.card import as_dict, read_card
@@ -149,7 +149,7 @@ def _print(card: Any) -> None:
     print(
         f"card {card.id}: {card.device}{' ' + card.uid if card.uid else ''}, layout"
         f" {card.layout_name}, {card.date}\n{card.poses} poses, {card.steps} table runs; residual"
-        f" {card.residual_rms * MG:.2f} mg, chi-square per degree {card.chi2:.2f}"
+        f" {card.residual_rms / MILLI_G:.2f} mg, chi-square per degree {card.chi2:.2f}"
     )
     table = Table("axis", "bias, mg", "scale, %", "off by, °", "position, mm", "residual, mg")
     for i, name in enumerate(card.names):
@@ -160,11 +160,11 @@ def _print(card: Any) -> None:
         )
         table.add_row(
             name,
-            f"{card.bias[i] * MG:+.2f} ±{sigma['bias'][i] * MG:.2f}",
+            f"{card.bias[i] / MILLI_G:+.2f} ±{sigma['bias'][i] / MILLI_G:.2f}",
             f"{(card.scale[i] - 1.0) * 100:+.3f} ±{sigma['scale'][i] * 100:.3f}",
             f"±{sigma['misalignment'][i] * DEG:.3f}",
             place,
-            f"{card.residual[i] * MG:.2f}",
+            f"{card.residual[i] / MILLI_G:.2f}",
         )
     show_table(table)
 
@@ -172,7 +172,7 @@ def _print(card: Any) -> None:
 @app.command("apply")
 def apply_card(
     log: Annotated[Path, typer.Argument(help="CSV log of the same axes.")],
-    card: Annotated[Path, typer.Argument(help="The calibration card.")],
+    card: Annotated[Path, typer.Argument(help="The calibration file.")],
     out: Annotated[
         Path, typer.Option(help="CSV with a.._mps2 columns, biases and scales taken out.")
     ],
@@ -232,7 +232,7 @@ def _write(file: Any, data: Any, values: np.ndarray, card: str) -> None:
         if extra is not None:
             columns.append((",".join(names), np.reshape(extra, (len(values), -1))))
     file.write(
-        f"# corrected by calibration card {card}\n" + ",".join(head for head, _ in columns) + "\n"
+        f"# corrected by calibration file {card}\n" + ",".join(head for head, _ in columns) + "\n"
     )
     writer = csv.writer(file, lineterminator="\n")
     writer.writerows(

@@ -5,6 +5,8 @@ from typing import Any
 
 from rich.table import Table
 
+from inertial.constants import MILLI_G
+
 
 def _products(q: Any) -> int:
     return int((q.singular_products > 1e-4 * max(q.singular_products.max(), 1e-9)).sum())
@@ -75,7 +77,7 @@ def figures_table(found: list[Any]) -> Table:
         ("products seen (rank of 6)", [str(_products(q)) for q in found]),
         (
             "noise of p x y z, mg",
-            [_three_of(q.sigma_least_squares[3:], 1 / 9.80665e-3, 2) for q in found],
+            [_three_of(q.sigma_least_squares[3:], 1 / MILLI_G, 2) for q in found],
         ),
         (
             "noise of w' x y z, rad/s2",

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from inertial.calibration import model
 from inertial.calibration.model import Parameters, Poses, Steps
+from inertial.constants import GRAVITY
 from inertial.layouts.layout import Layout
 
 Array = NDArray[np.float64]
 
-GRAVITY = 9.80665  # m/s^2, standard; the estimators level with it
 SETTLED = 3e-6  # of the prior sigma, a step that no longer matters
 
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from inertial.calibration.fit import CalibrationError, Fit, Prior, fit
 from inertial.calibration.model import Poses
+from inertial.constants import GRAVITY
 from inertial.layouts.layout import Layout
 
 Array = NDArray[np.float64]
@@ -155,6 +156,6 @@ def predicted(
     layout: Layout, up_b: Array, samples: int, noise: float, prior: Prior = Prior()
 ) -> Fit:
     """The fit that such poses would give with perfect axes: its sigmas are what a plan promises."""
-    mean = 9.80665 * up_b @ layout.theta_b.T
+    mean = GRAVITY * up_b @ layout.theta_b.T
     poses = Poses(mean, np.full(len(up_b), samples), np.full(len(up_b), noise))
     return fit(layout, poses, noise=noise, prior=prior)

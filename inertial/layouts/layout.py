@@ -15,6 +15,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.constants import GRAVITY, MILLI_G
+
 Array = NDArray[np.float64]
 
 PRODUCTS = np.triu_indices(3)  # xx xy xz yy yz zz: order of the products everywhere
@@ -52,13 +54,12 @@ class Sensor:
     limit: float  # largest reading
 
 
-MILLI_G = 9.80665e-3  # m/s^2
 SENSORS = {
     # 4 mg noise and 3.9 mg counts; offset and sensitivity as in the published test; 13 bit at +-16
     # g
     "adxl345": Sensor("adxl345", 4.16 * MILLI_G, 20 * MILLI_G, 0.005, 4095 * 3.9 * MILLI_G),
     # measured at rest in accelerometer_array, 62.5 Hz; offset and sensitivity from the data sheet
-    "mpu9150": Sensor("mpu9150", 0.045, 60 * MILLI_G, 0.015, 16.0 * 9.80665),
+    "mpu9150": Sensor("mpu9150", 0.045, 60 * MILLI_G, 0.015, 16.0 * GRAVITY),
 }
 
 

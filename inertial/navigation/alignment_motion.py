@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from inertial.constants import GRAVITY
 from inertial.navigation.strapdown import euler_to_dcm, exp, rotation, rotation_vector
 
 Array = NDArray[np.float64]
@@ -112,7 +113,7 @@ def integrate(t: Array, f: Array, w: Array, start: Array, bias: Array, C: Array,
 class MotionWindow:
     """Keeps samples and fixes of the last seconds and solves them."""
 
-    def __init__(self, settings: MotionSettings, gravity: float = 9.80665) -> None:
+    def __init__(self, settings: MotionSettings, gravity: float = GRAVITY) -> None:
         """gravity in m/s^2, at the place."""
         self.settings = settings
         self._down = np.array([0.0, 0.0, gravity])

@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.constants import MILLI_G
 from inertial.simulation.profiles import Profile
-from inertial.simulation.table import BLOCK, MILLI_G, SensorModel, TableTest
+from inertial.simulation.table import BLOCK, SensorModel, TableTest
 
 Array = NDArray[np.float64]
 

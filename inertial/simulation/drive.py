@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from inertial.earth import radii
 from inertial.navigation.fix import AUTONOMOUS, Fix
-from inertial.simulation.drive_path import RATE, Truth, drive_truth, radii
+from inertial.simulation.drive_path import RATE, Truth, drive_truth
 
 Array = NDArray[np.float64]
 

@@ -18,14 +18,11 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
+from inertial.constants import EARTH_RATE
+from inertial.earth import gravity, radii
+
 Array = NDArray[np.float64]
 
-SEMI_MAJOR, FLATTENING, EARTH_RATE = (
-    6378137.0,
-    1.0 / 298.257223563,
-    7.292115e-5,
-)  # WGS-84: m, -, rad/s
-ECCENTRICITY2 = FLATTENING * (2.0 - FLATTENING)
 PLACE = (np.radians(37.759), np.radians(45.978), 1468.0)  # Azarshahr: rad, rad, m
 RATE = 100  # Hz, of the samples; the motion is made at twice that
 SMOOTH = 0.5  # s, sigma of the window that rounds the corners of speed and curvature
@@ -166,23 +163,6 @@ def position_of(v_n: Array, dt: float) -> tuple[Array, Array, Array]:
     return latitude, longitude0 + cumulative_simpson(turn, dx=dt, initial=0.0), height
 
 
-def radii(latitude: Array) -> tuple[Array, Array]:
-    """Radii of curvature along the meridian and across it, m."""
-    root = np.sqrt(1.0 - ECCENTRICITY2 * np.sin(latitude) ** 2)
-    return SEMI_MAJOR * (1.0 - ECCENTRICITY2) / root**3, SEMI_MAJOR / root
-
-
-def normal_gravity(latitude: Array, height: Array) -> Array:
-    """Gravity of the WGS-84 ellipsoid, m/s^2: Somigliana on it, second order in height above it
-    (E-61).
-    """
-    s2 = np.sin(latitude) ** 2
-    m = 0.00344978650684
-    surface = 9.7803253359 * (1.0 + 0.00193185265241 * s2) / np.sqrt(1.0 - ECCENTRICITY2 * s2)
-    h = height / SEMI_MAJOR
-    return surface * (1.0 - 2.0 * h * (1.0 + FLATTENING + m - 2.0 * FLATTENING * s2) + 3.0 * h**2)
-
-
 def felt(
     t: Array, latitude: Array, longitude: Array, height: Array, v_n: Array, nb: Rotation
 ) -> tuple[Array, Array]:
@@ -192,7 +172,7 @@ def felt(
     spin_e = np.array([0.0, 0.0, EARTH_RATE])
     down_e = en.apply([0.0, 0.0, 1.0])
     a_e = CubicSpline(t, v_e).derivative()(t)
-    f_e = a_e + 2.0 * np.cross(spin_e, v_e) - normal_gravity(latitude, height)[:, None] * down_e
+    f_e = a_e + 2.0 * np.cross(spin_e, v_e) - gravity(latitude, height)[:, None] * down_e
     eb = en * nb
     angle = np.vstack([np.zeros(3), np.cumsum((eb[:-1].inv() * eb[1:]).as_rotvec(), axis=0)])
     turning = CubicSpline(t, angle).derivative()(

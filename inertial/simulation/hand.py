@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from inertial.constants import GRAVITY
+
 Array = NDArray[np.float64]
 
-GRAVITY = 9.80665  # m/s^2
 RATE_HZ = 100.0
 QUARTER = math.pi / 2.0
 POSES = {  # against level, rad, about axes of b

@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.constants import GRAVITY
 from inertial.layouts.layout import Layout
 from inertial.simulation.profiles import Profile, Ramp, named
-from inertial.simulation.table import BLOCK, GRAVITY, SensorModel, TableTest
+from inertial.simulation.table import BLOCK, SensorModel, TableTest
 
 Array = NDArray[np.float64]
 

@@ -17,13 +17,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.constants import GRAVITY, MILLI_G
 from inertial.layouts.layout import CUBE, Layout
 from inertial.simulation.profiles import DEGREE, Profile, named
 
 Array = NDArray[np.float64]
 
-GRAVITY = 9.80665  # m/s^2, standard
-MILLI_G = 1e-3 * GRAVITY  # m/s^2
 COUNT = 3.9 * MILLI_G  # m/s^2 per count, ADXL345 full resolution
 COUNTS = (-4096, 4095)  # 13 bit, +-16 g
 BLOCK = 1000  # samples generated at once; part of what a seed means

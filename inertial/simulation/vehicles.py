@@ -16,6 +16,7 @@ from scipy.integrate import cumulative_simpson
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
+from inertial.constants import GRAVITY
 from inertial.simulation.drive import (
     REALISTIC,
     Condition,
@@ -30,7 +31,6 @@ Array = NDArray[np.float64]
 
 DEG = np.pi / 180.0
 STEP = 0.5 / RATE  # s, between the points at which motion is written down
-STANDARD_G = 9.80665  # m/s^2
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def aircraft(seed: int, seconds: float = 300.0, still: float = 20.0) -> Motion:
     airborne = _smooth((airspeed > 30.0).astype(float), 2.0)
     bank = DEG * _random_steps(draw, t, (6.0, 20.0), [-45.0, -30.0, 0.0, 0.0, 30.0, 45.0])
     bank = airborne * _smooth(np.where(t > still + 45.0, bank, 0.0), 1.5)
-    turning = STANDARD_G * np.tan(bank) / np.maximum(airspeed, 20.0)
+    turning = GRAVITY * np.tan(bank) / np.maximum(airspeed, 20.0)
     heading = draw.uniform(-np.pi, np.pi) + cumulative_simpson(turning, dx=STEP, initial=0.0)
     climb = airborne * _smooth(_random_steps(draw, t, (15.0, 40.0), [-2.0, 0.0, 3.0]), 3.0)
     through_air = airspeed[:, None] * np.column_stack([np.cos(heading), np.sin(heading), 0 * t])

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.navigation.geodetic import ned_between
+from inertial.earth import ned_between
 from sessions.library.align import METHODS, MOST, CompareError, Overlaid, key_of, laid, resampled
 from sessions.library.curves import Curves, Line, Track
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.navigation.geodetic import ned_between
+from inertial.earth import ned_between
 from sessions.library.curves import Line, Track, bins_of
 from sessions.report.data import Tacho
 from sessions.report.segments import reference

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.constants import GRAVITY
 from sessions.recording.manifest import Manifest
 from sessions.report.data import Rate, Run
 from sessions.report.paper import CubeTest, PositionError, cube_test, local_gravity, position_error
@@ -52,7 +53,7 @@ class Analysis:
     rest: Segment | None
     allan_axes: list[Allan] = field(default_factory=list)
     navigation: list[NavigationResult] = field(default_factory=list)
-    gravity: float = 9.80665  # m/s^2
+    gravity: float = GRAVITY  # m/s^2
     completeness: float | None = None  # 0 to 1
 
     def rate(self, name: str) -> RateResult | None:

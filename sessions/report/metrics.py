@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from inertial.constants import MILLI_G
 from sessions.report.analysis import Analysis
-
-MG = 9.80665e-3  # m/s^2
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ def metrics(found: Analysis, estimator: str) -> list[Metric]:
         rows.append(
             (
                 f"accel_bias_{axis}_mg",
-                None if bias is None else bias[k] / MG,
+                None if bias is None else bias[k] / MILLI_G,
                 f"equivalent bias of p_{axis}",
             )
         )

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.constants import GRAVITY
 from inertial.navigation.earth import gravity
 from inertial.rate.field import cube_angular_acceleration, cube_specific_force
 from sessions.report.data import Accel, Rate, Run
@@ -17,7 +18,6 @@ from sessions.report.segments import STEP, Segment, reference
 
 Array = NDArray[np.float64]
 
-STANDARD_GRAVITY = 9.80665  # m/s^2, where no fix tells the latitude
 CUBE_AXES = 12
 
 
@@ -59,7 +59,7 @@ def cube_test(accel: Accel, side: float, segments: list[Segment], run: Run) -> C
 def local_gravity(run: Run) -> float:
     """m/s^2, at the median fix, or the standard one."""
     if not len(run.fixes):
-        return STANDARD_GRAVITY
+        return GRAVITY
     return float(gravity(float(np.median(run.fixes[:, 1])), float(np.median(run.fixes[:, 3]))))
 
 

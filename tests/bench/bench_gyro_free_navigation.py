@@ -34,9 +34,10 @@ from support.gyro_free_rig import (  # noqa: E402
 
 from estimator.pipeline import Pipeline  # noqa: E402
 from estimator.settings import EstimatorSettings  # noqa: E402
+from inertial.constants import MILLI_G  # noqa: E402
 from inertial.simulation.arm import centre  # noqa: E402
 from inertial.simulation.drive import simulate  # noqa: E402
-from inertial.simulation.table import MILLI_G, SensorModel  # noqa: E402
+from inertial.simulation.table import SensorModel  # noqa: E402
 from messages.contract.topics import INNOVATION, NAV  # noqa: E402
 
 PUBLISHED = SensorModel()

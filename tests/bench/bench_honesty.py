@@ -1,4 +1,4 @@
-"""Is a number called valid only where the data bear it out? One JSON line per condition and profile.
+"""Is a number called valid only where the data bear it out? A line per condition and profile.
 
 For every condition of inertial/simulation/disturbed.py, three profiles, ten seeds, products-ekf as
 it comes: of the samples whose components are called valid, the share that is off by more than 5

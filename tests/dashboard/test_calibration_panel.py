@@ -20,7 +20,7 @@ from messages.bus import orders
 from messages.bus.session import BusSettings, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ACCEL, CALIBRATION
-from messages.history.mending import Arrival
+from messages.history.mending_state import Arrival
 
 STATE = pb.CalibrationStatus
 
@@ -70,7 +70,7 @@ def test_buttons_follow_the_state_and_are_named_to_the_proxy(free_port):
     server, store = viser.ViserServer(host="127.0.0.1", port=free_port, verbose=False), Store()
     try:
         page = Calibration(server, server.gui.add_folder("x"))
-        assert len(page.uuids) == 4
+        assert len(page.orders) == 4
 
         def shown(state, poses=0):
             status_at(store, state, poses)

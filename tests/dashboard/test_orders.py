@@ -44,11 +44,7 @@ def test_every_button_that_orders_gives_its_order(server, title):
     page.chart(
         "one", "a chart", "m"
     )  # what a page draws must not stand in the way of what it orders
-    buttons = [
-        handle
-        for uuid, handle in server.gui._gui_input_handle_from_uuid.items()
-        if uuid in page.uuids and isinstance(handle, viser.GuiButtonHandle)
-    ]
+    buttons = [handle for handle in page.orders if isinstance(handle, viser.GuiButtonHandle)]
     assert buttons
     for button in buttons:
         before = len(page.desk.given)

@@ -85,7 +85,8 @@ def test_every_answer_carries_the_headers(door: Door):
 
 
 def test_pages_need_nothing_from_elsewhere_and_no_inline_code():
-    for file in [*FOLDER.glob("templates/*.html"), *FOLDER.glob("static/*")]:
+    ours = [*FOLDER.glob("templates/*.html"), *FOLDER.glob("static/*.*")]
+    for file in ours:  # of what is vendored, test_charts.py sees that it asks for nothing
         text = file.read_text().replace("http://www.w3.org/2000/svg", "")
         assert (
             "http://" not in text

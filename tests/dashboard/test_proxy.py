@@ -4,20 +4,31 @@ meets.
 
 import socket
 
+import msgspec
 import numpy as np
 import pytest
 import viser._messages
+import zstandard
 from support.front_door import CAMERA, Door, message, open_door, wait_for
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from dashboard.web.auth import Role
-from dashboard.web.proxy import OPERATOR_MAY, VIEWER_MAY, BadMessage, may_send, message_type
+from dashboard.web.scene_messages import (
+    MAKES_INPUT,
+    OPERATOR_MAY,
+    VIEWER_MAY,
+    BadMessage,
+    Widgets,
+    may_send,
+    message_type,
+)
 from dashboard.web.users import remove_user
 
 
 @pytest.fixture(scope="module")
 def door(tmp_path_factory):
-    with open_door(tmp_path_factory.mktemp("door"), free_attempts=100) as opened:
+    folder = tmp_path_factory.mktemp("door")
+    with open_door(folder, free_attempts=100, open_labels=["Pause"]) as opened:
         yield opened
 
 
@@ -93,6 +104,43 @@ def test_viewer_moves_the_camera_but_no_widget(door: Door, checkbox):
         assert checkbox.value is False  # sent before the camera and in order, so it was dropped
 
 
+def test_viewer_uses_a_widget_of_his_own_view_by_its_label(door: Door, checkbox):
+    """The relay learns which is which of what viser tells the browser."""
+    mine = door.viser.gui.add_checkbox("Pause", False)
+    try:
+        with door.client("vera") as client, door.scene(client) as scene:
+            scene.send(message("ViewerCameraMessage", **CAMERA))
+            scene.recv(timeout=20.0)
+            only_client(door)
+            for handle in (checkbox, mine):
+                update = {"uuid": handle._impl.uuid, "updates": {"value": True}}
+                scene.send(message("GuiUpdateMessage", **update))
+            wait_for(lambda: mine.value, "his own widget changed")
+            assert checkbox.value is False
+    finally:
+        mine.remove()
+
+
+def test_a_label_that_is_given_later_opens_nothing():
+    def frame(*messages) -> bytes:
+        text = msgspec.msgpack.encode({"messages": messages, "timestampSec": 0.0})
+        packed = zstandard.compress(text)
+        sizes = len(text).to_bytes(8, "little") + len(packed).to_bytes(8, "little")
+        return sizes + packed + b"more"
+
+    made = {"type": "GuiButtonMessage", "uuid": "a", "props": {"label": "Record", "order": 1.0}}
+    renamed = {"type": "GuiUpdateMessage", "uuid": "a", "updates": {"label": "Pause"}}
+    own = {"type": "GuiButtonMessage", "uuid": "b", "props": {"label": "Pause"}}
+    text = {"type": "GuiHtmlMessage", "uuid": "c", "props": {"content": "Pause", "label": "Pause"}}
+    widgets = Widgets(["Pause"])
+    widgets.learn(frame(made, renamed, text))
+    assert widgets.open == set()
+    widgets.learn(frame(own))
+    for damaged in (b"", b"short", frame(own)[:-20], bytes(100), b"\xff" * 40):
+        widgets.learn(damaged)
+    assert widgets.open == {"b"}
+
+
 def test_operator_drives_a_widget_but_only_its_value(door: Door, checkbox):
     with door.client("otto") as client, door.scene(client) as scene:
         scene.send(message("ViewerCameraMessage", **CAMERA))
@@ -119,7 +167,7 @@ def test_nobody_opens_a_public_tunnel(door: Door, checkbox):
 
 def test_every_allowed_name_is_a_message_of_this_viser():
     assert VIEWER_MAY < OPERATOR_MAY
-    for name in OPERATOR_MAY:
+    for name in OPERATOR_MAY | MAKES_INPUT:
         assert hasattr(viser._messages, name), name
 
 

@@ -2,6 +2,7 @@
 real viser server.
 """
 
+import contextlib
 import json
 import time
 import urllib.request
@@ -28,6 +29,8 @@ from dashboard.scene.panels import PAGES, Snapshot
 from dashboard.scene.panels.base import Panel
 from dashboard.scene.panels.device.devices import Devices, counts
 from dashboard.scene.service import SceneError, start
+from dashboard.scene.view import OWN_INPUTS, View
+from inertial.rotation import from_matrix, rotate
 from messages.bus.orders import OrderError
 from messages.bus.session import BusSettings, Publishers, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
@@ -182,12 +185,12 @@ def test_chart_data_are_of_one_length_finite_and_end_with_the_mask():
     ],
 )
 def test_world_turns_north_east_down_into_east_north_up(p_n, shown):
-    assert np.allclose(geo.rotate(np.array(geo.Q_DISPLAY_N), np.array(p_n)), shown)
+    assert np.allclose(rotate(geo.Q_DISPLAY_N, p_n), shown)
 
 
 def test_cube_on_its_table_stands_upright_on_the_screen():
-    up_b = geo.rotate(np.array(cube_attitude(0.7)), np.array([0.0, 0.0, 1.0]))
-    assert geo.rotate(np.array(geo.Q_DISPLAY_N), up_b)[2] > 0.999
+    up_b = rotate(np.array(cube_attitude(0.7)), np.array([0.0, 0.0, 1.0]))
+    assert rotate(np.array(geo.Q_DISPLAY_N), up_b)[2] > 0.999
 
 
 def test_quaternion_refuses_what_is_none():
@@ -200,15 +203,15 @@ def test_matrix_to_quaternion_inverts_rotate():
     random = np.random.default_rng(3)
     for q in random.normal(size=(50, 4)):
         q /= np.linalg.norm(q)
-        c = np.column_stack([geo.rotate(q, axis) for axis in np.eye(3)])
-        back = np.array(geo.matrix_to_quaternion(c))
+        c = np.column_stack([rotate(q, axis) for axis in np.eye(3)])
+        back = np.array(from_matrix(c))
         assert min(np.abs(back - q).max(), np.abs(back + q).max()) < 1e-9
 
 
 def test_ellipsoid_axes_are_three_standard_deviations():
     axes, q = geo.ellipsoid(np.diag([4.0, 9.0, 1.0]).ravel())
     assert np.allclose(sorted(axes), [3.0, 6.0, 9.0])
-    longest = geo.rotate(np.array(q), np.eye(3)[int(np.argmax(axes))])
+    longest = rotate(np.array(q), np.eye(3)[int(np.argmax(axes))])
     assert np.allclose(np.abs(longest), [0, 1, 0])
     assert geo.ellipsoid([]) is None and geo.ellipsoid([float("nan")] * 9) is None
 
@@ -448,7 +451,7 @@ def test_scene_is_served_and_idle_without_browsers(store, nobody):
     try:
         with urllib.request.urlopen(f"http://127.0.0.1:{handle.port}/", timeout=20) as page:
             assert page.status == 200 and b"<html" in page.read(2000)
-        assert handle.clients == 0 and handle.viewer_uuids() == frozenset()
+        assert handle.clients == 0
     finally:
         handle.stop()
 
@@ -460,6 +463,30 @@ def test_a_port_in_use_is_an_error_with_its_remedy(store, nobody, free_port):
             start(SimpleNamespace(viser_port=free_port), store, nobody)
     finally:
         first.stop()
+
+
+def test_every_input_is_an_order_or_named_as_ones_own(server, store, nobody):
+    """A viewer may use inputs by their labels, so no order may have one of those."""
+    before = set(server.gui._gui_input_handle_from_uuid)
+    client = SimpleNamespace(
+        gui=server.gui, scene=server.scene, camera=None, atomic=contextlib.nullcontext
+    )
+    view = View(client, store, nobody)
+    made = server.gui._gui_input_handle_from_uuid.items()
+    inputs = [handle for uuid, handle in made if uuid not in before]
+    orders = [handle for handle in inputs if handle in view.orders]
+    own = [handle for handle in inputs if handle not in view.orders]
+    assert len(orders) == len(view.orders) > 15 and len(own) > 12
+    assert not {handle.label for handle in orders} & OWN_INPUTS
+    assert {handle.label for handle in own} == OWN_INPUTS
+
+
+def test_the_scene_opens_no_public_tunnel(store, nobody):
+    handle = start(SimpleNamespace(viser_port=0), store, nobody)
+    try:
+        assert handle._server.request_share_url() is None and handle._server._share_tunnel is None
+    finally:
+        handle.stop()
 
 
 @pytest.mark.browser

@@ -1,26 +1,29 @@
-"""Radii, gravity and rates against published values and each other."""
+"""Radii, gravity and rates against published values and each other; both twins, bit for bit."""
 
 import math
 
 import numpy as np
 import pytest
 
-from inertial.navigation.earth import (
-    E2,
-    OMEGA,
-    A,
-    earth_rate,
-    gravity,
-    ned_between,
-    radii,
-    transport_rate,
-)
+from inertial import earth
+from inertial.constants import EARTH_RATE, ECCENTRICITY2, FLATTENING, SEMI_MAJOR_AXIS
+from inertial.core import native
+from inertial.earth import earth_rate, gravity, ned_between, radii, transport_rate
+
+RNG = np.random.default_rng(4)
+L, LON = RNG.uniform(-1.5, 1.5, 500), RNG.uniform(-math.pi, math.pi, 500)
+H, NORTH, EAST = RNG.uniform(-100, 9000, 500), RNG.normal(0, 30, 500), RNG.normal(0, 30, 500)
+
+
+def test_the_ellipsoid_is_of_one_piece() -> None:
+    assert FLATTENING * (2.0 - FLATTENING) == pytest.approx(ECCENTRICITY2, rel=1e-11)
 
 
 def test_radii_at_equator_and_pole() -> None:
-    b = A * math.sqrt(1.0 - E2)
-    assert radii(0.0) == pytest.approx((b * b / A, A), rel=1e-14)
-    assert radii(math.pi / 2) == pytest.approx((A * A / b, A * A / b), rel=1e-12)
+    a = SEMI_MAJOR_AXIS
+    b = a * math.sqrt(1.0 - ECCENTRICITY2)
+    assert radii(0.0) == pytest.approx((b * b / a, a), rel=1e-14)
+    assert radii(math.pi / 2) == pytest.approx((a * a / b, a * a / b), rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -37,7 +40,7 @@ def test_gravity_falls_by_a_third_of_a_milligal_per_metre() -> None:
 
 def test_rates() -> None:
     L, h = math.radians(37.759), 1468.0
-    assert np.linalg.norm(earth_rate(L)) == pytest.approx(OMEGA, rel=1e-15)
+    assert np.linalg.norm(earth_rate(L)) == pytest.approx(EARTH_RATE, rel=1e-15)
     R_N, R_E = radii(L)
     north, east, down = transport_rate(L, h, 30.0, 20.0)
     assert north == 20.0 / (R_E + h)
@@ -46,7 +49,25 @@ def test_rates() -> None:
 
 
 def test_ned_between_goes_over_the_antimeridian() -> None:
-    north, east, down = ned_between(0.0, math.pi - 1e-6, 5.0, 1e-6, -math.pi + 1e-6, 2.0)
+    north, east, down = ned_between((0.0, math.pi - 1e-6, 5.0), (1e-6, -math.pi + 1e-6, 2.0))
     assert (north, east, down) == pytest.approx(
-        (1e-6 * (radii(0.0)[0] + 5.0), 2e-6 * (A + 5.0), 3.0), rel=1e-9
+        (1e-6 * (radii(0.0)[0] + 5.0), 2e-6 * (SEMI_MAJOR_AXIS + 5.0), 3.0), rel=1e-9
     )
+
+
+def test_core_and_numpy_twin_give_the_same_bits() -> None:
+    functions = {
+        "radii": (L,),
+        "gravity": (L, H),
+        "earth_rate": (L,),
+        "transport_rate": (L, H, NORTH, EAST),
+    }
+    for name, inputs in functions.items():
+        whole = getattr(earth, name)(*inputs)
+        whole = np.stack(whole, axis=-1) if isinstance(whole, tuple) else whole
+        single = [getattr(native.earth, name)(*one) for one in zip(*inputs, strict=True)]
+        assert np.array(single).tobytes() == whole.tobytes(), name
+    there = (L + 1e-4 * NORTH, LON[::-1], H[::-1])
+    whole = np.stack(ned_between((L, LON, H), there), axis=-1)
+    single = [native.earth.ned_between(*o, *p) for o, p in zip(zip(L, LON, H), zip(*there))]
+    assert np.array(single).tobytes() == whole.tobytes()

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from inertial.attitude.rotation import to_dcm
+from inertial.constants import GRAVITY
 from inertial.simulation.profiles import PROFILES
-from inertial.simulation.table import BLOCK, COUNTS, GRAVITY, IDEAL, SensorModel, TableTest
+from inertial.simulation.table import BLOCK, COUNTS, IDEAL, SensorModel, TableTest
 
 
 @pytest.mark.parametrize("name", PROFILES)

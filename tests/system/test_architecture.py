@@ -10,7 +10,7 @@ MAY_IMPORT = {
     "firmware_protocol": set(),
     "messages": set(),
     "emulator": {"firmware_protocol"},
-    "gateway": {"firmware_protocol", "messages"},
+    "gateway": {"firmware_protocol", "messages", "inertial"},
     "inertial": set(),
     "estimator": {"messages", "inertial"},
     "logs": {"messages", "inertial", "estimator"},

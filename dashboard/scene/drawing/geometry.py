@@ -11,6 +11,7 @@ import numpy as np
 
 from dashboard.data.pose import yaw_of
 from inertial.layouts.layout import CUBE
+from inertial.rotation import from_matrix, multiply
 from messages.contract import gyrofree_pb2 as pb
 
 # Rotation n (north, east, down) -> display (east, north, up): half a turn about (1, 1, 0), w x y z.
@@ -18,14 +19,6 @@ Q_DISPLAY_N = (0.0, 0.5**0.5, 0.5**0.5, 0.0)
 
 _CUBE = CUBE(half_side=1.0)
 SENSORS_B, DIRECTIONS_B = _CUBE.r_b, _CUBE.theta_b  # (12, 3): a11 a12 ... a43, in half sides
-
-
-def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """v (..., 3) turned by the unit quaternion q (w, x, y, z)."""
-    w, u = q[0], np.asarray(q[1:], dtype=float)
-    v = np.asarray(v, dtype=float)
-    t = 2.0 * np.cross(u, v)
-    return v + w * t + np.cross(u, t)
 
 
 def quaternion(values) -> tuple[float, float, float, float] | None:
@@ -54,26 +47,7 @@ def ellipsoid(
     if np.linalg.det(vectors) < 0:
         vectors[:, 0] = -vectors[:, 0]
     axes = tuple(float(v) for v in sigmas * np.sqrt(np.maximum(values, 1e-8)))
-    return axes, matrix_to_quaternion(vectors)
-
-
-def matrix_to_quaternion(c: np.ndarray) -> tuple[float, float, float, float]:
-    """Rotation matrix (3, 3) to w, x, y, z (Shepperd's method: divides by the largest
-    component).
-    """
-    trace = float(np.trace(c))
-    squares = np.array([trace, *np.diag(c)])
-    k = int(np.argmax(squares))
-    q = np.empty(4)
-    if k == 0:
-        q[:] = 1 + trace, c[2, 1] - c[1, 2], c[0, 2] - c[2, 0], c[1, 0] - c[0, 1]
-    else:
-        i, j, l = k - 1, k % 3, (k + 1) % 3
-        q[0] = c[l, j] - c[j, l]
-        q[1 + i] = 1 + c[i, i] - c[j, j] - c[l, l]
-        q[1 + j] = c[j, i] + c[i, j]
-        q[1 + l] = c[l, i] + c[i, l]
-    return tuple(float(v) for v in q / np.linalg.norm(q))
+    return axes, tuple(from_matrix(vectors).tolist())
 
 
 def box_edges(half: tuple[float, float, float], centre=(0.0, 0.0, 0.0)) -> np.ndarray:
@@ -137,6 +111,4 @@ def facing(q_nb: Sequence[float], other: Sequence[float]) -> tuple[float, ...] |
     if q is None or quaternion(other) is None:
         return q
     half = 0.5 * (yaw_of(other) - yaw_of(q_nb))
-    c, s = float(np.cos(half)), float(np.sin(half))
-    w, x, y, z = q
-    return c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w
+    return tuple(multiply([np.cos(half), 0.0, 0.0, np.sin(half)], q).tolist())

@@ -5,16 +5,15 @@ from typing import Any
 
 import numpy as np
 
+from inertial.rotation import to_matrix
+
 SKY, GROUND, LINE, PLANE = "#56B4E9", "#8a6d3b", "#ffffff", "#E69F00"
 
 
 def between(q: Any, p: Any) -> float:
     """Angle between the verticals of two attitudes, rad."""
-    down = [
-        np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
-        for w, x, y, z in (q, p)
-    ]
-    return math.atan2(float(np.linalg.norm(np.cross(*down))), float(np.dot(*down)))
+    down, other = to_matrix(q)[2], to_matrix(p)[2]
+    return math.atan2(float(np.linalg.norm(np.cross(down, other))), float(np.dot(down, other)))
 
 
 def horizon_svg(roll: float, pitch: float, stale: bool, size: int = 190) -> str:

@@ -19,6 +19,8 @@ log = logging.getLogger(__name__)
 
 DEG = 180.0 / np.pi
 
+Input = viser.GuiInputHandle | viser.GuiButtonHandle | viser.GuiButtonGroupHandle
+
 
 @dataclass(frozen=True)
 class Snapshot:
@@ -49,6 +51,7 @@ class Panel:
 
     title = ""
     desk: Desk  # set by the view: how a panel gives orders
+    own_inputs: tuple[str, ...] = ()  # labels of inputs that change this browser's own view only
     own_scene = False  # True: the page shows something else than the device in 3-D
 
     def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
@@ -109,9 +112,9 @@ class Panel:
         return handle
 
     @property
-    def uuids(self) -> frozenset[str]:
+    def orders(self) -> tuple[Input, ...]:
         """Inputs that do more than change this browser's own view: a viewer may not use them."""
-        return frozenset()
+        return ()
 
     def update(self, s: Snapshot) -> None:
         """Bring the page to the state of the snapshot."""

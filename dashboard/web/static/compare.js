@@ -50,11 +50,12 @@ function showTables(answer) {
 }
 
 function line(cells) {
-  const row = document.createElement("tr");
+  const row = document.createElement("tr"), heads = [...document.querySelectorAll("#differences th")];
   row.append(...cells.map((text, k) => {
     const cell = document.createElement("td");
     cell.textContent = text;
-    cell.className = k > 1 ? "n" : "id";
+    cell.className = k > 1 ? "n" : k ? "" : "id";
+    if (k) cell.dataset.label = heads[k]?.textContent ?? "";
     return cell;
   }));
   return row;

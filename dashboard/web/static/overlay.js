@@ -1,6 +1,7 @@
 // Sessions over one another on one axis of time; also the plots of a single session.
-import { Group, Plot, drawTracks } from "/static/plot.js";
+import { Group, Plot } from "/static/chart.js";
 import { call } from "/static/rest.js";
+import { Tracks } from "/static/tracks.js";
 
 const COLORS = ["#3296d8", "#d55e00", "#009e73", "#c564a0"]; // told apart by all eyes; dashes tell them apart, too
 const DASHES = [[], [7, 3], [2, 2], [9, 3, 2, 3]];
@@ -15,9 +16,9 @@ export class Overlay {
     this.plots = [...root.querySelectorAll("figure[data-plot]")].filter((f) => f.dataset.plot !== "tracks").map((figure) => ({
       figure, kind: figure.dataset.plot.split(" ")[0], part: figure.dataset.plot.split(" ")[1], plot: new Plot(figure, this.group),
     }));
-    this.tracks = root.querySelector("figure[data-plot=tracks]");
+    this.trackFigure = root.querySelector("figure[data-plot=tracks]");
+    this.tracks = new Tracks(this.trackFigure);
     this.legend = root.querySelector(".legend");
-    if (this.tracks) new ResizeObserver(() => this.drawTracks()).observe(this.tracks.querySelector("canvas"));
   }
 
   // Until all recordings have been read whole; what is there already is drawn meanwhile.
@@ -49,10 +50,10 @@ export class Overlay {
       if (kind === "error" && mine.length) figure.querySelector("small").textContent = `against ${[...new Set(mine.map((l) => l.against))].join(", ")}, deg/s`;
       plot.set(mine, marks);
     }
-    if (this.tracks) {
-      this.tracks.hidden = !answer.tracks.length;
-      this.drawTracks();
-    }
+    this.trackFigure.hidden = !answer.tracks.length;
+    this.tracks.set(answer.tracks.map((track) => ({
+      ...track, ...this.trackLook(track), hidden: this.hidden.has(`${track.session} ${track.key}`),
+    })));
     this.showLegend(lines, answer.tracks);
     this.hooks.data(answer);
   }
@@ -78,15 +79,7 @@ export class Overlay {
   // Of one session alone colours tell its tracks apart, else the sessions.
   trackLook(track) {
     const place = this.ids.length === 1 ? this.answer.tracks.findIndex((t) => t.key === track.key) : track.session;
-    return { color: COLORS[place % 4], dash: DASHES[place % 4] };
-  }
-
-  drawTracks() {
-    if (!this.answer) return;
-    drawTracks(this.tracks.querySelector("canvas"), this.answer.tracks.map((track) => ({
-      ...track, ...this.trackLook(track), dots: track.title === "gnss",
-      hidden: this.hidden.has(`${track.session} ${track.key}`),
-    })));
+    return { color: COLORS[place % 4], dash: DASHES[place % 4], dots: track.title === "gnss" };
   }
 
   showLegend(lines, tracks) {
@@ -98,7 +91,9 @@ export class Overlay {
       button.setAttribute("aria-pressed", String(!this.hidden.has(entry.id)));
       const sample = document.createElement("i");
       const look = entry.kind ? this.line(entry, { low: [] }) : this.trackLook(entry);
-      sample.style.borderTop = `3px ${look.dash?.length ? "dashed" : "solid"} ${look.color}`;
+      const stroke = look.dots ? "dotted" : look.dash?.length ? "dashed" : "solid";
+      sample.style.borderTop = `${look.width < 1.5 ? 2 : 3}px ${stroke} ${look.color}`;
+      sample.style.opacity = look.alpha ?? 1;
       const name = entry.device ?? entry.key.split("/")[0];
       button.append(sample, `${this.ids.length > 1 ? `${LETTERS[entry.session]} ` : ""}${name} ${entry.title}`);
       button.addEventListener("click", () => {

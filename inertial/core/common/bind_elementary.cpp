@@ -10,14 +10,27 @@ namespace {
 using AnyIn = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
 using AnyOut = nb::ndarray<nb::numpy, double>;
 
-template <double (*Function)(double)>
-AnyOut each(const AnyIn& x) {
+// A new array of x's shape.
+AnyOut like(const AnyIn& x) {
   auto* numbers = new double[x.size() == 0 ? 1 : x.size()];
   nb::capsule owner(numbers, [](void* p) noexcept { delete[] static_cast<double*>(p); });
-  for (std::size_t i = 0; i < x.size(); ++i) numbers[i] = Function(x.data()[i]);
   std::vector<std::size_t> shape(x.ndim());
   for (std::size_t d = 0; d < x.ndim(); ++d) shape[d] = x.shape(d);
   return AnyOut(numbers, shape.size(), shape.data(), owner);
+}
+
+template <double (*Function)(double)>
+AnyOut each(const AnyIn& x) {
+  AnyOut out = like(x);
+  for (std::size_t i = 0; i < x.size(); ++i) out.data()[i] = Function(x.data()[i]);
+  return out;
+}
+
+AnyOut each_atan2(const AnyIn& y, const AnyIn& x) {
+  if (y.size() != x.size()) throw std::invalid_argument("y and x want one shape");
+  AnyOut out = like(y);
+  for (std::size_t i = 0; i < x.size(); ++i) out.data()[i] = elementary::atan2(y.data()[i], x.data()[i]);
+  return out;
 }
 
 template <double (*Function)(double)>
@@ -64,6 +77,7 @@ void bind_elementary(nb::module_& m) {
   define<elementary::exp>(m, "exp", "e to the x");
   define<elementary::log>(m, "log", "natural logarithm");
   m.def("atan2", &elementary::atan2, nb::arg("y"), nb::arg("x"), "angle of the point (x, y), rad");
+  m.def("atan2", &each_atan2, nb::arg("y"), nb::arg("x"), "the same of two arrays of one shape");
   m.def("pow", &elementary::pow, nb::arg("base"), nb::arg("exponent"), "base > 0 to the exponent");
   m.def("product", &product_of, nb::arg("A"), nb::arg("B"), "A B of (n, k) and (k, m)");
   m.def("cholesky", &lower_factor, nb::arg("C"), "lower L with L L^T = C; raises ValueError without one");

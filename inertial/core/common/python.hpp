@@ -56,6 +56,8 @@ MatrixOut to_numpy(const Eigen::MatrixBase<Derived>& m) {
 
 // One for each subject; module.cpp calls them all.
 void bind_elementary(nb::module_& m);
+void bind_rotation(nb::module_& m);
+void bind_places(nb::module_& m);
 void bind_health(nb::module_& m);
 void bind_navigation(nb::module_& m);
 

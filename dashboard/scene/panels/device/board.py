@@ -8,7 +8,7 @@ import time
 import viser
 
 from dashboard.scene.drawing.palette import age, escape, number, rows
-from dashboard.scene.panels.base import Panel, Snapshot
+from dashboard.scene.panels.base import Input, Panel, Snapshot
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
 
@@ -89,9 +89,9 @@ class Board(Panel):
                 self._inputs.append(button)
 
     @property
-    def uuids(self) -> frozenset[str]:
+    def orders(self) -> tuple[Input, ...]:
         """Everything here: a viewer may not use it."""
-        return frozenset(handle._impl.uuid for handle in self._inputs)
+        return tuple(self._inputs)
 
     def update(self, s: Snapshot) -> None:
         self._device = s.device.name

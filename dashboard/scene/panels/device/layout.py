@@ -11,10 +11,12 @@ import viser
 from dashboard.scene.drawing import geometry as geo
 from dashboard.scene.drawing.palette import GREY, ORANGE, SKY, number, rgb, rows
 from dashboard.scene.panels.base import DEG, Panel, Snapshot
+from inertial.constants import MILLI_G
 from inertial.layouts import catalogue
 from inertial.layouts.draw import noise_ellipsoid
 from inertial.layouts.layout import CUBE, LAYOUTS, Layout
 from inertial.layouts.quality import UNKNOWNS, Quality, analyse
+from inertial.rotation import from_matrix, rotate
 
 HALF_SIDE = 0.05  # m
 ARROW = 0.42  # half sides
@@ -27,6 +29,7 @@ class LayoutBench(Panel):
     """One gizmo moves and turns the chosen axis, or all axes of its triad; figures follow."""
 
     title = "Layout"
+    own_inputs = ("Start from", "Sensor", "Whole triad", "Save as TOML")
     own_scene = True
 
     def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
@@ -130,7 +133,7 @@ class LayoutBench(Panel):
         @gizmo.on_update
         def _(_: object) -> None:
             r = np.tile(np.round(np.asarray(gizmo.position), 3) * scale, (len(which), 1))
-            self.move(which, r, geo.rotate(np.asarray(gizmo.wxyz), theta0))
+            self.move(which, r, rotate(gizmo.wxyz, theta0))
 
     def _draw(self, q: Quality) -> None:
         scene, layout = self.client.scene, q.layout
@@ -173,7 +176,7 @@ class LayoutBench(Panel):
                     color=rgb(ORANGE),
                     opacity=0.35,
                     scale=tuple(size.tolist()),
-                    wxyz=geo.matrix_to_quaternion(vectors),
+                    wxyz=from_matrix(vectors),
                     cast_shadow=False,
                 )
             )
@@ -199,7 +202,6 @@ def figures(q: Quality, cube: Quality) -> str:
         f'<span style="white-space:nowrap">{MARKS[g]} {n}</span>'
         for n, g in zip(UNKNOWNS, q.seen, strict=True)
     )
-    mg = 1.0 / 9.80665e-3
     items = [
         ("κ", pair(q.kappa, cube.kappa, 3)),
         ("GDOP", pair(q.gdop, cube.gdop, 4)),
@@ -211,8 +213,8 @@ def figures(q: Quality, cube: Quality) -> str:
         (
             "noise of p",
             pair(
-                float(q.sigma_least_squares[3:].max()) * mg,
-                float(cube.sigma_least_squares[3]) * mg,
+                float(q.sigma_least_squares[3:].max()) / MILLI_G,
+                float(cube.sigma_least_squares[3]) / MILLI_G,
                 2,
                 "mg",
             ),

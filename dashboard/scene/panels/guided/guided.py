@@ -7,7 +7,7 @@ from typing import Any
 import viser
 
 from dashboard.scene.drawing.palette import GREEN, escape
-from dashboard.scene.panels.base import Panel, Snapshot
+from dashboard.scene.panels.base import Input, Panel, Snapshot
 
 GONE_S = 3.0  # s without a word of a running guidance
 
@@ -35,9 +35,9 @@ class Guided(Panel):
                 self._buttons[action] = button
 
     @property
-    def uuids(self) -> frozenset[str]:
+    def orders(self) -> tuple[Input, ...]:
         """The buttons: a viewer may not press them."""
-        return frozenset(button._impl.uuid for button in self._buttons.values())
+        return tuple(self._buttons.values())
 
     def _show(self, actions: set[int]) -> None:
         for action, button in self._buttons.items():

@@ -10,6 +10,7 @@ from dashboard.scene.drawing.chart import Curve
 from dashboard.scene.drawing.palette import GREY, VERMILLION, number
 from dashboard.scene.panels.base import DEG, Snapshot
 from estimator.devices.gyro_free import equivalent_drift, position_error
+from inertial.constants import MILLI_G
 from messages.contract import gyrofree_pb2 as pb
 
 HOUR = 3600.0
@@ -97,7 +98,7 @@ def table_of(u: Unaided) -> list[tuple[str, str]]:
         ("by equation (27)", number(float(u.predicted[-1]), 1, "m")),
         (
             "&nbsp; of bias · drift",
-            f"{number(u.bias * 1e3 / 9.80665, 1, 'mg')} · {number(u.drift * DEG, 2, '°/s')}",
+            f"{number(u.bias / MILLI_G, 1, 'mg')} · {number(u.drift * DEG, 2, '°/s')}",
         ),
         ("drift that explains it", number(u.equivalent * DEG * HOUR, 0, "°/h")),
     ]

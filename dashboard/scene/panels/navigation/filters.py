@@ -16,7 +16,7 @@ from dashboard.scene.drawing.palette import (
     number,
     rows,
 )
-from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve
+from dashboard.scene.panels.base import Input, Panel, Snapshot, estimator_curve
 from dashboard.scene.panels.navigation import drift
 from messages.contract import gyrofree_pb2 as pb
 
@@ -50,9 +50,9 @@ class Navigation(Panel):
         self._button.on_click(lambda _: self._order())
 
     @property
-    def uuids(self) -> frozenset[str]:
+    def orders(self) -> tuple[Input, ...]:
         """The button: a viewer may not press it."""
-        return frozenset([self._button._impl.uuid])
+        return (self._button,)
 
     def update(self, s: Snapshot) -> None:
         self._device = s.device.name

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import viser
 
 from dashboard.scene.drawing.palette import escape, number, rows
+from dashboard.scene.panels.base import Input
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
 
@@ -32,9 +33,9 @@ class Record:
         self._stop.on_click(lambda _: self._order(pb.RecorderCommand.ACTION_STOP))
 
     @property
-    def uuids(self) -> frozenset[str]:
+    def orders(self) -> tuple[Input, ...]:
         """The elements a viewer may not use."""
-        return frozenset(handle._impl.uuid for handle in (self._start, self._stop, self._name))
+        return self._start, self._stop, self._name
 
     def update(self, latest, now: float) -> None:
         """Show the recorder's newest status; `latest` is None before it spoke."""

@@ -12,6 +12,7 @@ import viser
 from dashboard.data.store import Store
 from dashboard.desk import Desk
 from dashboard.scene.drawing.palette import escape
+from dashboard.scene.panels.base import Input
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
 
@@ -71,10 +72,9 @@ class Timeline:
         self._commands()
 
     @property
-    def uuids(self) -> frozenset[str]:
+    def orders(self) -> tuple[Input, ...]:
         """The elements a viewer may not use: they order, or write into the recording."""
-        handles = (*self._replay_inputs, self._note, self._keep)
-        return frozenset(handle._impl.uuid for handle in handles)
+        return *self._replay_inputs, self._note, self._keep
 
     def update(self, now: float) -> None:
         """Show the newest state. Call under the store's lock."""

@@ -1,0 +1,210 @@
+// Charts over time, drawn by uPlot: least and greatest of every point as a band, gaps, marks, one
+// window and one cursor for all charts of a group. Drag to zoom, double click (or double tap) for
+// all of it, arrow keys to move, + and - to zoom.
+
+const { uPlot } = window; // vendor/uplot, a classic script before this module
+const FONT = "12px system-ui, 'DejaVu Sans', sans-serif";
+const DRAGGED = 8; // px that make a drag of a click
+const LOOK_MS = 120; // a window that still changes asks for no new points
+const UNTOLD = 2; // uPlot.join: null is a gap, also for the times that only another line has
+
+const STEPS = Array.from({ length: 16 }, (_, k) => [1, 2, 5].map((n) => n * 10 ** (k - 8))).flat();
+
+export const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const digits = (step) => Math.max(0, Math.min(6, -Math.floor(Math.log10(step) + 1e-9)));
+
+// How an axis looks; unit stands behind each number.
+export function axis(unit, more) {
+  return {
+    stroke: style("--dim"), font: FONT, gap: 6,
+    incrs: STEPS, grid: { stroke: style("--line"), width: 1 }, ticks: { show: false },
+    values: (_, splits, __, ___, step) => splits.map((v) => `${v.toFixed(digits(step))}${unit}`),
+    ...more,
+  };
+}
+
+export const faded = (color, alpha) => color + Math.round(255 * alpha).toString(16).padStart(2, "0");
+
+// Calls redraw when the theme changes, by a person or by the system.
+export function onTheme(redraw) {
+  document.addEventListener("gyrofree-theme", redraw);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+}
+
+// One table of times for all lines: [times, low, high of the first, low ...]; high where it differs.
+function table(lines) {
+  if (!lines.length) return [[]];
+  return uPlot.join(lines.map(({ t0, dt, low, high }) => {
+    const times = Array.from(low, (_, k) => t0 + k * dt);
+    return high === low ? [times, low] : [times, low, high];
+  }), lines.map(({ low, high }) => (high === low ? [0, UNTOLD] : [0, UNTOLD, UNTOLD])));
+}
+
+function seriesOf(lines) {
+  const series = [{}], bands = [];
+  for (const line of lines) {
+    const look = {
+      label: line.short, stroke: faded(line.color, line.alpha ?? 1), width: line.width ?? 1.4,
+      dash: line.dash?.length ? line.dash : undefined, points: { show: false },
+    };
+    series.push(look);
+    if (line.high === line.low) continue;
+    bands.push({ series: [series.length, series.length - 1], fill: faded(line.color, 0.45 * (line.alpha ?? 1)) });
+    series.push(look);
+  }
+  return { series, bands };
+}
+
+// A margin above and below what is seen; something around zero where nothing is.
+function range(_, low, high) {
+  if (low === null || !(high >= low)) return [-1, 1];
+  const margin = 0.06 * (high - low) || Math.abs(high) * 0.1 || 1;
+  return [low - margin, high + margin];
+}
+
+export class Plot {
+  // lines: [{label, short, color, dash, width, alpha, hidden, t0, dt, low, high}]; group: window and cursor.
+  constructor(figure, group) {
+    this.group = group;
+    this.root = figure.querySelector(".chart");
+    this.readout = figure.querySelector("output");
+    this.lines = [];
+    this.marks = [];
+    group.plots.push(this);
+    new ResizeObserver(() => this.resize()).observe(this.root);
+    this.root.addEventListener("keydown", (event) => group.key(event));
+  }
+
+  set(lines, marks) {
+    this.marks = marks;
+    this.lines = lines.filter((line) => !line.hidden);
+    const shape = JSON.stringify(this.lines.map((l) => [l.short, l.color, l.dash, l.width, l.alpha, l.high === l.low]));
+    if (this.shape !== shape) this.build();
+    else this.chart?.setData(table(this.lines), false);
+    this.shape = shape;
+    this.look();
+  }
+
+  build() {
+    this.chart?.destroy();
+    this.chart = null;
+    const { clientWidth: width, clientHeight: height } = this.root;
+    if (!width || !height) return; // hidden: built when there is room
+    this.chart = new uPlot({
+      width, height, ...seriesOf(this.lines), legend: { show: false }, padding: [8, 10, 0, 0],
+      scales: { x: { time: false, auto: false, range: (_, a, b) => [a, b] }, y: { range } },
+      axes: [axis(" s", { space: 60, size: 28 }), axis("", { space: 30, size: 58 })],
+      cursor: {
+        y: false, points: { show: false }, drag: { x: false, y: false },
+        sync: { key: this.group.cursorKey, scales: ["x", null] },
+        bind: { mousedown: () => () => {}, dblclick: () => () => this.group.look(...this.group.span) },
+      },
+      hooks: { drawAxes: [(u) => this.drawMarks(u)], setCursor: [(u) => this.say(u)] },
+    }, table(this.lines), this.root);
+    this.listen(this.chart.over);
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.root;
+    if (!this.chart && this.shape !== undefined) {
+      this.build();
+      this.look();
+    } else if (this.chart && width) this.chart.setSize({ width, height });
+  }
+
+  look() {
+    const [min, max] = this.group.window;
+    this.chart?.setScale("x", { min, max });
+  }
+
+  drawMarks(u) {
+    const c = u.ctx, { left, top, width, height } = u.bbox, px = uPlot.pxRatio;
+    c.save();
+    c.beginPath();
+    c.rect(left, top, width, height);
+    c.clip();
+    c.font = FONT.replace("12px", `${12 * px}px`);
+    c.textBaseline = "top";
+    c.lineWidth = px;
+    c.setLineDash([3 * px, 3 * px]);
+    for (const mark of this.marks) {
+      const x = u.valToPos(mark.t, "x", true), near = x > left + width - 110 * px;
+      c.strokeStyle = c.fillStyle = mark.color;
+      c.beginPath(); c.moveTo(x, top); c.lineTo(x, top + height); c.stroke();
+      c.textAlign = near ? "right" : "left";
+      c.fillText(mark.text.slice(0, 40), x + (near ? -4 : 4) * px, top + 2 * px);
+    }
+    c.restore();
+  }
+
+  // Time and values under the cursor, of this chart or of another of the group.
+  say(u) {
+    if (!(u.cursor.left >= 0)) { this.readout.textContent = ""; return; }
+    const t = u.posToVal(u.cursor.left, "x");
+    const values = this.lines.map((line) => {
+      const k = Math.round((t - line.t0) / line.dt), low = line.low[k];
+      return low === undefined || low === null ? null : `${line.short} ${((low + line.high[k]) / 2).toFixed(3)}`;
+    }).filter(Boolean);
+    this.readout.textContent = `${t.toFixed(2)} s: ${values.join(", ")}`;
+  }
+
+  // uPlot selects with a mouse only; this does with a finger, too.
+  listen(over) {
+    let from = null;
+    const at = (event) => Math.min(over.clientWidth, Math.max(0, event.clientX - over.getBoundingClientRect().left));
+    const show = (left, width) => this.chart.setSelect({ left, width, top: 0, height: width ? over.clientHeight : 0 }, false);
+    over.addEventListener("pointerdown", (event) => {
+      if (event.button) return;
+      from = at(event);
+      over.setPointerCapture(event.pointerId);
+    });
+    over.addEventListener("pointermove", (event) => {
+      const x = at(event);
+      if (event.pointerType !== "mouse") this.chart.setCursor({ left: x, top: 0 });
+      if (from !== null) show(Math.min(from, x), Math.abs(x - from));
+    });
+    const end = (event) => {
+      if (from === null) return;
+      const [a, b] = [from, at(event)].sort((p, q) => p - q).map((x) => this.chart.posToVal(x, "x"));
+      const far = Math.abs(at(event) - from) > DRAGGED;
+      from = null;
+      show(0, 0);
+      if (event.type === "pointercancel") return; // the browser scrolls the page
+      if (far) this.group.look(a, b);
+      else this.group.click(b);
+    };
+    over.addEventListener("pointerup", end);
+    over.addEventListener("pointercancel", end);
+  }
+}
+
+// Charts with one axis of time. `onLook(begin, end)` after a change of the window, `click(t)` for a click.
+export class Group {
+  static count = 0;
+
+  constructor(onLook, click = () => {}) {
+    this.plots = [];
+    this.span = this.window = [0, 1];
+    this.cursorKey = `charts ${Group.count++}`;
+    Object.assign(this, { onLook, click });
+    onTheme(() => this.plots.forEach((plot) => { if (plot.chart) { plot.build(); plot.look(); } }));
+  }
+
+  look(begin, end) {
+    const [a, b] = this.span;
+    const width = Math.min(b - a, Math.max(1e-3, end - begin));
+    begin = Math.min(Math.max(a, begin), b - width);
+    this.window = [begin, begin + width];
+    for (const plot of this.plots) plot.look();
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.onLook(...this.window), LOOK_MS);
+  }
+
+  key(event) {
+    const [a, b] = this.window, w = b - a;
+    const moves = { ArrowLeft: [a - w / 4, b - w / 4], ArrowRight: [a + w / 4, b + w / 4], "+": [a + w / 4, b - w / 4], "-": [a - w / 2, b + w / 2], 0: this.span };
+    if (!(event.key in moves)) return;
+    event.preventDefault();
+    this.look(...moves[event.key]);
+  }
+}

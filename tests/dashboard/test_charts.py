@@ -1,0 +1,174 @@
+"""Charts of the sessions' pages in real Chromium: drawn, zoomed, gaps left open, both themes."""
+
+import shutil
+
+import pytest
+from playwright.sync_api import expect, sync_playwright
+from support.front_door import PASSWORDS, open_door
+from support.table_session import SESSION, table_root
+
+from sessions.library.annotations import SessionNote, add_note
+from sessions.recording.mcap_log import read
+from sessions.replay.rerun import write_session
+from tests.system.test_browser import CHROMIUM, DESKTOP, FLAGS, PHONE
+
+pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
+
+HOLED = "20240101-000004-holed"  # the same run without 10 to 15 s
+HOLE_S = (10.0, 15.0)
+# Share of a chart's columns between two shares of its width that hold a saturated pixel (a line's).
+COLOURED = """([name, from, to]) => {
+  const figure = document.querySelector(`figure[data-plot="${name}"]`);
+  const canvas = figure.querySelector('canvas'), over = figure.querySelector('.u-over');
+  const c = canvas.getBoundingClientRect(), o = over.getBoundingClientRect();
+  const scale = canvas.width / c.width;
+  const left = Math.round((o.left - c.left + from * o.width) * scale);
+  const width = Math.round((to - from) * o.width * scale);
+  const data = canvas.getContext('2d').getImageData(left, 0, width, canvas.height).data;
+  const columns = new Set();
+  for (let k = 0; k < data.length; k += 4) {
+    const rgb = data.slice(k, k + 3);
+    if (data[k + 3] > 100 && Math.max(...rgb) - Math.min(...rgb) > 60) columns.add((k / 4) % width);
+  }
+  return columns.size / width;
+}"""
+
+
+@pytest.fixture(scope="module")
+def door(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("door")
+    root = folder / "sessions"
+    shutil.copytree(table_root() / SESSION, root / SESSION)
+    rows = list(read(root / SESSION / "recording.mcap"))
+    begin_ns = rows[0].log_ns
+    outside = (
+        (row.log_ns, row.key, row.payload)
+        for row in rows
+        if not HOLE_S[0] < (row.log_ns - begin_ns) / 1e9 < HOLE_S[1]
+    )
+    write_session(root, HOLED, outside, "", {})
+    add_note(root / SESSION, SessionNote(text="a nudge", author="anna", at_s=12.0))
+    with open_door(folder, scene=False) as door:
+        yield door
+        door.front.readings.close()
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def visit(browser, door):
+    """Open a page signed in; at the end nothing may have complained, the content policy neither."""
+    contexts, complaints = [], []
+
+    def open_page(path, viewport=DESKTOP, scheme="dark", **options):
+        context = browser.new_context(viewport=viewport, color_scheme=scheme, **options)
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(60_000)
+        page.on("console", lambda m: m.type == "error" and complaints.append(m.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.goto(f"{door.url}/login")
+        page.fill("input[name=username], input[name=name]", "otto")
+        page.fill("input[name=password]", PASSWORDS["otto"])
+        page.click("main button")
+        page.wait_for_load_state()
+        page.goto(door.url + path)
+        page.wait_for_selector("body[data-plotted=done]")
+        page.wait_for_selector("figure[data-plot='rate z'] .u-over")
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert not complaints
+
+
+def plot(page, name):
+    return page.locator(f"figure[data-plot='{name}']")
+
+
+def asked(page, act):
+    """The window that the page asks curves for after act()."""
+    with page.expect_request(lambda request: "/api/compare?" in request.url) as request:
+        act()
+    query = dict(part.split("=") for part in request.value.url.split("?")[1].split("&"))
+    return [float(query[name]) for name in ("begin", "end")]
+
+
+def drag(page, name, begin, end):
+    box = plot(page, name).locator(".u-over").bounding_box()
+    y = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + begin * box["width"], y)
+    page.mouse.down()
+    page.mouse.move(box["x"] + end * box["width"], y, steps=5)
+    assert plot(page, name).locator(".u-select").bounding_box()["width"] == pytest.approx(
+        (end - begin) * box["width"], abs=3.0
+    )
+    page.mouse.up()
+
+
+def test_a_drag_zooms_all_charts_and_a_double_click_shows_all_of_it(visit):
+    page = visit(f"/sessions/{SESSION}")
+    begin, end = asked(page, lambda: drag(page, "rate x", 0.25, 0.5))
+    assert (begin, end) == (pytest.approx(7.5, abs=0.2), pytest.approx(15.0, abs=0.2))
+    over = plot(page, "angle z").locator(".u-over")
+    box = over.bounding_box()
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 20)
+    for name in ("rate x", "rate y", "error z", "angle z"):  # one cursor, one window for all
+        expect(plot(page, name).locator("output")).to_contain_text("11.2")
+    plot(page, "rate z").locator(".chart").focus()
+    left = asked(page, lambda: page.keyboard.press("ArrowLeft"))
+    assert left == [
+        pytest.approx(begin - (end - begin) / 4, abs=0.01),
+        pytest.approx(end - (end - begin) / 4, abs=0.01),
+    ]
+    closer = asked(page, lambda: page.keyboard.press("+"))
+    assert closer[1] - closer[0] == pytest.approx((end - begin) / 2, abs=0.01)
+    whole = asked(page, over.dblclick)
+    assert whole[1] - whole[0] == pytest.approx(29.99, abs=0.1)
+
+
+def test_a_click_names_the_moment_for_a_remark(visit):
+    page = visit(f"/sessions/{SESSION}")
+    over = plot(page, "rate x").locator(".u-over")
+    over.click(position={"x": over.bounding_box()["width"] / 3, "y": 30})
+    moment = float(page.locator("#note input[name=at_s]").input_value())
+    assert moment == pytest.approx(10.0, abs=0.1) and f"t={moment:g}" in page.url
+
+
+def test_a_gap_stays_open_and_a_hidden_line_goes(visit):
+    page = visit(f"/sessions/{HOLED}")
+    inside, before = (0.36, 0.48), (0.05, 0.3)  # shares of 30 s
+    for name in ("rate x", "rate y", "angle z"):
+        assert page.evaluate(COLOURED, [name, *inside]) == 0.0
+        assert page.evaluate(COLOURED, [name, *before]) > 0.95
+    for line in page.locator(".legend button").all():
+        line.click()
+    assert page.locator(".legend [aria-pressed=true]").count() == 0
+    assert page.evaluate(COLOURED, ["rate x", *before]) == 0.0
+
+
+@pytest.mark.parametrize("path", [f"/sessions/{SESSION}", f"/compare?ids={SESSION},{HOLED}"])
+def test_on_a_phone_no_page_is_wider_than_the_screen(visit, path):
+    page = visit(path, PHONE, "light", has_touch=True, is_mobile=True)
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+    assert page.evaluate(COLOURED, ["rate x", 0.0, 0.3]) > 0.9
+
+
+def test_axes_follow_the_theme(visit):
+    """Their words are drawn, so a stylesheet alone does not change them."""
+    page = visit(f"/sessions/{SESSION}")
+    darkest = """() => { const c = document.querySelector("figure[data-plot='rate x'] canvas");
+      const d = c.getContext('2d').getImageData(0, 0, 50, c.height).data;
+      return Math.min(...Array.from({length: d.length / 4}, (_, k) => d[4 * k + 3] > 200
+        ? d[4 * k] + d[4 * k + 1] + d[4 * k + 2] : 765)); }"""
+    in_dark = page.evaluate(darkest)
+    page.locator("details.menu summary").click()
+    page.locator("[data-theme-toggle]").click()
+    assert page.evaluate(darkest) < in_dark - 100
