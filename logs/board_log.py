@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.layouts.layout import CUBE
+from inertial.layouts.catalogue import CUBE
 from inertial.navigation.fix import Fix
 from inertial.plausible import doubt_of_gravity, doubt_of_rate
 from inertial.timing import Timing

@@ -9,7 +9,6 @@ are comments, before the header and below it; empty lines are left out; the head
 The file is read in blocks, so memory grows with the numbers that are kept, not with the text.
 """
 
-import codecs
 import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -20,22 +19,22 @@ import pyarrow as pa
 import pyarrow.csv
 from numpy.typing import NDArray
 
+from logs.sheet_form import (
+    COMMENTS,
+    FIRST_LOOK,
+    MISSING,
+    SEPARATORS,
+    LogError,
+    count,
+    decimal_of,
+    decoded,
+    header_line,
+    is_number,
+)
+
 Array = NDArray[np.float64]
 
 BLOCK = 1 << 20  # bytes read at once; no line may be longer
-FIRST_LOOK = 1 << 16  # bytes in which the header must stand
-SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar"}
-COMMENTS = ("#", "%", "//")
-MISSING = ["", "NA", "N/A", "na", "nan", "NaN", "NAN", "null", "-"]
-MARKS = (
-    (codecs.BOM_UTF8, "utf-8"),
-    (codecs.BOM_UTF16_LE, "utf-16-le"),
-    (codecs.BOM_UTF16_BE, "utf-16-be"),
-)
-
-
-class LogError(ValueError):
-    """A log that cannot be used; names file, line and column, and says what was wanted."""
 
 
 @dataclass(frozen=True)
@@ -241,7 +240,7 @@ class Sheet:
                 continue
             for name, place in places:
                 cell = cells[place].strip() if place < len(cells) else ""
-                if cell and cell not in MISSING and not _is_number(cell, self.decimal):
+                if cell and cell not in MISSING and not is_number(cell, self.decimal):
                     return (
                         f"{self.path}:{number}: column {name!r}: {cell!r} is no finite number"
                         f"{self._comma_hint(cell)}; correct it, or leave the row out"
@@ -249,7 +248,7 @@ class Sheet:
         return ""
 
     def _comma_hint(self, cell: str) -> str:
-        if self.decimal == "." and _is_number(cell, ","):
+        if self.decimal == "." and is_number(cell, ","):
             return " (a decimal comma wants another separator of columns: semicolon or tab)"
         return ""
 
@@ -258,16 +257,16 @@ def open_sheet(path: Path) -> Sheet:
     """Find encoding, separator, decimal sign and header. Raises LogError, OSError."""
     with path.open("rb") as file:
         data = file.read(FIRST_LOOK)
-    encoding, text = _decoded(path, data, len(data) == FIRST_LOOK)
+    encoding, text = decoded(path, data, len(data) == FIRST_LOOK)
     lines = text.splitlines()
-    number = _header_line(lines)
+    number = header_line(lines)
     if number == 0:
         raise LogError(f"{path}: empty; want a header line with the columns' names, and samples")
     line = lines[number - 1]
-    separator = max(SEPARATORS, key=lambda s: _count(line, s))
+    separator = max(SEPARATORS, key=lambda s: count(line, s))
     names = next(csv.reader([line], delimiter=separator))
     header = tuple(name.strip().strip('"') for name in names)
-    if all(_is_number(name, ".") for name in header):
+    if all(is_number(name, ".") for name in header):
         raise LogError(
             f"{path}:{number}: numbers where the columns' names were expected ({line[:40]!r}); want"
             " a header line above the samples"
@@ -277,62 +276,8 @@ def open_sheet(path: Path) -> Sheet:
         raise LogError(
             f"{path}:{number}: column {twice[0]!r} stands there twice; rename or remove one"
         )
-    decimal = _decimal(lines[number:], separator)
+    decimal = decimal_of(lines[number:], separator)
     return Sheet(path, encoding, separator, decimal, header, number)
-
-
-def _header_line(lines: Sequence[str]) -> int:
-    """Number of the first line that is neither empty nor a comment; 0 without one."""
-    texts = (line.strip() for line in lines)
-    return next((k for k, s in enumerate(texts, 1) if s and not s.startswith(COMMENTS)), 0)
-
-
-def _decoded(path: Path, data: bytes, more: bool) -> tuple[str, str]:
-    """Encoding and text of the beginning of a file; `more` follows."""
-    for mark, encoding in MARKS:
-        if data.startswith(mark):
-            name = "utf-8-sig" if encoding == "utf-8" else "utf-16"
-            text = codecs.getincrementaldecoder(encoding)("replace").decode(data[len(mark) :])
-            return name, text
-    if b"\0" in data:
-        for encoding, zeros in (("utf-16-le", data[1::2]), ("utf-16-be", data[0::2])):
-            if zeros and zeros.count(0) > 0.4 * len(zeros):
-                return encoding, codecs.getincrementaldecoder(encoding)("replace").decode(data)
-        raise LogError(f"{path}: not a text file (it holds zero bytes); want CSV")
-    if more and b"\n" not in data and b"\r" not in data:
-        raise LogError(f"{path}:1: a line of more than {FIRST_LOOK >> 10} kB; want CSV")
-    try:
-        return "utf-8", codecs.getincrementaldecoder("utf-8")().decode(data, final=not more)
-    except UnicodeDecodeError:
-        return "cp1252", data.decode("cp1252", errors="replace")
-
-
-def _decimal(lines: Sequence[str], separator: str) -> str:
-    """The decimal sign: a comma where cells between other separators have one."""
-    if separator == ",":
-        return "."
-    for line in lines[:20]:
-        for cell in next(csv.reader([line], delimiter=separator), []):
-            if "," in cell and _is_number(cell, ","):
-                return ","
-    return "."
-
-
-def _count(line: str, separator: str) -> int:
-    """Separators outside of quotes."""
-    return (
-        sum(part.count(separator) for part in line.split('"')[0::2])
-        if '"' in line
-        else (line.count(separator))
-    )
-
-
-def _is_number(cell: str, decimal: str) -> bool:
-    try:
-        float(cell.strip().strip('"').replace(decimal, "."))
-    except ValueError:
-        return False
-    return True
 
 
 def _or(names) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from inertial.layouts.layout import CUBE  # noqa: E402
+from inertial.layouts.catalogue import CUBE  # noqa: E402
 from inertial.rate import sight  # noqa: E402
 from inertial.rate.estimators import ESTIMATORS  # noqa: E402
 from inertial.simulation.disturbed import CONDITIONS, Record, record  # noqa: E402

@@ -10,7 +10,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.layouts.layout import CUBE, Layout
+from inertial.layouts.catalogue import CUBE
+from inertial.layouts.layout import Layout
 
 Array = NDArray[np.float64]
 
