@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.constants import GRAVITY, MILLI_G
+from inertial.core import native
 
 Array = NDArray[np.float64]
 
@@ -220,7 +221,8 @@ class Layout:
                 f" {wanted} unknowns ({unknowns}): place axes off one plane and one line, four"
                 " triads at corners that span a tetrahedron see everything"
             )
-        return np.linalg.solve(matrix.T @ matrix, matrix.T)
+        # by the core, not by LAPACK: every estimate is made with it
+        return native.solve_positive(native.product(matrix.T, matrix), matrix.T)
 
 
 CORNERS = np.array(
