@@ -1,7 +1,5 @@
-"""Rate estimates of one batch as messages. Part of the shell: knows messages.
-
-This runs for every sample. What the samples of a batch share is put into bytes once; what the
-filter wrote into a row goes from there into the message as it stands.
+"""Rate estimates of one batch as a message, and what messages about a board have in common. Part
+of the shell: knows messages.
 """
 
 from typing import Any
@@ -9,111 +7,58 @@ from typing import Any
 import numpy as np
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 
-from estimator.convert.header import moment
-from estimator.packed import Doubles
+from estimator.convert.header import sample_header
+from estimator.devices.rate import RateOutput
+from inertial.rate.batch import TACHOMETER, RateColumns
 from messages.contract import gyrofree_pb2 as pb
 
-MOST_SHARED = 64  # combinations of what few samples change; a clock that is adjusted makes new ones
-_NONE = np.zeros(0)
-_ARRAYS = Doubles(
-    pb.RateEstimate,
-    "omega_ib_b_radps",
-    "omega_covariance",
-    "alpha_b_radps2",
-    "f_b_mps2",
-    "q_nb",
-    "innovation",
-    "innovation_sigma",
-    "p_n_m",
-    "v_n_mps",
-    "bias",
-    "bound_sigma_radps",
-)
+
+def rate_batch(batch: pb.AccelBatch, card: str, said: RateOutput) -> pb.RateBatch:
+    """What an estimator says of samples of a batch, as published; the publisher counts the
+    sequence. card: id of the calibration file in use, empty for none.
+    """
+    columns = said.columns
+    message = pb.RateBatch(
+        header=sample_header(batch.header, said.row * batch.period_s),
+        estimator=said.estimator,
+        for_sequence=batch.header.sequence,
+        for_index=said.index,
+        innovation_unit=columns.innovation_unit,
+        sight_reason=_sight_reason(columns),
+        calibration=card,
+        excluded_mask=columns.excluded,
+        aid=TACHOMETER if columns.aided.any() else "",
+        period_s=said.step * batch.period_s,
+        index_step=said.step,
+    )
+    for field, column in (
+        (message.omega_ib_b_radps, columns.omega_b),
+        (message.omega_covariance, columns.P),
+        (message.alpha_b_radps2, columns.alpha_b),
+        (message.f_b_mps2, columns.f_b),
+        (message.q_nb, columns.q_nb),
+        (message.angle_z_rad, columns.angle_z),
+        (message.nis, columns.nis),
+        (message.nis_dof, columns.nis_dof),
+        (message.still, columns.still),
+        (message.p_n_m, columns.p_n),
+        (message.v_n_mps, columns.v_n),
+        (message.bias, columns.bias),
+        (message.sight, columns.sight),
+    ):
+        field.extend(column.ravel().tolist())
+    if columns.nis_dof.any():
+        message.innovation.extend(columns.innovation.ravel().tolist())
+        message.innovation_sigma.extend(columns.innovation_sigma.ravel().tolist())
+    if columns.bound_sigma.any():
+        message.bound_sigma_radps.extend(columns.bound_sigma.ravel().tolist())
+    return message
 
 
-class RateMessages:
-    """Messages about the samples of one batch."""
-
-    def __init__(
-        self, batch: pb.AccelBatch, card: str, shared: dict[tuple[Any, ...], bytes] | None = None
-    ) -> None:
-        """card: id of the calibration file in use, empty for none; shared: what batches of one
-        board have in common.
-        """
-        first = batch.header
-        self._header, self._period_s, self._sequence = first, batch.period_s, first.sequence
-        self._device_us, self._utc_ns = first.device_us, first.utc_ns
-        self._of_batch = (
-            first.device,
-            first.epoch,
-            first.utc_sigma_s,
-            first.source,
-            first.run,
-            card,
-        )
-        self._shared = {} if shared is None else shared
-
-    def estimate(self, row: int, index: int, name: str, state: Any) -> pb.RateEstimate:
-        """RateState after sample `index`, which is `row` of the batch, as
-        published.
-        """
-        key = (
-            name,
-            state.still,
-            state.nis_dof,
-            state.sight,
-            state.excluded,
-            state.aid,
-            self._of_batch,
-        )
-        shared = self._shared.get(key)
-        if shared is None:
-            if len(self._shared) >= MOST_SHARED:
-                self._shared.clear()
-            shared = self._shared[key] = self._share(name, state)
-        message = pb.RateEstimate()
-        message.MergeFromString(shared + self._numbers(state))
-        header = message.header
-        header.device_us, header.utc_ns = moment(
-            self._device_us, self._utc_ns, row * self._period_s
-        )
-        message.for_sequence, message.for_index = self._sequence, index
-        if state.sight_reason:
-            message.sight_reason = state.sight_reason
-        return message
-
-    def _share(self, name: str, state: Any) -> bytes:
-        """Fields that have few values; the publisher counts the sequence."""
-        message = pb.RateEstimate(
-            header=self._header,
-            estimator=name,
-            nis_dof=state.nis_dof,
-            still=state.still,
-            innovation_unit=state.innovation_unit,
-            sight=state.sight,
-            calibration=self._of_batch[-1],
-            excluded_mask=state.excluded,
-            aid=state.aid,
-        )
-        message.header.sequence, message.header.late = 0, False
-        return message.SerializeToString()
-
-    def _numbers(self, state: Any) -> bytes:
-        bound = state.bound_sigma
-        message = pb.RateEstimate(angle_z_rad=state.angle_z, nis=state.nis)
-        return message.SerializeToString() + _ARRAYS.wire(
-            state.omega_b,
-            state.P,
-            state.alpha_b,
-            state.f_b,
-            state.q_nb,
-            state.innovation,
-            state.innovation_sigma,
-            state.p_n,
-            state.v_n,
-            state.bias,
-            _NONE if bound is None else bound,
-        )
+def _sight_reason(columns: RateColumns) -> str:
+    """Why the last sample that has a component which is not valid has it; empty: all are."""
+    unseen = np.flatnonzero(columns.sight.any(axis=1))
+    return columns.sight_reason(int(unseen[-1])) if len(unseen) else ""
 
 
 class BoardMessages:
@@ -121,7 +66,6 @@ class BoardMessages:
 
     def __init__(self, device: str, layout: Any) -> None:
         self._device = device
-        self.shared: dict[tuple[Any, ...], bytes] = {}  # of RateMessages
         self._poses: dict[str, bytes] = {}
         axes = pb.AxisHealth(layout=layout.name, scale_m=layout.scale_m)
         for name, position, direction in zip(

@@ -5,7 +5,6 @@ numba notices a change of the file a compiled function is in, not of a file that
 a cache older than any source of this folder is thrown away first.
 """
 
-import itertools
 import logging
 import time
 from pathlib import Path
@@ -15,16 +14,9 @@ import numpy as np
 import inertial
 from inertial.attitude.filters import ATTITUDES
 from inertial.navigation.alignment_motion import MotionSettings, MotionWindow
-from inertial.rate.estimators import ESTIMATORS
-from inertial.rate.health import HealthMonitor
-from inertial.simulation.faults import AxisFault, Faults
-from inertial.simulation.table import TableTest
 
 log = logging.getLogger(__name__)
 
-RATE_SAMPLES = (
-    800  # at 100 Hz: the standstill of the published test and the start of the first turn
-)
 HERE = Path(inertial.__file__).resolve().parent
 
 
@@ -44,7 +36,7 @@ def drop_stale(folder: Path = HERE) -> int:
 
 
 def _compiles(source: str) -> bool:
-    return any(word in source for word in ("@njit", "@intrinsic", "rate.compiling import"))
+    return any(word in source for word in ("@njit", "@intrinsic"))
 
 
 def warm() -> None:
@@ -53,20 +45,10 @@ def warm() -> None:
     """
     logging.disable(logging.INFO)  # the made-up motion is no news
     try:
-        _warm_rates()
-        _warm_health()
         _warm_attitudes()
         _warm_alignment()
     finally:
         logging.disable(logging.NOTSET)
-
-
-def _warm_rates() -> None:
-    test = TableTest()
-    for make in ESTIMATORS.values():
-        estimator = make(test.layout)
-        for index, sample in enumerate(itertools.islice(test, RATE_SAMPLES)):
-            estimator.step(index, sample.t_s, sample.counts * test.sensor.count)
 
 
 def _warm_alignment() -> None:
@@ -86,19 +68,6 @@ def _warm_attitudes() -> None:
         attitude = make(0.01)
         for _ in range(2):
             attitude.step(np.array([0.0, 0.0, -9.8]), np.zeros(3))
-
-
-def _warm_health() -> None:
-    """Samples of a standstill, then with an axis off, so that the hypotheses compile too."""
-    test = TableTest()
-    monitor = HealthMonitor(test.layout)
-    spoilt = Faults([AxisFault(3, "biased", 4.0)]).into(test.block(0))
-    for t, readings in zip(spoilt.t_s, spoilt.readings, strict=True):
-        monitor.step(float(t), readings)
-    if not monitor.mask:
-        raise RuntimeError(
-            "the made-up fault was not found: warm.py does not fit health.py any more"
-        )
 
 
 def main() -> None:

@@ -9,10 +9,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from dashboard.data.device import Device
-from dashboard.data.pose import ned_from_geodetic, roll_pitch, yaw_of
+from dashboard.data.pose import ned_from_geodetic, roll_pitch, yaw_of, yaws_of
 from dashboard.data.tables import ADC_CHANNELS
 from dashboard.data.track import Track
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract import rates
 
 FIXES_REMEMBERED = 100  # until the filter has said whether it believes them
 NAV_SPACING_M, FIX_SPACING_M = 0.3, 0.5  # between the points of a track
@@ -31,6 +32,11 @@ def fitted(values: np.ndarray | Sequence[float], width: int) -> np.ndarray:
     out = np.full((len(found), width), np.nan)
     out[:, : found.shape[1]] = found
     return out
+
+
+def known(rows: np.ndarray) -> np.ndarray:
+    """Rows that are all zero say nothing: NaN."""
+    return np.where(np.any(rows != 0.0, axis=1, keepdims=True), rows, np.nan)
 
 
 def sigmas(covariance: np.ndarray) -> np.ndarray:
@@ -79,21 +85,27 @@ def _truth(device: Device, estimator: str, t: float, m: pb.Truth) -> None:
     )
 
 
-def _rate(device: Device, estimator: str, t: float, m: pb.RateEstimate) -> None:
+def _rate(device: Device, estimator: str, t: float, m: pb.RateBatch) -> None:
+    n = rates.count(m)
+    dof = fields(m.nis_dof, 1, n)
+    corrected = dof > 0.0
+    m_innovation = len(m.innovation) // n
     device.ring("rate", estimator).append(
-        t,
-        omega_ib_b=fields(m.omega_ib_b_radps, 3),
-        sigma=sigmas(fields(m.omega_covariance, 9)),
-        bound=fields(m.bound_sigma_radps, 3),
-        sight=fields(m.sight, 3),
-        f_b=fields(m.f_b_mps2, 3),
-        angle_z=m.angle_z_rad,
-        yaw=yaw_of(m.q_nb),
-        p_n=fields(m.p_n_m, 3),
-        innovation=fitted(m.innovation, 6),
-        innovation_sigma=fitted(m.innovation_sigma, 6),
-        nis=m.nis if m.nis_dof else np.nan,
-        nis_dof=m.nis_dof,
+        t + m.period_s * np.arange(n),
+        omega_ib_b=fields(m.omega_ib_b_radps, 3, n),
+        sigma=sigmas(fields(m.omega_covariance, 9, n)),
+        bound=known(fields(m.bound_sigma_radps, 3, n)),
+        sight=fields(m.sight, 3, n),
+        f_b=fields(m.f_b_mps2, 3, n),
+        angle_z=fields(m.angle_z_rad, 1, n)[:, 0],
+        yaw=yaws_of(fields(m.q_nb, 4, n)),
+        p_n=fields(m.p_n_m, 3, n),
+        innovation=np.where(corrected, fitted(fields(m.innovation, m_innovation, n), 6), np.nan),
+        innovation_sigma=np.where(
+            corrected, fitted(fields(m.innovation_sigma, m_innovation, n), 6), np.nan
+        ),
+        nis=np.where(corrected, fields(m.nis, 1, n), np.nan)[:, 0],
+        nis_dof=dof[:, 0],
     )
 
 

@@ -20,6 +20,12 @@ def yaw_of(q_nb: Sequence[float]) -> float:
     return float(euler_angles(to_matrix(q_nb))[2]) if len(q_nb) == 4 else math.nan
 
 
+def yaws_of(q_nb: np.ndarray) -> np.ndarray:
+    """Headings (n,) of q_nb (n, 4) w x y z, rad; NaN for NaN."""
+    w, x, y, z = q_nb.T
+    return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
 def ned_from_geodetic(
     latitude_deg: float, longitude_deg: float, height_m: float, origin: tuple[float, float, float]
 ) -> np.ndarray:

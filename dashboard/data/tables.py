@@ -47,7 +47,7 @@ TRUTH = Table(
     (Column("omega_ib_b", "rad/s", 3), Column("f_b", "m/s²", 3), Column("angle_z", "rad")),
 )
 RATE = Table(
-    tp.RATE.rate,
+    tp.RATE.rate,  # rows, not messages
     (
         Column("omega_ib_b", "rad/s", 3),
         Column("sigma", "rad/s", 3),  # of omega_ib_b

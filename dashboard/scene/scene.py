@@ -182,7 +182,7 @@ class SceneView:
     def _update_cube(self, device: Device, estimators: list[str]) -> None:
         reference = None
         for name in reversed(estimators):
-            reference = geo.quaternion(device.get("rate", name).message.q_nb)
+            reference = geo.quaternion(device.get("rate", name).message.q_nb[-4:])  # the last
             self._set(f"/world/estimate/{name}/body", q=reference)
         truth = device.get("truth")
         if truth is not None:
@@ -217,7 +217,7 @@ class SceneView:
 
     def _update_rate_arrow(self, path: str, device: Device, estimator: str) -> None:
         node, label = self._nodes.get(path), self._nodes.get(f"{path}_label")
-        omega = np.asarray(device.get("rate", estimator).message.omega_ib_b_radps, dtype=float)
+        omega = np.asarray(device.get("rate", estimator).message.omega_ib_b_radps[-3:], dtype=float)
         if node is None or omega.shape != (3,) or not np.all(np.isfinite(omega)):
             return
         size = float(np.linalg.norm(omega))

@@ -104,14 +104,19 @@ class GyroFreeNavigation:
         if not mine:
             return []
         step = every(period_s, self._rate_limit)  # one estimate in so many samples
-        t = t_s[[o.row for o in mine]]
+        rows = np.concatenate([o.row + step * np.arange(len(o.columns)) for o in mine])
         f_b, omega_b = (
-            np.array([o.state.f_b for o in mine]),
-            np.array([o.state.omega_b for o in mine]),
+            np.concatenate([o.columns.f_b for o in mine]),
+            np.concatenate([o.columns.omega_b for o in mine]),
         )
-        self._believe(mine[-1].state.P)
-        out = self.board.feed(epoch, mine[0].index // step, step * period_s, t, f_b, omega_b)
-        return [NavOutput(mine[o.row].row, mine[o.row].index, o.estimator, o.what) for o in out]
+        self._believe(mine[-1].columns.P[-1])
+        first = mine[0].index
+        out = self.board.feed(epoch, first // step, step * period_s, t_s[rows], f_b, omega_b)
+        told = [int(rows[o.row]) for o in out]
+        return [
+            NavOutput(row, first + row - mine[0].row, o.estimator, o.what)
+            for row, o in zip(told, out, strict=True)
+        ]
 
     def _believe(self, P_omega: Array) -> None:
         """Let the filters' process noise be what the rate estimator says of itself now."""

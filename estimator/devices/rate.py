@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from estimator.stream import Stream, every, worth_a_line
 from inertial.layouts.layout import GeometryError
+from inertial.rate.batch import RateColumns, RateState
 from inertial.rate.beliefs import Beliefs, make
 
 log = logging.getLogger(__name__)
@@ -21,12 +22,13 @@ class WrongAxes(ValueError):
 
 
 class RateOutput(NamedTuple):
-    """State of one estimator after the sample of this index."""
+    """What one estimator says of a part of a batch in which it used the same axes."""
 
-    row: int  # of the batch
-    index: int
+    row: int  # of the batch: the first sample that is told
+    index: int  # sample index of it
+    step: int  # each step-th sample is told
     estimator: str
-    state: Any  # inertial.rate.RateState
+    columns: RateColumns  # of the samples that are told
 
 
 class RateBoard:
@@ -53,7 +55,7 @@ class RateBoard:
         self.wiring = layout  # which column of the board is which axis
         self.layout = layout if card is None else card.layout(layout)
         self.stream = Stream()
-        self.last: dict[str, Any] = {}  # newest RateState by estimator
+        self._last: dict[str, RateColumns] = {}  # newest by estimator
         self._make = {name: VARIANTS[name] for name in names}
         self.cost_ns = dict.fromkeys(names, 0)  # spent in each estimator, and for how many samples
         self.cost_samples = dict.fromkeys(names, 0)
@@ -65,7 +67,7 @@ class RateBoard:
         self._mask = 0  # axes that the estimators were told to leave out
 
     def _start(self, reason: str) -> None:
-        from inertial.rate.health import HealthMonitor  # here: it compiles
+        from inertial.rate.health import HealthMonitor  # here: loads only where it is needed
 
         if reason:
             log.warning("%s: %s: rate estimators start anew", self.device, reason)
@@ -136,26 +138,24 @@ class RateBoard:
     def _run(
         self, first_index: int, begin: int, t_s: Array, f_axis: Array, step: int
     ) -> list[RateOutput]:
-        """Every estimator over one part of a batch; outputs sample by sample, as if fed so."""
-        n, first = len(t_s), first_index + begin
-        wanted = list(range((step - 1 - first) % step, n, step))
-        asked = (
-            wanted if wanted and wanted[-1] == n - 1 else [*wanted, n - 1]
-        )  # the newest state is always known
-        by_name = []
+        """Every estimator over one part of a batch; each step-th sample is told."""
+        first = first_index + begin
+        told = slice((step - 1 - first) % step, len(t_s), step)
+        out = []
         for name, estimator in self._estimators.items():
             began = time.perf_counter_ns()  # told by EstimatorStatus, touches no estimate
-            columns = estimator.feed(t_s, f_axis)
-            states = [columns.state(k) for k in asked]
-            self.last[name] = states[-1]
+            columns = self._last[name] = estimator.feed(t_s, f_axis)
             self.cost_ns[name] += time.perf_counter_ns() - began
-            self.cost_samples[name] += n
-            by_name.append((name, states))
-        return [
-            RateOutput(begin + row, first + row, name, states[k])
-            for k, row in enumerate(wanted)
-            for name, states in by_name
-        ]
+            self.cost_samples[name] += len(t_s)
+            if told.start < len(t_s):
+                rows = columns if step == 1 else columns.part(told)
+                out.append(RateOutput(begin + told.start, first + told.start, step, name, rows))
+        return out
+
+    def newest(self, name: str) -> RateState:
+        """What an estimator said last."""
+        columns = self._last[name]
+        return columns.state(len(columns) - 1)
 
     def tacho(self, t_s: float, rate: float, sigma: float, signed: bool) -> None:
         """A tachometer's report to all estimators (RateEstimator.tacho)."""

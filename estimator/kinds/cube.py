@@ -4,14 +4,14 @@ In: AccelBatch; TachoRate where the tachometer aids; fixes for navigation withou
 Estimators: the rate estimators of [estimator] rate, side by side (devices/rate.py), the axis health
 monitor, a guided calibration while one runs, and navigation on the cube's own rate where it is
 asked for (devices/gyro_free.py).
-Out: RateEstimate, pose, AxisHealth, CalibrationStatus, EstimatorStatus, and the messages of
+Out: RateBatch, pose, AxisHealth, CalibrationStatus, EstimatorStatus, and the messages of
 kinds/navigation.py.
 """
 
 from typing import Any
 
 from estimator.choice import beliefs, load_card, make_layout
-from estimator.convert.header import sample_header
+from estimator.convert.header import moment, sample_header
 from estimator.convert.samples import BadMessage, Samples, accel_samples, tacho_report
 from estimator.convert.status import rate_state
 from estimator.devices.gyro_free import GyroFreeNavigation
@@ -21,7 +21,7 @@ from estimator.kinds.common import Common
 from estimator.kinds.navigation import navigated
 from estimator.orders.calibration import CalibrationDesk
 from estimator.output import Output
-from estimator.rate_messages import BoardMessages, RateMessages
+from estimator.rate_messages import BoardMessages, rate_batch
 from estimator.stream import every
 from inertial.calibration.card import CardError
 from inertial.navigation.navigation import NavigatorConfig
@@ -128,15 +128,18 @@ class Cube:
         messages: BoardMessages,
         states: list[RateOutput],
     ) -> list[Output]:
-        """States as messages, and poses now and then."""
+        """A message of each estimator, and poses now and then."""
         device, step, out = self._device, every(batch.period_s, POSE_HZ), []
         card = "" if board.card is None else board.card.id
-        estimates = RateMessages(batch, card, messages.shared)
-        for row, index, name, state in states:
-            out.append(Output(RATE, device, name, estimates.estimate(row, index, name, state)))
-            if index % step == step - 1:
-                utc_ns = out[-1].message.header.utc_ns
-                out.append(Output(POSE, device, name, messages.pose(name, utc_ns, state.q_nb)))
+        for said in states:
+            message = rate_batch(batch, card, said)
+            out.append(Output(RATE, device, said.estimator, message))
+            for k in range(len(said.columns)):
+                if (said.index + k * said.step) % step == step - 1:
+                    row = said.row + k * said.step
+                    _, utc_ns = moment(0, batch.header.utc_ns, row * batch.period_s)
+                    pose = messages.pose(said.estimator, utc_ns, said.columns.q_nb[k])
+                    out.append(Output(POSE, device, said.estimator, pose))
         return out
 
     def _health(
@@ -159,6 +162,6 @@ class Cube:
 
     def _status(self, header: pb.Header, board: RateBoard, name: str) -> pb.EstimatorStatus:
         status: Any = self._common.status(header, board.stream, name)
-        status = rate_state(status, board.last[name])
+        status = rate_state(status, board.newest(name))
         status.layout, status.us_per_sample = board.layout.name, board.cost_us(name)
         return status

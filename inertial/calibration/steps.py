@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 from inertial.calibration.fit import CalibrationError
 from inertial.calibration.model import Steps
@@ -45,6 +44,8 @@ def blocks(
     t, w = cut(t_s), cut(tacho)
     # a cubic through 11 readings: exact on a ramp that bends, where a straight line through a block
     # is not
+    from scipy.signal import savgol_filter  # here: heavy, and only a calibration needs it
+
     alpha = savgol_filter(tacho, min(11, len(tacho) // 2 * 2 - 1), 3, deriv=1, delta=period_s)
     whole = (t[:, -1] - t[:, 0]) < 1.5 * size * period_s
     return Steps(

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from inertial.core import navigation as core
 from inertial.earth import ned_between
@@ -61,8 +61,8 @@ class DragWatch:
     def __init__(self, settings: DragSettings = DragSettings()) -> None:
         s = self.settings = settings
         self.dragging = False
-        self._gate, self._calm = float(chi2.isf(s.false_alarm, 3)), float(chi2.isf(s.calm, 3))
-        self._jump = float(chi2.isf(s.gross, 3))
+        self._gate, self._calm = float(chdtri(3, s.false_alarm)), float(chdtri(3, s.calm))
+        self._jump = float(chdtri(3, s.gross))
         self._last: Fix | None = None
         self._lag, self._sigma_lag = 0.0, s.sigma_lag
         self._contradicted = 0

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from inertial.core import navigation as core
 
@@ -103,7 +103,7 @@ _GATES: dict[tuple[float, int], float] = {}
 def _gate(false_alarm: float, dof: int) -> float:
     key = (false_alarm, dof)
     if key not in _GATES:
-        _GATES[key] = float(chi2.isf(false_alarm, dof))
+        _GATES[key] = float(chdtri(dof, false_alarm))
     return _GATES[key]
 
 

@@ -4,7 +4,7 @@ Frames and units as everywhere: b body, n north-east-down, SI, quaternions w x y
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 
 import numpy as np
@@ -111,6 +111,15 @@ class RateColumns:
 
     def __len__(self) -> int:
         return len(self.nis)
+
+    def part(self, rows: slice) -> "RateColumns":
+        """Some of the samples; views, not copies."""
+        parts = {
+            f.name: value[rows]
+            for f in fields(self)
+            if isinstance(value := getattr(self, f.name), np.ndarray)
+        }
+        return replace(self, **parts)
 
     @property
     def started(self) -> NDArray[np.bool_]:

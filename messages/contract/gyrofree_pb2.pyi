@@ -290,6 +290,64 @@ class AdcBatch(_message.Message):
     gyro_v_per_radps: float
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., first_index: _Optional[int] = ..., period_s: _Optional[float] = ..., channels: _Optional[int] = ..., counts: _Optional[_Iterable[int]] = ..., volt_per_count: _Optional[float] = ..., lost_samples: _Optional[int] = ..., frame_sequence: _Optional[int] = ..., received_ns: _Optional[int] = ..., channel_mask: _Optional[int] = ..., zero_g_v: _Optional[float] = ..., accel_v_per_mps2: _Optional[float] = ..., zero_rate_v: _Optional[float] = ..., gyro_v_per_radps: _Optional[float] = ...) -> None: ...
 
+class RateBatch(_message.Message):
+    __slots__ = ("header", "estimator", "for_sequence", "for_index", "omega_ib_b_radps", "omega_covariance", "alpha_b_radps2", "f_b_mps2", "q_nb", "angle_z_rad", "innovation", "innovation_sigma", "nis", "nis_dof", "still", "p_n_m", "v_n_mps", "bias", "innovation_unit", "sight", "sight_reason", "bound_sigma_radps", "calibration", "excluded_mask", "aid", "period_s", "index_step")
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    ESTIMATOR_FIELD_NUMBER: _ClassVar[int]
+    FOR_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    FOR_INDEX_FIELD_NUMBER: _ClassVar[int]
+    OMEGA_IB_B_RADPS_FIELD_NUMBER: _ClassVar[int]
+    OMEGA_COVARIANCE_FIELD_NUMBER: _ClassVar[int]
+    ALPHA_B_RADPS2_FIELD_NUMBER: _ClassVar[int]
+    F_B_MPS2_FIELD_NUMBER: _ClassVar[int]
+    Q_NB_FIELD_NUMBER: _ClassVar[int]
+    ANGLE_Z_RAD_FIELD_NUMBER: _ClassVar[int]
+    INNOVATION_FIELD_NUMBER: _ClassVar[int]
+    INNOVATION_SIGMA_FIELD_NUMBER: _ClassVar[int]
+    NIS_FIELD_NUMBER: _ClassVar[int]
+    NIS_DOF_FIELD_NUMBER: _ClassVar[int]
+    STILL_FIELD_NUMBER: _ClassVar[int]
+    P_N_M_FIELD_NUMBER: _ClassVar[int]
+    V_N_MPS_FIELD_NUMBER: _ClassVar[int]
+    BIAS_FIELD_NUMBER: _ClassVar[int]
+    INNOVATION_UNIT_FIELD_NUMBER: _ClassVar[int]
+    SIGHT_FIELD_NUMBER: _ClassVar[int]
+    SIGHT_REASON_FIELD_NUMBER: _ClassVar[int]
+    BOUND_SIGMA_RADPS_FIELD_NUMBER: _ClassVar[int]
+    CALIBRATION_FIELD_NUMBER: _ClassVar[int]
+    EXCLUDED_MASK_FIELD_NUMBER: _ClassVar[int]
+    AID_FIELD_NUMBER: _ClassVar[int]
+    PERIOD_S_FIELD_NUMBER: _ClassVar[int]
+    INDEX_STEP_FIELD_NUMBER: _ClassVar[int]
+    header: Header
+    estimator: str
+    for_sequence: int
+    for_index: int
+    omega_ib_b_radps: _containers.RepeatedScalarFieldContainer[float]
+    omega_covariance: _containers.RepeatedScalarFieldContainer[float]
+    alpha_b_radps2: _containers.RepeatedScalarFieldContainer[float]
+    f_b_mps2: _containers.RepeatedScalarFieldContainer[float]
+    q_nb: _containers.RepeatedScalarFieldContainer[float]
+    angle_z_rad: _containers.RepeatedScalarFieldContainer[float]
+    innovation: _containers.RepeatedScalarFieldContainer[float]
+    innovation_sigma: _containers.RepeatedScalarFieldContainer[float]
+    nis: _containers.RepeatedScalarFieldContainer[float]
+    nis_dof: _containers.RepeatedScalarFieldContainer[int]
+    still: _containers.RepeatedScalarFieldContainer[bool]
+    p_n_m: _containers.RepeatedScalarFieldContainer[float]
+    v_n_mps: _containers.RepeatedScalarFieldContainer[float]
+    bias: _containers.RepeatedScalarFieldContainer[float]
+    innovation_unit: str
+    sight: _containers.RepeatedScalarFieldContainer[RateEstimate.Sight]
+    sight_reason: str
+    bound_sigma_radps: _containers.RepeatedScalarFieldContainer[float]
+    calibration: str
+    excluded_mask: int
+    aid: str
+    period_s: float
+    index_step: int
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., for_sequence: _Optional[int] = ..., for_index: _Optional[int] = ..., omega_ib_b_radps: _Optional[_Iterable[float]] = ..., omega_covariance: _Optional[_Iterable[float]] = ..., alpha_b_radps2: _Optional[_Iterable[float]] = ..., f_b_mps2: _Optional[_Iterable[float]] = ..., q_nb: _Optional[_Iterable[float]] = ..., angle_z_rad: _Optional[_Iterable[float]] = ..., innovation: _Optional[_Iterable[float]] = ..., innovation_sigma: _Optional[_Iterable[float]] = ..., nis: _Optional[_Iterable[float]] = ..., nis_dof: _Optional[_Iterable[int]] = ..., still: _Optional[_Iterable[bool]] = ..., p_n_m: _Optional[_Iterable[float]] = ..., v_n_mps: _Optional[_Iterable[float]] = ..., bias: _Optional[_Iterable[float]] = ..., innovation_unit: _Optional[str] = ..., sight: _Optional[_Iterable[_Union[RateEstimate.Sight, str]]] = ..., sight_reason: _Optional[str] = ..., bound_sigma_radps: _Optional[_Iterable[float]] = ..., calibration: _Optional[str] = ..., excluded_mask: _Optional[int] = ..., aid: _Optional[str] = ..., period_s: _Optional[float] = ..., index_step: _Optional[int] = ...) -> None: ...
+
 class RateEstimate(_message.Message):
     __slots__ = ("header", "estimator", "for_sequence", "for_index", "omega_ib_b_radps", "omega_covariance", "alpha_b_radps2", "f_b_mps2", "q_nb", "angle_z_rad", "innovation", "innovation_sigma", "nis", "nis_dof", "still", "p_n_m", "v_n_mps", "bias", "innovation_unit", "sight", "sight_reason", "bound_sigma_radps", "calibration", "excluded_mask", "aid")
     class Sight(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):

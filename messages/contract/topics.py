@@ -65,7 +65,7 @@ LINK = Topic("link", pb.LinkStatus, 1, "gateway", "state and ledger of the line"
 BOARD = Topic("board", pb.BoardInfo, 0.1, "gateway", "what the board says of itself")
 TRUTH = Topic("truth", pb.Truth, 100, "simulator", "true motion; simulated boards only")
 RATE = Topic(
-    "rate", pb.RateEstimate, 100, "estimator", "gyro-free rotation estimate", per_estimator=True
+    "rate", pb.RateBatch, 100, "estimator", "gyro-free rotation estimates", per_estimator=True
 )
 NAV = Topic("nav", pb.NavSolution, 20, "estimator", "INS/GNSS solution", per_estimator=True)
 INNOVATION = Topic(

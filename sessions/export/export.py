@@ -2,26 +2,31 @@
 describes the files.
 
 csv      one file per bus key            parquet  one file per bus key, zstd
-mat      one file, a struct per key      mcap     the same recording, cut by time or topic; the
-bytes are the bus's own kml/gpx  tracks of fixes and of every navigation filter
+mat      one file, a struct per key      mcap     the same recording, cut by time or topic; rate
+kml/gpx  tracks of fixes and of every             estimates one by one, all else as on the bus
+         navigation filter
 
 Big recordings stream: only mat holds all in memory.
 """
 
 import csv
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 from scipy.io import savemat
 
-from messages.contract.topics import GNSS, LOG, NAV, parse
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract import rates
+from messages.contract.topics import GNSS, LOG, NAV, RATE, Topic, parse
 from sessions.export.columns import Column
 from sessions.export.table import (
     Block,
@@ -34,8 +39,10 @@ from sessions.export.table import (
     tables,
 )
 from sessions.export.track import write_gpx, write_kml
-from sessions.recording.mcap_log import Damage, McapLog, read
+from sessions.recording.mcap_log import Damage, McapLog, Recorded, read
+from sessions.recording.samples import decode
 
+RATE_ESTIMATE: Topic = replace(RATE, type=pb.RateEstimate)  # one sample of a batch
 ROW_GROUP = 20_000  # rows of Parquet written at once
 
 
@@ -173,13 +180,13 @@ def to_mcap(
                 selection.takes(topic)
                 and selection.start_s <= (row.log_ns - start) / 1e9 <= selection.end_s
             ):
-                count += 1
-                log.add(
-                    log.open_channel(row.key, topic), row.log_ns, row.publish_ns, row.payload, count
-                )
-                if count % 5000 == 0:
-                    log.push()
-                    progress(0.5, "cutting")
+                for kind, log_ns, publish_ns, payload in _single(topic, row):
+                    count += 1
+                    channel = log.open_channel(row.key, kind)
+                    log.add(channel, log_ns, publish_ns, payload, count)
+                    if count % 5000 == 0:
+                        log.push()
+                        progress(0.5, "cutting")
         log.finish()
         log.push()
     if not count:
@@ -187,6 +194,24 @@ def to_mcap(
         raise ExportError(f"{path}: no message of the wanted topics and time")
     progress(1.0, "cut")
     return [target]
+
+
+def _single(topic: Topic, row: Recorded) -> Iterator[tuple[Topic, int, int, bytes]]:
+    """Type, receive and publish time and bytes of a message in the copy: rate estimates one by one, each at its
+    own time before the last of its batch, because other viewers draw numbers that stand alone.
+    """
+    if topic is not RATE:
+        yield topic, row.log_ns, row.publish_ns, row.payload
+        return
+    try:
+        batch = decode(topic, row.payload)
+    except DecodeError:
+        return
+    last_ns = batch.header.utc_ns + round((rates.count(batch) - 1) * batch.period_s * 1e9)
+    for one in rates.rows(batch):
+        own_ns = one.header.utc_ns
+        log_ns = row.log_ns - (last_ns - own_ns)
+        yield RATE_ESTIMATE, log_ns, own_ns or log_ns, one.SerializeToString()
 
 
 def to_kml(

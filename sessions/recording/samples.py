@@ -7,7 +7,7 @@ through here, so what an older version wrote is brought into the present form he
 
 import json
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,8 @@ from google.protobuf.json_format import MessageToDict
 from google.protobuf.message import Message
 from numpy.typing import NDArray
 
-from messages.contract.topics import ACCEL, ADC, IMU, Topic
+from messages.contract import rates
+from messages.contract.topics import ACCEL, ADC, IMU, RATE, Topic
 
 Column = NDArray[Any]
 
@@ -34,7 +35,10 @@ BATCHES: dict[str, tuple[str, ...]] = {  # topic -> its fields with one entry pe
     ACCEL.name: ("counts", "f_mps2"),
     IMU.name: ("f_b_mps2", "omega_ib_b_radps"),
     ADC.name: ("counts",),
+    RATE.name: (*rates.ROWS, *rates.NUMBERS),
 }
+NUMBERS = {RATE.name: rates.NUMBERS}  # topic -> fields with one number per sample of a batch
+HIDDEN = {RATE.name: rates.BETWEEN}  # topic -> fields that rows of their own do not need
 HEADER = ("sequence", "run", "epoch", "device_us", "utc_sigma_s", "source", "late")
 MANY = 1000  # messages that are made into columns at once
 
@@ -56,7 +60,8 @@ class Samples:
 
 def decode(topic: Topic, payload: bytes) -> Message:
     """A recorded message of this topic in its present form. Raises DecodeError."""
-    return topic.type.FromString(payload)
+    message = topic.type.FromString(payload)
+    return rates.complete(message) if topic is RATE else message
 
 
 def has_header(topic: Topic) -> bool:
@@ -66,7 +71,8 @@ def has_header(topic: Topic) -> bool:
 
 def fields_of(topic: Topic) -> list[FieldDescriptor]:
     """The fields that become columns: all but the header."""
-    return [field for field in topic.type.DESCRIPTOR.fields if field.name != "header"]
+    hidden = ("header", *HIDDEN.get(topic.name, ()))
+    return [field for field in topic.type.DESCRIPTOR.fields if field.name not in hidden]
 
 
 def is_number(field: FieldDescriptor) -> bool:
@@ -74,9 +80,9 @@ def is_number(field: FieldDescriptor) -> bool:
     return field.cpp_type in KINDS
 
 
-def is_vector(field: FieldDescriptor) -> bool:
-    """Does the field hold numbers side by side?"""
-    return field.is_repeated and is_number(field)
+def is_vector(topic: Topic, field: FieldDescriptor) -> bool:
+    """Does a row hold several numbers of the field side by side?"""
+    return field.is_repeated and is_number(field) and field.name not in NUMBERS.get(topic.name, ())
 
 
 def is_whole(field: FieldDescriptor) -> bool:
@@ -88,6 +94,8 @@ def samples_in(topic: Topic, message: Message) -> int:
     """How many rows a message makes."""
     if topic.name not in BATCHES:
         return 1
+    if topic.name == RATE.name:
+        return rates.count(message)
     if topic.name == IMU.name:
         return max(1, len(message.f_b_mps2) // 3)
     if topic.name == ADC.name:
@@ -101,7 +109,7 @@ def widths(topic: Topic, message: Message) -> dict[str, int]:
     return {
         field.name: len(getattr(message, field.name)) // (n if field.name in batch else 1)
         for field in fields_of(topic)
-        if is_vector(field)
+        if is_vector(topic, field)
     }
 
 
@@ -130,11 +138,13 @@ def samples(
     for field in fields_of(topic):
         if not takes(field.name):
             continue
-        if is_vector(field):
+        if is_vector(topic, field):
             fields[field.name], lengths[field.name] = _vectors(topic, field, messages, n)
+        elif field.name in NUMBERS.get(topic.name, ()):
+            fields[field.name] = _numbers(field, messages, n)
         else:
             fields[field.name] = np.repeat(_values(field, messages), n)
-    return Samples(
+    found = Samples(
         np.repeat(np.where(own != 0, own, received), n),
         _after(topic, messages, n),
         np.repeat(received, n),
@@ -146,6 +156,7 @@ def samples(
         fields,
         lengths,
     )
+    return _single_estimates(found, messages, n) if topic is RATE else found
 
 
 def _after(topic: Topic, messages: Sequence[Message], n: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -156,6 +167,48 @@ def _after(topic: Topic, messages: Sequence[Message], n: NDArray[np.int64]) -> N
         [np.arange(k) * message.period_s for k, message in zip(n, messages, strict=True)]
         or [np.zeros(0)]
     )
+
+
+def _numbers(field: FieldDescriptor, messages: Sequence[Message], n: NDArray[np.int64]) -> Column:
+    """A field with one number per sample; zeros where a message does not have as many."""
+    column = np.zeros(int(n.sum()), dtype=KINDS[field.cpp_type])
+    at = 0
+    for message, rows in zip(messages, n.tolist(), strict=True):
+        part = getattr(message, field.name)
+        column[at : at + min(rows, len(part))] = part[:rows]
+        at += rows
+    return column
+
+
+def _single_estimates(found: Samples, messages: Sequence[Message], n: NDArray[np.int64]) -> Samples:
+    """Rows of batches of rate estimates as if each had been a message of its own."""
+    fields, lengths, header = found.fields, found.lengths, found.header
+    row = np.concatenate([np.arange(k) for k in n] or [np.zeros(0, dtype=np.int64)])
+    if "for_index" in fields:
+        step = np.repeat(np.array([m.index_step for m in messages], dtype=np.int64), n)
+        fields["for_index"] = fields["for_index"] + (step * row).astype(np.uint64)
+    if "device_us" in header:
+        later = np.round(found.after_s * 1e6).astype(header["device_us"].dtype)
+        header["device_us"] = header["device_us"] + later
+    told = {"bound_sigma_radps": fields.get("bound_sigma_radps", np.zeros((len(row), 0))) > 0.0}
+    dof = _numbers(RATE.type.DESCRIPTOR.fields_by_name["nis_dof"], messages, n)
+    told |= dict.fromkeys(rates.ONLY_CORRECTED, dof[:, None] > 0)
+    for name in told.keys() & fields.keys():
+        known = told[name].any(axis=1)
+        if not known.all():
+            fields[name] = np.where(known[:, None], fields[name], np.nan)
+            lengths[name] = np.where(known, lengths[name], 0)
+    if "sight_reason" in fields:
+        unseen = np.concatenate([_unseen(m, k) for m, k in zip(messages, n.tolist(), strict=True)])
+        fields["sight_reason"] = np.where(unseen, fields["sight_reason"], "").astype(object)
+    utc_ns = found.utc_ns + np.round(found.after_s * 1e9).astype(np.int64)
+    return replace(found, utc_ns=utc_ns, after_s=np.zeros(len(row)))
+
+
+def _unseen(message: Message, n: int) -> NDArray[np.bool_]:
+    """Rows in which a component of the rate is not valid."""
+    sight = np.asarray(message.sight, dtype=np.int64)
+    return sight.reshape(n, -1).any(axis=1) if len(sight) else np.ones(n, dtype=bool)
 
 
 def _values(field: FieldDescriptor, messages: Sequence[Message]) -> Column:

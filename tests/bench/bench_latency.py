@@ -26,6 +26,7 @@ from gyrofree.config import load
 from gyrofree.running.demo import Plan, write_configuration
 from gyrofree.running.supervisor import Supervisor
 from messages.bus.session import open_client, subscribe
+from messages.contract import rates
 from messages.contract.topics import RATE
 
 PERIOD = 0.01  # s
@@ -70,9 +71,10 @@ def measure(link: PtyLink, settings) -> list[float]:
 
     def on_rate(key: str, message) -> None:
         now = time.monotonic()
-        if message.estimator == "products-ekf" and message.for_index >= WARM_UP:
-            latencies.append(now - written[message.for_index])
-        if message.for_index >= WARM_UP + COUNTED - 1:
+        indices = range(message.for_index, message.for_index + rates.count(message))
+        if message.estimator == "products-ekf":
+            latencies.extend(now - written[index] for index in indices if index >= WARM_UP)
+        if indices[-1] >= WARM_UP + COUNTED - 1:
             done.set()
 
     rest = np.array(

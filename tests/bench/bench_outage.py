@@ -22,6 +22,7 @@ from support.kill_stack import line  # noqa: E402
 from support.stack import free_port  # noqa: E402
 
 from messages.bus.session import open_client, subscribe  # noqa: E402
+from messages.contract import rates  # noqa: E402
 from messages.contract.topics import ACCEL, ESTIMATOR, LINK, RATE, STATUS, parse  # noqa: E402
 from sessions.library.catalogue import Catalogue  # noqa: E402
 from sessions.recording.mcap_log import read  # noqa: E402
@@ -136,7 +137,8 @@ def account(folder: Path) -> dict:
                     )
                 )
             elif topic is RATE:
-                estimates[row.key].add(message.for_index)
+                n = rates.count(message)
+                estimates[row.key].update(range(message.for_index, message.for_index + n))
     lost = max(have) - min(have) + 1 - len(have) - line_lost
     missing = sum(len((have & set(range(min(n), max(n) + 1))) - n) for n in estimates.values())
     return {

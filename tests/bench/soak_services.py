@@ -235,7 +235,7 @@ def talk(bus: BusSettings, hours: float, taken: Any) -> None:
     for k, message in batches(hours, time.time_ns()):
         said = [(ACCEL, "", message)]
         for name in ("products-ekf", "least-squares"):
-            rate = pb.RateEstimate(
+            rate = pb.RateBatch(
                 header=message.header, estimator=name, omega_ib_b_radps=[0.0, 0.1, 1.0]
             )
             rate.omega_covariance[:], rate.f_b_mps2[:], rate.q_nb[:] = (

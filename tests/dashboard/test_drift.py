@@ -39,7 +39,7 @@ def store_of(turn):
         true = np.array([2.0 * tau, 0.0, 0.0])
         wrong = np.array([0.0, 0.5 * B * tau**2 + 9.80665 * D * tau**3 / 6.0, 0.0])
         p = own.apply(true + wrong)
-        rate = pb.RateEstimate(header=header(t), p_n_m=p, q_nb=q_of(-turn), f_b_mps2=[0, 0, -9.8])
+        rate = pb.RateBatch(header=header(t), p_n_m=p, q_nb=q_of(-turn), f_b_mps2=[0, 0, -9.8])
         store.put(tp.ACCEL, "cube", "", pb.AccelBatch(header=header(t)))
         store.put(tp.RATE, "cube", "products-free", rate)
         nav = pb.NavSolution(

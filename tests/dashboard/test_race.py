@@ -28,7 +28,7 @@ def page(aid: str) -> str:
         store.put(
             tp.TACHO, "cube", "", pb.TachoRate(header=header, omega_radps=1.0, direction_known=True)
         )
-        rate = pb.RateEstimate(
+        rate = pb.RateBatch(
             header=header,
             estimator="products-ekf",
             omega_ib_b_radps=[0.0, 0.0, 1.0 + 2.0 * DEGREE],

@@ -323,7 +323,7 @@ def test_malformed_messages_leave_the_store_usable(store):
         tp.RATE,
         "cube-01",
         "odd",
-        pb.RateEstimate(header=header, omega_ib_b_radps=[1.0], innovation=[0.0] * 40),
+        pb.RateBatch(header=header, omega_ib_b_radps=[1.0], innovation=[0.0] * 40),
     )
     store.put(tp.NAV, "cube-01", "odd", pb.NavSolution(header=header, mode=3, q_nb=[1.0]))
     assert len(store.device("cube-01").window("rate", "odd", -1, 1)[0]) == 1

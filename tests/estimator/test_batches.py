@@ -2,11 +2,13 @@
 filled at once.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 
 from estimator.devices.rate import RateBoard, RateOutput
-from estimator.packed import Doubles, varint
+from estimator.rate_messages import rate_batch
 from inertial.core import native
 from inertial.layouts.catalogue import CUBE, LAYOUTS
 from inertial.rate import bound
@@ -22,6 +24,7 @@ from inertial.rate.products_model import (
 from inertial.simulation.faults import Faults, parse
 from inertial.simulation.table import TableTest
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract import rates
 
 NAMES = CUBE(0.05).axis_names
 N = 1000
@@ -37,31 +40,35 @@ def faulty():
     return table.layout, block.t_s[:N], block.readings[:N]
 
 
-def fed(faulty, size: int, limit_hz: float = 200.0) -> list[RateOutput]:
+class Told(NamedTuple):
+    """One sample by one estimator."""
+
+    index: int
+    estimator: str
+    state: RateState
+
+
+def fed(faulty, size: int, limit_hz: float = 200.0) -> list[Told]:
     layout, t_s, readings = faulty
     board = RateBoard("cube", layout, ["products-ekf", "least-squares"], limit_hz)
     out = []
     for k in range(0, N, size):
-        out += [
-            RateOutput(k + o.row, o.index, o.estimator, o.state)
-            for o in board.feed(0, k, 0.01, t_s[k : k + size], readings[k : k + size])
-        ]
-    return out
+        for o in board.feed(0, k, 0.01, t_s[k : k + size], readings[k : k + size]):
+            assert o.index == k + o.row
+            out += [
+                Told(o.index + o.step * row, o.estimator, o.columns.state(row))
+                for row in range(len(o.columns))
+            ]
+    return sorted(out, key=lambda told: (told.index, told.estimator))
 
 
-def bits(outputs: list[RateOutput]) -> list[tuple]:
+def bits(outputs: list[Told]) -> list[tuple]:
     """Everything that is said, arrays as bytes."""
     plain = []
     for o in outputs:
         state = [getattr(o.state, name) for name in RateState.__slots__]
-        plain.append(
-            (
-                o.row,
-                o.index,
-                o.estimator,
-                *(v.tobytes() if isinstance(v, np.ndarray) else v for v in state),
-            )
-        )
+        parts = (v.tobytes() if isinstance(v, np.ndarray) else v for v in state)
+        plain.append((o.index, o.estimator, *parts))
     return plain
 
 
@@ -72,11 +79,7 @@ def by_tens(faulty):
 
 def test_how_samples_are_batched_changes_no_bit(faulty, by_tens):
     assert {o.state.excluded for o in by_tens} == {0, 1 << NAMES.index("a21")}
-    assert [(o.row, o.estimator) for o in by_tens[:3]] == [
-        (0, "products-ekf"),
-        (0, "least-squares"),
-        (1, "products-ekf"),
-    ]
+    assert len(by_tens) == 2 * N
     assert bits(fed(faulty, 1)) == bits(by_tens) == bits(fed(faulty, 37))
 
 
@@ -137,42 +140,28 @@ def test_the_live_bound_is_that_of_whole_matrices():
     assert steps == 87 and not still
 
 
-def test_arrays_become_the_fields_of_a_message():
-    rng = np.random.default_rng(1)
-    arrays = [rng.normal(size=n) for n in (3, 9, 0, 40)]
-    fields = ("omega_ib_b_radps", "omega_covariance", "innovation", "bias")
-    message = pb.RateEstimate(estimator="x")
-    message.MergeFromString(Doubles(pb.RateEstimate, *fields).wire(*arrays))
-    expected = pb.RateEstimate(
-        estimator="x", **{f: a.tolist() for f, a in zip(fields, arrays, strict=True)}
-    )
-    assert message == expected and message.SerializeToString() == expected.SerializeToString()
-    assert varint(300) == b"\xac\x02"
-    with pytest.raises(TypeError, match="RateEstimate.nis is not"):
-        Doubles(pb.RateEstimate, "nis")
-
-
-def test_a_state_becomes_the_message_it_did():
-    """RateMessages against the constructor, with and without innovation and bound."""
-    from estimator.rate_messages import RateMessages
-
+def test_a_batch_says_row_by_row_what_the_states_say():
+    """RateBatch against the states one by one, with and without innovation and bound."""
     block, estimator = TableTest(1).block(0), ProductsRate(CUBE(0.05))
-    said = estimator.feed(block.t_s[:700], block.readings[:700])
-    states = [said.state(0), said.state(699)]
+    columns = estimator.feed(block.t_s[:700], block.readings[:700])
     batch = pb.AccelBatch(
         header=pb.Header(device="cube", run=7, sequence=9, device_us=5, utc_ns=9), period_s=0.01
     )
-    messages = RateMessages(batch, "card")
-    for index, s in enumerate(states):
-        header = pb.Header(
-            device="cube", run=7, device_us=5 + 10_000 * index, utc_ns=9 + 10**7 * index
-        )
+    said = RateOutput(3, 103, 2, "e", columns)
+    message = rate_batch(batch, "card", said)
+    read = list(rates.rows(message))
+    assert len(read) == rates.count(message) == 700
+    for k in (0, 350, 699):
+        s = columns.state(k)
+        later = 3 + 2 * k
         expected = pb.RateEstimate(
-            header=header,
+            header=pb.Header(
+                device="cube", run=7, device_us=5 + 10_000 * later, utc_ns=9 + 10**7 * later
+            ),
             estimator="e",
             calibration="card",
             for_sequence=9,
-            for_index=index,
+            for_index=103 + 2 * k,
             omega_ib_b_radps=s.omega_b,
             omega_covariance=s.P.ravel(),
             alpha_b_radps2=s.alpha_b,
@@ -189,12 +178,21 @@ def test_a_state_becomes_the_message_it_did():
             bias=s.bias,
             innovation_unit=s.innovation_unit,
             sight=s.sight,
-            sight_reason=s.sight_reason,
             bound_sigma_radps=[] if s.bound_sigma is None else s.bound_sigma,
             excluded_mask=s.excluded,
         )
-        said = messages.estimate(index, index, "e", s)
-        assert said == expected and said.SerializeToString() == expected.SerializeToString()
-    assert (
-        states[0].bound_sigma is None and len(states[1].bound_sigma) == 3 and states[1].nis_dof == 6
-    )
+        reason = read[k].sight_reason
+        assert bool(reason) == any(s.sight)
+        expected.sight_reason = reason
+        assert read[k] == expected
+        alone = rates.complete(pb.RateBatch.FromString(expected.SerializeToString()))
+        assert rates.row(alone, 0) == expected  # an estimate is a batch of one
+    assert columns.state(0).bound_sigma is None and columns.state(699).nis_dof == 6
+
+
+def test_the_fields_of_a_batch_have_the_numbers_of_an_estimate():
+    for name, field in pb.RateEstimate.DESCRIPTOR.fields_by_name.items():
+        of_batch = pb.RateBatch.DESCRIPTOR.fields_by_name[name]
+        assert (of_batch.number, of_batch.type) == (field.number, field.type)
+    repeated = {f.name for f in pb.RateBatch.DESCRIPTOR.fields if f.is_repeated}
+    assert repeated == {*rates.ROWS, *rates.NUMBERS}

@@ -16,6 +16,7 @@ from inertial.calibration.poses import collect, find, plan
 from inertial.layouts.catalogue import find as find_layout
 from inertial.simulation.imperfect import device, table_run, tumble
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.rates import rows
 from messages.contract.topics import ACCEL, CALIBRATION, RATE, TACHO
 
 CUBE = find_layout("cube", 0.05)
@@ -43,10 +44,11 @@ def bench():
 
 def estimates(pipeline, readings):
     return [
-        out.message
+        one
         for batch in batches(readings)
         for out in pipeline.on(ACCEL, batch)
         if out.topic is RATE
+        for one in rows(out.message)
     ]
 
 

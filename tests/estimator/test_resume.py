@@ -170,13 +170,11 @@ def test_an_estimator_killed_right_after_an_order_goes_on_with_the_card_that_was
     second, spool = life(folder, settings)
     work(second, inputs[20:60])
     said = [
-        pb.RateEstimate.FromString(p)
+        pb.RateBatch.FromString(p)
         for topic, _, p in published(spool)
         if topic == "rate/products-ekf"
     ]
     assert [m.for_index for m in said] == sorted({m.for_index for m in said})
     assert [m.header.sequence for m in said] == list(range(1, len(said) + 1))
-    assert [m.calibration for m in said] == [""] * 100 + [
-        named[-1]
-    ] * 200  # five samples in a batch
+    assert [m.calibration for m in said] == [""] * 20 + [named[-1]] * 40
     spool.close()

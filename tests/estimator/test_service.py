@@ -21,6 +21,7 @@ from estimator.stream import Stream, every, worth_a_line
 from inertial.simulation.table import TableTest
 from messages.bus.session import BusSettings, Publishers, open_client, open_router, subscribe
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.rates import rows
 from messages.contract.topics import ACCEL, ESTIMATOR, GNSS, IMU, INNOVATION, NAV, POSE, RATE
 
 UTC = 1_700_000_000 * 10**9
@@ -103,7 +104,7 @@ def run_through(
 def test_accelerometers_become_rates_poses_and_health() -> None:
     batches = accel_batches(50)
     outputs = run_through([(ACCEL, b) for b in batches])
-    rates = [o.message for o in outputs if o.topic is RATE]
+    rates = [one for o in outputs if o.topic is RATE for one in rows(o.message)]
     names = EstimatorSettings().rate
     assert {m.estimator for m in rates} == set(names)
     assert len(rates) == 250 * len(names)

@@ -17,6 +17,7 @@ from inertial.simulation.table import TableTest
 from logs.cube import run_cube
 from logs.sheet import LogError
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.rates import rows
 from messages.contract.topics import ACCEL, ESTIMATOR, RATE, TACHO
 
 EVERY = 5  # samples between reports, 20 Hz
@@ -118,7 +119,7 @@ def messages(table, n=160):
 def published(**options):
     pipeline = Pipeline(EstimatorSettings(rate=["products-ekf"], **options), clock=lambda: 0)
     said = [o for topic, message in messages(TableTest(2)) for o in pipeline.on(topic, message)]
-    return [o.message for o in said if o.topic is RATE], [
+    return [one for o in said if o.topic is RATE for one in rows(o.message)], [
         o.message for o in said if o.topic is ESTIMATOR
     ]
 

@@ -109,7 +109,7 @@ def test_a_client_may_start_before_its_router_and_messages_arrive(free_port):
             )
             publishers = Publishers(router, settings.prefix)
             for _ in range(100):  # the subscription travels to the router on its own time
-                publishers.put(topics.RATE, "cube", pb.RateEstimate(estimator="x"), "x")
+                publishers.put(topics.RATE, "cube", pb.RateBatch(estimator="x"), "x")
                 if got.wait(0.1):
                     break
             key, message = received[0]

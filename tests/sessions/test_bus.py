@@ -312,7 +312,7 @@ def make_session(root: Path) -> Path:
             store.add(t0 + n * 10_000_000 + 1, GNSS.key("t", "cube"), fix.SerializeToString())
             place = LOCATION.type(latitude=48.1, frame_id="cube")
             store.add(t0 + n * 10_000_000 + 2, LOCATION.key("t", "cube"), place.SerializeToString())
-        estimate = pb.RateEstimate(header=pb.Header(device="cube", sequence=n), estimator="e")
+        estimate = pb.RateBatch(header=pb.Header(device="cube", sequence=n), estimator="e")
         store.add(t0 + n * 10_000_000 + 3, RATE.key("t", "cube", "e"), estimate.SerializeToString())
     assert store.close()
     return store.folder / "recording.mcap"

@@ -107,7 +107,7 @@ def test_curves_are_the_recordings_and_kept_until_it_changes(root, tmp_path):
     path = root / SESSION / "recording.mcap"
     made = build(path)
     sent = [
-        pb.RateEstimate.FromString(row.payload)
+        pb.RateBatch.FromString(row.payload)
         for row in read(path)
         if row.key.endswith("rate/products-ekf")
     ]

@@ -15,7 +15,11 @@ from scipy.io import loadmat
 from support.mcap_protobuf_free import decoded
 from support.table_session import table_recording
 
+from estimator.pipeline import Pipeline
+from estimator.settings import EstimatorSettings
+from inertial.simulation.table import TableTest
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract import rates
 from messages.contract.topics import ACCEL, GNSS, RATE
 from sessions.export.export import ExportError, export
 from sessions.export.table import Selection, tables
@@ -49,7 +53,7 @@ def test_parquet_is_read_by_duckdb_and_has_the_units_in_its_names(recording, tmp
     files = export(recording, "parquet", tmp_path)
     path = tmp_path / "cube.rate.products-ekf.parquet"
     assert path in files
-    sent = recorded(recording, KEY, pb.RateEstimate)
+    sent = recorded(recording, KEY, pb.RateBatch)
     query = f"select count(*), max(omega_ib_b_radps_z), min(omega_ib_b_radps_z) from '{path}'"
     ((count, high, low),) = duckdb.sql(query).fetchall()
     z = [m.omega_ib_b_radps[2] for m in sent]
@@ -60,8 +64,8 @@ def test_parquet_is_read_by_duckdb_and_has_the_units_in_its_names(recording, tmp
 def test_mat_has_a_struct_per_key(recording, tmp_path):
     (path,) = export(recording, "mat", tmp_path, Selection(frozenset({"rate"})))
     found = loadmat(path, simplify_cells=True)["cube_rate_products_ekf"]
-    sent = recorded(recording, KEY, pb.RateEstimate)
-    assert np.array_equal(found["angle_z_rad"], [m.angle_z_rad for m in sent])
+    sent = recorded(recording, KEY, pb.RateBatch)
+    assert np.array_equal(found["angle_z_rad"], [m.angle_z_rad[0] for m in sent])
 
 
 def test_cut_mcap_has_the_same_bytes_of_that_time_only(recording, tmp_path):
@@ -77,8 +81,8 @@ def test_cut_mcap_has_the_same_bytes_of_that_time_only(recording, tmp_path):
 def test_the_plain_mcap_reader_decodes_with_the_schema_in_the_file(recording):
     """Nothing of ours: descriptors come from the recording."""
     message = decoded(recording, KEY)
-    assert message.DESCRIPTOR.full_name == "gyrofree.v1.RateEstimate"
-    assert message is not None and type(message).__module__ != pb.RateEstimate.__module__
+    assert message.DESCRIPTOR.full_name == "gyrofree.v1.RateBatch"
+    assert message is not None and type(message).__module__ != pb.RateBatch.__module__
     assert len(message.omega_ib_b_radps) == 3
 
 
@@ -96,6 +100,46 @@ def test_rerun_opens_a_recording_unmodified(recording, tmp_path):
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     assert out.stat().st_size > 100_000
+
+
+def test_an_exported_mcap_has_rate_estimates_one_by_one_for_other_viewers(tmp_path):
+    """Batches of a pipeline: every sample stands alone, at its own time, in a schema of numbers."""
+    pipeline, block = Pipeline(EstimatorSettings(rate=["products-ekf"])), TableTest(1).block(0)
+    path, batches_sent = tmp_path / "batches.mcap", []
+    with path.open("wb") as stream:
+        log = McapLog(stream.fileno(), 65536)
+        for k in range(0, 300, 10):
+            header = pb.Header(device="cube", utc_ns=10**18 + k * 10**7, device_us=k * 10_000)
+            f = block.readings[k : k + 10].ravel()
+            batch = pb.AccelBatch(header=header, first_index=k, period_s=0.01, axes=12, f_mps2=f)
+            for o in pipeline.on(ACCEL, batch):
+                if o.topic is RATE:
+                    batches_sent.append(o.message)
+                    log.add(
+                        log.open_channel(KEY, RATE),
+                        header.utc_ns + 10**8,
+                        header.utc_ns,
+                        o.message.SerializeToString(),
+                    )
+        log.finish()
+        log.push()
+    (single,) = export(path, "mcap", tmp_path)
+    sent = [one for batch in batches_sent for one in rates.rows(batch)]
+    with single.open("rb") as stream:
+        got = list(make_reader(stream).iter_messages())
+    assert {schema.name for schema, _, _ in got} == {"gyrofree.v1.RateEstimate"}
+    assert [m.data for _, _, m in got] == [one.SerializeToString() for one in sent]
+    assert len(sent) == 300 and all(np.diff([m.log_time for _, _, m in got]) == 10**7)
+    assert {len(one.innovation) for one in sent} == {0, 6}
+    whole, again = (tables(p, Selection(frozenset({RATE.name})))[KEY] for p in (path, single))
+    for name, column in whole.data.items():
+        assert np.array_equal(column, again.data[name], equal_nan=column.dtype.kind == "f"), name
+    out = tmp_path / "single.rrd"
+    rerun = str(Path(sys.executable).parent / "rerun")
+    command = [rerun, "mcap", "convert", str(single), "-o", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert out.stat().st_size > 10_000
 
 
 def test_tracks_want_fixes(recording, tmp_path):
@@ -138,8 +182,8 @@ def test_nothing_selected_is_said(recording, tmp_path):
 
 def test_a_table_in_memory_is_the_recording(recording):
     found = tables(recording, Selection(frozenset({RATE.name, ACCEL.name})))
-    sent = recorded(recording, KEY, pb.RateEstimate)
-    assert np.array_equal(found[KEY].data["nis"], [m.nis for m in sent])
+    sent = recorded(recording, KEY, pb.RateBatch)
+    assert np.array_equal(found[KEY].data["nis"], [m.nis[0] for m in sent])
     readings = found["gyrofree/cube/accel"]
     assert readings.vector("a11_mps2", "a43_mps2").shape == (3000, 2)
     assert readings.data["utc_s"][-1] - readings.data["utc_s"][0] == pytest.approx(29.99, abs=1e-3)

@@ -18,6 +18,7 @@ from mcap.reader import make_reader
 
 from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
+from messages.contract.rates import count
 from messages.contract.topics import INNOVATION, NAV, RATE
 from sessions.export.export import export
 from sessions.export.table import Selection, tables
@@ -124,7 +125,7 @@ def test_a_playback_shows_the_old_estimates_beside_the_new_ones():
 
     def put(address, device, message):
         if address.topic is RATE:
-            shown[message.estimator] = shown.get(message.estimator, 0) + 1
+            shown[message.estimator] = shown.get(message.estimator, 0) + count(message)
             assert message.estimator == address.estimator and device == "cube-replay"
 
     playback = Playback(

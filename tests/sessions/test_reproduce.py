@@ -76,14 +76,14 @@ def estimating(bus):
     thread.join(PATIENCE)
 
 
-def rates(path, device: str) -> dict[tuple[str, int], bytes]:
-    """Recorded rate estimates by estimator and sample, device name and sequence of publication
+def batches_of(path, device: str) -> dict[tuple[str, int], bytes]:
+    """Recorded rate estimates by estimator and first sample, device name and sequence of publication
     taken out.
     """
     found = {}
     for row in read(path):
         if f"/{device}/rate/" in row.key:
-            message = pb.RateEstimate.FromString(row.payload)
+            message = pb.RateBatch.FromString(row.payload)
             message.header.device = ""
             message.header.sequence = 0
             found[message.estimator, message.for_index] = message.SerializeToString()
@@ -94,7 +94,7 @@ def wait_for_last(seen: list, device: str) -> None:
     """Wait until every estimator has spoken of the last sample, and the recorder has written it."""
     wanted = {f"t/{device}/rate/{name}" for name in SETTINGS.rate}
     until(
-        lambda: wanted <= {key for key, index in seen if index == SAMPLES - 1},
+        lambda: wanted <= {key for key, index in seen if index == SAMPLES - BATCH},
         f"the last estimates of {device}",
     )
 
@@ -135,10 +135,10 @@ def test_a_live_session_is_reproduced_and_its_replay_gives_the_same_estimates(
     stop.set()
     thread.join(PATIENCE)
     listener.undeclare()
-    first = rates(Catalogue(settings.root).path(live.session), "cube")
-    second = rates(Catalogue(settings.root).path(again.session), "cube-replay")
+    first = batches_of(Catalogue(settings.root).path(live.session), "cube")
+    second = batches_of(Catalogue(settings.root).path(again.session), "cube-replay")
     both = first.keys() & second.keys()
-    assert len(both) > 0.25 * SAMPLES * len(SETTINGS.rate)
+    assert len(both) > 0.25 * BATCHES * len(SETTINGS.rate)
     assert all(first[name] == second[name] for name in both)
 
 
@@ -156,7 +156,7 @@ def test_a_changed_bit_a_missing_input_and_a_late_start_are_told_apart(tmp_path)
         for output in pipeline.on(ACCEL, batch):
             if output.topic is RATE and output.estimator == name:
                 if output.message.for_index == 50:
-                    output.message.angle_z_rad += 1e-12
+                    output.message.angle_z_rad[0] += 1e-12
                 output.message.header.sequence = 7
                 session.add(T0 + n, key, output.message.SerializeToString())
     assert session.close()
@@ -166,11 +166,13 @@ def test_a_changed_bit_a_missing_input_and_a_late_start_are_told_apart(tmp_path)
 
 
 def test_fields_that_differ_are_named_also_when_they_are_not_numbers():
-    one = pb.RateEstimate(estimator="e", nis=float("nan"), q_nb=[1, 0, 0, 0])
-    two = pb.RateEstimate(estimator="e", nis=float("nan"), q_nb=[1, 0, 0, 1e-16])
-    three = pb.RateEstimate(estimator="f", nis=float("nan"), q_nb=[1, 0, 0, 0], innovation=[0.0])
+    one = pb.RateBatch(estimator="e", nis=[float("nan")], q_nb=[1, 0, 0, 0])
+    two = pb.RateBatch(estimator="e", nis=[float("nan")], q_nb=[1, 0, 0, 1e-16])
+    three = pb.RateBatch(
+        estimator="f", nis=[float("nan")], q_nb=[1, 0, 0, 0], nis_dof=[1], innovation=[0.0]
+    )
     first = samples(RATE, [one])
     assert compare(first, samples(RATE, [one])).same
     assert compare(first, samples(RATE, [two])).first_difference.endswith(": q_nb")
     found = compare(first, samples(RATE, [three]))
-    assert found.first_difference.endswith(": estimator, innovation") and not found.same
+    assert found.first_difference.endswith(": estimator, innovation, nis_dof") and not found.same

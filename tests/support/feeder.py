@@ -15,6 +15,7 @@ import numpy as np
 
 from messages.bus.session import BusSettings, Publishers, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract import rates
 from messages.contract import topics as tp
 
 UTC0_NS = 1_750_000_000_000_000_000
@@ -128,25 +129,26 @@ class Feeder:
             ("products-ekf", 0.0, 1.5 * DEG),
             ("least-squares", self._drift, 1.0 * DEG),
         ):
-            estimate = pb.RateEstimate(
+            estimate = pb.RateBatch(
                 header=header, estimator=name, for_index=self._k, f_b_mps2=f_b + noise(0, 0.02, 3)
             )
             estimate.omega_ib_b_radps.extend(noise(0, 0.5 * DEG, 3) + [0.3 * bias, 0, omega + bias])
             spread = sigma + (0.3 * bias if name == "least-squares" else 0)
             estimate.omega_covariance.extend((np.eye(3) * spread**2).ravel())
             angle = self._angle + (2 * DEG if name == "products-ekf" else 3.0 * bias)
-            estimate.angle_z_rad = angle
+            estimate.angle_z_rad.append(angle)
             estimate.q_nb.extend(cube_attitude(angle))
             estimate.p_n_m.extend(
                 [0.02 * bias * self._k**1.2, 0.01 * self._k**1.1, -0.001 * self._k]
             )
-            estimate.still = not fusing
+            estimate.still.append(not fusing)
             if name == "products-ekf" and fusing:
                 estimate.innovation.extend(noise(0, 0.4, 6))
                 estimate.innovation_sigma.extend([0.4] * 6)
-                estimate.nis, estimate.nis_dof = self._random.chisquare(6), 6
+                estimate.nis.append(self._random.chisquare(6))
+                estimate.nis_dof.append(6)
                 estimate.innovation_unit = "rad²/s²"
-            self._put(tp.RATE, device, estimate, name)
+            self._put(tp.RATE, device, rates.complete(estimate), name)
 
     def _health(
         self, device: str, header: pb.Header, estimators: tuple[str, ...], rate: float

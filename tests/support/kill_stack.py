@@ -12,6 +12,7 @@ from pathlib import Path
 
 from messages.bus.session import BusSettings, open_client, subscribe
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract import rates
 from messages.contract.topics import ACCEL, LINK, RATE, STATUS, parse
 from messages.history.journal_file import scan
 from sessions.library.catalogue import Catalogue
@@ -157,7 +158,8 @@ def account(folder: Path, kills: list[tuple[str, int]], durable: dict[str, int])
                     (message.first_index, n, message.header.utc_ns, message.period_s)
                 )
             elif address.topic is RATE:
-                estimates[row.key].add(message.for_index)
+                n = rates.count(message)
+                estimates[row.key].update(range(message.for_index, message.for_index + n))
         result.acknowledged_lost += max(0, durable.get(info.id, 0) - rows)
     _holes(result, covered, kills, estimates)
     return result

@@ -22,6 +22,7 @@ from dashboard.scene.drawing.palette import (
 )
 from dashboard.scene.panels.base import DEG, Panel, Snapshot
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract import rates
 
 _COUNTS = re.compile(r"fixes (\w+) (\d+)")
 
@@ -96,7 +97,7 @@ class Devices(Panel):
     def _cube(s: Snapshot) -> str:
         tiles = []
         for name in s.device.estimators("rate"):
-            m = s.device.get("rate", name).message
+            m = rates.row(s.device.get("rate", name).message, -1)
             omega = m.omega_ib_b_radps[2] * DEG if len(m.omega_ib_b_radps) == 3 else None
             sub = "still" if m.still else f"angle {number(m.angle_z_rad * DEG, 0, '°')}"
             tiles.append(_tile(s, name, "rate", number(omega, 1), "°/s", sub))

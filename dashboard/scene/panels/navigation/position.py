@@ -6,6 +6,7 @@ from dashboard.scene.drawing.chart import Curve
 from dashboard.scene.drawing.geometry import MODES
 from dashboard.scene.drawing.palette import FIX, escape, number, rows
 from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
+from messages.contract import rates
 
 NAMES = ("North", "East", "Down")
 
@@ -75,7 +76,7 @@ def _cube_note(s: Snapshot) -> str:
     names = s.device.estimators("rate")
     items = []
     for name in names:
-        m = s.device.get("rate", name).message
+        m = rates.row(s.device.get("rate", name).message, -1)
         if len(m.p_n_m) == 3:
             items.append((f"distance, {name}", number(float(np.linalg.norm(m.p_n_m)), 1, "m")))
     return (
