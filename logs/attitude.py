@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.attitude.filters import ATTITUDES
-from logs.attitude_log import LogError, Trial, read_trials
+from logs.attitude_log import Trial, read_trials
+from logs.sheet import LogError
 
 Array = NDArray[np.float64]
 
@@ -21,6 +22,7 @@ def run_attitude(
     *,
     filters: list[str] | None = None,
     plot: Path | None = None,
+    units_as_named: bool = False,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Run filters over one log, or every log of a folder, and score their inclination where the
@@ -38,7 +40,7 @@ def run_attitude(
             raise LogError(f"no attitude filter {name!r}; want some of {', '.join(ATTITUDES)}")
     if not names:
         raise LogError(f"no attitude filter named; want some of {', '.join(ATTITUDES)}")
-    trials = read_trials(Path(log))
+    trials = read_trials(Path(log), units_as_named)
     logs, errors = {}, {}
     for k, trial in enumerate(trials):
         figures = {}

@@ -8,16 +8,17 @@ from numpy.typing import NDArray
 from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
+from inertial.plausible import doubt_of_gravity, doubt_of_rate
+from logs.quantities import read_si, refuse, timing_of
+from logs.sheet import LogError, open_sheet
+
 Array = NDArray[np.float64]
 
 SAMPLES = ("t_s", "fx_mps2", "fy_mps2", "fz_mps2", "wx_radps", "wy_radps", "wz_radps")
+QUANTITIES = tuple(name.rpartition("_")[0] for name in SAMPLES)
 TRUTH = ("true_qw", "true_qx", "true_qy", "true_qz")
 SCORED = "scored"  # optional CSV column: 0 where a row is not to be scored
 MAT = ("imu_acc", "imu_gyr", "opt_quat", "movement", "sampling_rate")
-
-
-class LogError(ValueError):
-    """A log that cannot be read, and what it would need."""
 
 
 @dataclass(frozen=True)
@@ -37,23 +38,23 @@ class Trial:
         return float((self.t[-1] - self.t[0]) / (len(self.t) - 1))
 
 
-def read_trials(log: Path) -> list[Trial]:
+def read_trials(log: Path, units_as_named: bool = False) -> list[Trial]:
     """A .csv or .mat, or every one of a folder. Raises LogError with the file and what it lacks."""
     if log.is_dir():
         files = sorted(f for f in log.iterdir() if f.suffix in (".csv", ".mat"))
         if not files:
             raise LogError(f"{log}: no .csv or .mat files in this folder")
-        return [_read(file) for file in files]
-    return [_read(log)]
+        return [_read(file, units_as_named) for file in files]
+    return [_read(log, units_as_named)]
 
 
-def _read(file: Path) -> Trial:
+def _read(file: Path, units_as_named: bool) -> Trial:
     if not file.is_file():
         raise LogError(f"{file}: no such file")
     if file.suffix == ".mat":
         return _read_mat(file)
     if file.suffix == ".csv":
-        return _read_csv(file)
+        return _read_csv(file, units_as_named)
     raise LogError(f"{file}: want .csv (columns {', '.join(SAMPLES + TRUTH)}) or BROAD's .mat")
 
 
@@ -71,22 +72,15 @@ def _read_mat(file: Path) -> Trial:
     return _trial(file, t, content["imu_acc"], content["imu_gyr"], q, moving)
 
 
-def _read_csv(file: Path) -> Trial:
-    with open(file, encoding="utf-8") as lines:
-        names = lines.readline().strip().split(",")
-        missing = [name for name in SAMPLES + TRUTH if name not in names]
-        if missing:
-            raise LogError(f"{file}: no column {missing[0]!r}; want {', '.join(SAMPLES + TRUTH)}")
-        try:
-            table = np.loadtxt(lines, delimiter=",", ndmin=2)
-        except ValueError as error:
-            raise LogError(f"{file}: {error}") from None
-    at = {name: table[:, k] for k, name in enumerate(names)}
-    q = np.column_stack([at[name] for name in TRUTH])
-    f, w = (np.column_stack([at[name] for name in SAMPLES[a:b]]) for a, b in ((1, 4), (4, 7)))
-    return _trial(
-        file, at["t_s"], f, w, q, at[SCORED] > 0 if SCORED in at else np.ones(len(q), dtype=bool)
-    )
+def _read_csv(file: Path, units_as_named: bool) -> Trial:
+    sheet = open_sheet(file)
+    table = read_si(sheet, [*QUANTITIES, *TRUTH], [SCORED], TRUTH)
+    timing_of(sheet, table)
+    f, w = (np.column_stack([table[name] for name in QUANTITIES[a:b]]) for a, b in ((1, 4), (4, 7)))
+    q = np.column_stack([table[name] for name in TRUTH])
+    refuse(file, [doubt_of_gravity(f), doubt_of_rate(table["t"], f, w)], units_as_named)
+    scored = table[SCORED] > 0 if SCORED in table else np.ones(len(q), dtype=bool)
+    return _trial(file, table["t"], f, w, q, scored)
 
 
 def _trial(file: Path, t: Array, f: Array, w: Array, q: Array, scored: NDArray[np.bool_]) -> Trial:

@@ -19,7 +19,9 @@ from inertial.attitude.wiring import (
     Turn,
 )
 from inertial.constants import GRAVITY
-from logs.attitude_log import SAMPLES, LogError
+from logs.attitude_log import SAMPLES
+from logs.quantities import timing_of
+from logs.sheet import LogError, open_sheet
 
 Array = NDArray[np.float64]
 
@@ -65,33 +67,19 @@ def detect(log: Path, figures: Figures = ACC_GYRO, volt_per_count: float = VOLT_
 
 
 def _read(log: Path) -> tuple[Array, tuple[str, ...], Array]:
-    if not log.is_file():
-        raise LogError(f"{log}: no such file")
-    with log.open(encoding="utf-8") as lines:
-        names = next((line for line in lines if not line.startswith("#")), "").strip().split(",")
-        inputs = tuple(
-            sorted(
-                (n for n in names if INPUT.fullmatch(n)), key=lambda n: int(INPUT.fullmatch(n)[1])
-            )
-        )
-        columns = SAMPLES[1:] if set(SAMPLES) <= set(names) else inputs
-        if "t_s" not in names or len(columns) < 5:
-            raise LogError(
-                f"{log}: columns {', '.join(names)[:80]!r}; want {WANTED}, at least five"
-            )
-        try:
-            table = np.loadtxt(lines, delimiter=",", ndmin=2)
-        except ValueError as error:
-            raise LogError(f"{log}: {error}") from None
-    if table.shape[1:] != (len(names),) or len(table) < 2:
-        raise LogError(f"{log}: {len(table)} rows of samples, want at least some seconds of them")
-    t, values = table[:, names.index("t_s")], table[:, [names.index(name) for name in columns]]
-    if not np.isfinite(values).all() or not (np.diff(t) > 0.0).all():
-        bad = ~np.isfinite(values).all(axis=1) | np.r_[False, ~(np.diff(t) > 0.0)]
+    sheet = open_sheet(log)
+    inputs = (name for name in sheet.header if INPUT.fullmatch(name))
+    numbered = tuple(sorted(inputs, key=lambda name: int(INPUT.fullmatch(name)[1])))
+    columns = SAMPLES[1:] if set(SAMPLES) <= set(sheet.header) else numbered
+    if "t_s" not in sheet.header or len(columns) < 5:
         raise LogError(
-            f"{log}: row {int(np.argmax(bad)) + 1}: not a number, or a time that does not grow"
+            f"{log}:{sheet.header_line}: columns {', '.join(sheet.header)[:80]!r}; want {WANTED},"
+            " at least five"
         )
-    return t, columns, values
+    table = sheet.read(["t_s", *columns])
+    table.columns["t"] = table["t_s"]
+    timing_of(sheet, table)
+    return table["t"], columns, np.column_stack([table[name] for name in columns])
 
 
 def _board(columns: tuple[str, ...], figures: Figures, volt_per_count: float) -> BoardColumns:

@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.calibration.card import Card, read_card
+from inertial.constants import GRAVITY
 from inertial.layouts.catalogue import find
 from inertial.layouts.layout import GeometryError, Layout
+from inertial.plausible import doubt_of_gravity
 from inertial.rate import resolved
 from inertial.rate.beliefs import make
 from inertial.rate.estimators import ESTIMATORS, ProductsRate
@@ -21,9 +23,11 @@ from inertial.rate.names import LEADER
 from inertial.rate.sight import ALL_BLIND
 from inertial.rate.tachometer import SUFFIX
 from logs.cube_axes import examine
-from logs.cube_log import CubeLog, LogError, read_log
+from logs.cube_log import CubeLog, read_log
 from logs.cube_run import EstimatorRun, reference
 from logs.cube_score import bound_of, notes_of, score
+from logs.quantities import refuse, said_of
+from logs.sheet import LogError
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
@@ -52,6 +56,7 @@ def run_cube(
     estimators: list[str] | None = None,
     tacho_aid: bool = False,
     resolve: bool = False,
+    units_as_named: bool = False,
     plot: Path | None = None,
     progress: Progress = nothing,
 ) -> dict[str, Any]:
@@ -70,6 +75,9 @@ def run_cube(
     progress(0.0, "reading")
     data = read_log(log, shape.axis_names, lsb_mg)
     used = read_card(card) if card is not None else None
+    doubtful = refuse(
+        log, [doubt_of_gravity(_centre_force(data, shape), _lsb(data))], units_as_named
+    )
     if tacho_aid and data.tacho is None:
         raise LogError(f"--tacho-aid: {log} has no column tacho_rad_s")
     tracks, notes = run_log(data, shape, used, estimators, progress, tacho_aid, resolve)
@@ -109,7 +117,12 @@ def run_cube(
             "list": [asdict(gap) for gap in data.gaps[:SHOW_GAPS]],
         },
         "axes": examine(data, shape),
-        "notes": notes + notes_of(data, truth, used),
+        "notes": [
+            *doubtful,
+            *said_of(log, data.timing, data.cut_off),
+            *notes,
+            *notes_of(data, truth, used),
+        ],
     }
     if plot is not None:
         from logs.cube_plot import draw  # here: matplotlib only where something is drawn
@@ -118,6 +131,17 @@ def run_cube(
         draw(plot, data, tracks, truth, result)
     progress(1.0, "done")
     return result
+
+
+def _centre_force(data: CubeLog, shape: Layout) -> Array:
+    """Specific force (n, 3) of the centre, m/s^2, by least squares where nothing turns (E-5)."""
+    J = np.column_stack([np.cross(shape.r_b, shape.theta_b), shape.theta_b])
+    return (data.f_axis * np.array(shape.gain)) @ np.linalg.pinv(J).T[:, 3:]
+
+
+def _lsb(data: CubeLog) -> float | None:
+    """mg that a count was taken for; None for a log in m/s^2."""
+    return data.lsb_mps2 / GRAVITY * 1e3 if data.lsb_mps2 else None
 
 
 def run_log(

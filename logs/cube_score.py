@@ -105,10 +105,4 @@ def notes_of(data: CubeLog, truth: Reference, card: Card | None) -> list[str]:
         found.append("scored against the tachometer: only z is known")
     elif not truth.name:
         found.append("neither truth nor tachometer in the log: nothing to score against")
-    if data.gaps:
-        worst = max(data.gaps, key=lambda gap: gap.seconds)
-        found.append(
-            f"{len(data.gaps)} gaps, the longest {worst.seconds:.3f} s after t_s {worst.t_s:.3f}"
-            f" (line {worst.line})"
-        )
     return found

@@ -25,6 +25,7 @@ from inertial.navigation.smoother import SMOOTHERS, smooth_drive
 from inertial.rotation import rotation_vector, to_matrix
 from logs.drive_log import DriveLog, DriveTruth, read_drive_log
 from logs.drive_result import SETTLED, Result, of_filter, of_smoother
+from logs.quantities import said_of
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
@@ -53,6 +54,7 @@ def run_drive(
     outages: Sequence[tuple[float, float]] = (),
     filters: Sequence[str] | None = None,
     truth: Path | None = None,
+    units_as_named: bool = False,
     plot: Path | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
@@ -60,7 +62,7 @@ def run_drive(
 
     One fix in `every` is given; outages (start, length in s from the first fix) are a second run
     each filter makes. Lengths in m, speeds in m/s, angles in rad; None where nothing is known.
-    Raises BadLog for files that cannot be used, UnknownFilter for a name, OSError.
+    Raises LogError for files that cannot be used, UnknownFilter for a name, OSError.
     """
     names = list(filters) if filters else list(USUAL)
     for name in names:
@@ -70,7 +72,7 @@ def run_drive(
             )
     tell = progress or (lambda done, what: None)
     tell(0.0, "reading")
-    log = read_drive_log(folder, imu, gnss, truth)
+    log = read_drive_log(folder, imu, gnss, truth, units_as_named)
     fed = [replace(fix, withheld=k % every != 0) for k, fix in enumerate(log.fixes)]
     results = run_all(log, fed, names, lambda done, what: tell(0.05 + 0.6 * done, what))
     ends: dict[str, list[float | None]] = {name: [] for name in names}
@@ -93,7 +95,11 @@ def run_drive(
         tell(0.97, "drawing")
         draw(plot, log, {name: r for name, r in results.items() if r is not None}, scores)
     tell(1.0, "")
-    return {"filters": {name: scores[name] for name in names}, "default": DEFAULT}
+    return {
+        "filters": {name: scores[name] for name in names},
+        "default": DEFAULT,
+        "notes": [*log.notes, *said_of(folder / imu, log.timing, False)],
+    }
 
 
 def run_all(

@@ -5,18 +5,14 @@ The header names what a column is and its unit: fx_mps2 or fx_g, wx_radps or wx_
 lat_deg, vn_mps.
 """
 
-import csv
 import math
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv
 from numpy.typing import NDArray
 
-from inertial.constants import GRAVITY, MILLI_G
 from inertial.navigation.fix import (
     AUTONOMOUS,
     DIFFERENTIAL,
@@ -25,38 +21,23 @@ from inertial.navigation.fix import (
     Fix,
     typical_sigma,
 )
+from inertial.plausible import doubt_of_gravity, doubt_of_rate
+from inertial.timing import Timing
+from logs.quantities import read_si, refuse, timing_of
+from logs.sheet import LogError, Table, open_sheet
 
 Array = NDArray[np.float64]
 
-# RTKLIB's solution quality (1 fixed, 2 float, 4 differential, 5 single) to the bus's
-QUALITY = {1: RTK_FIXED, 2: RTK_FLOAT, 4: DIFFERENTIAL, 5: AUTONOMOUS}
-UNITS = {
-    "s": 1.0,
-    "ms": 1e-3,
-    "us": 1e-6,
-    "ns": 1e-9,
-    "mps2": 1.0,
-    "g": GRAVITY,
-    "mg": MILLI_G,
-    "radps": 1.0,
-    "degps": math.pi / 180.0,
-    "dps": math.pi / 180.0,
-    "rad": 1.0,
-    "deg": math.pi / 180.0,
-    "m": 1.0,
-    "cm": 0.01,
-    "mps": 1.0,
-    "kmph": 1.0 / 3.6,
-}
+# RTKLIB's solution quality (1 fixed, 2 float, 3 SBAS, 4 differential, 5 single) to the bus's
+QUALITY = {1: RTK_FIXED, 2: RTK_FLOAT, 3: DIFFERENTIAL, 4: DIFFERENTIAL, 5: AUTONOMOUS}
+UNKNOWN_QUALITY = 0  # no solution, or none that is known here: not used
 IMU = ("t", "fx", "fy", "fz", "wx", "wy", "wz")
 TRUE_POSITION = ("true_lat", "true_lon", "true_height")
 TRUE_VELOCITY = ("true_vn", "true_ve", "true_vd")
 TRUE_ATTITUDE = ("true_qw", "true_qx", "true_qy", "true_qz")
-NO_UNIT = {"quality", *TRUE_ATTITUDE}
-
-
-class BadLog(ValueError):
-    """A file that is not a drive; names row and column."""
+SIGMA_P, SIGMA_V = ("sd_n", "sd_e", "sd_u"), ("sd_vn", "sd_ve", "sd_vd")
+VELOCITY = ("vn", "ve", "vd")
+EPOCH = ("arrival", "quality", *VELOCITY, *SIGMA_P, *SIGMA_V, "yaw", "sd_yaw")
 
 
 @dataclass(frozen=True)
@@ -77,144 +58,102 @@ class DriveLog:
     fixes: list[Fix]
     truth: DriveTruth | None
     lever_arm_b: tuple[float, float, float]
+    timing: Timing  # of the samples
+    notes: tuple[str, ...] = ()  # for people: what is doubtful or was left out
 
 
 def read_drive_log(
-    folder: Path, imu: str = "imu.csv", gnss: str = "gnss.csv", truth: Path | None = None
+    folder: Path,
+    imu: str = "imu.csv",
+    gnss: str = "gnss.csv",
+    truth: Path | None = None,
+    units_as_named: bool = False,
 ) -> DriveLog:
-    """Read the files of a folder. Raises BadLog, or OSError for a file that cannot be read.
+    """Read the files of a folder. Raises LogError, or OSError for a file that cannot be read.
 
     Truth columns may stand in the inertial file or in a file of their own. drive.toml, where there
-    is one, tells the lever arm: lever_arm_b_m = [forward, right, down].
+    is one, tells the lever arm: lever_arm_b_m = [forward, right, down]. Numbers that look like
+    another unit are refused unless they are meant as they are named.
     """
     path = folder / imu
-    columns = read_columns(path)
-    samples = np.column_stack([_need(path, columns, name) for name in IMU])
-    fallen = np.flatnonzero(np.diff(samples[:, 0]) <= 0.0)
-    if len(fallen):
-        row = int(fallen[0]) + 3
-        raise BadLog(
-            f"{path}: row {row}, column t: {samples[row - 2, 0]} s is not after the row before it"
-        )
-    true = _truth(read_columns(truth) if truth else columns, truth or path)
+    sheet = open_sheet(path)
+    optional = (*TRUE_POSITION, *TRUE_VELOCITY, *TRUE_ATTITUDE)
+    table = read_si(sheet, IMU, () if truth else optional, optional)
+    timing = timing_of(sheet, table)
+    samples = np.column_stack([table[name] for name in IMU])
+    t, f_b, omega_b = samples[:, 0], samples[:, 1:4], samples[:, 4:7]
+    notes = refuse(path, [doubt_of_gravity(f_b), doubt_of_rate(t, f_b, omega_b)], units_as_named)
+    if truth:
+        table = read_si(open_sheet(truth), ("t",), optional, optional)
+    fixes, left_out = read_fixes(folder / gnss)
     return DriveLog(
         np.ascontiguousarray(samples),
-        read_fixes(folder / gnss),
-        true,
+        fixes,
+        _truth(table),
         _lever(folder / "drive.toml"),
+        timing,
+        (*notes, *left_out),
     )
 
 
-def read_fixes(path: Path) -> list[Fix]:
-    """GNSS epochs; sigmas and velocity where the file has them, else what is typical of the
-    quality.
+def read_fixes(path: Path) -> tuple[list[Fix], list[str]]:
+    """GNSS epochs, and in words what is missing of them; sigmas and velocity where the file has
+    them, else what is typical of the quality. Raises LogError, OSError.
     """
-    c = read_columns(path)
-    t, lat, lon, height = (_need(path, c, name) for name in ("t", "lat", "lon", "height"))
-    quality = c["quality"] if "quality" in c else np.full(len(t), 5.0)
-    arrival = c.get("arrival", t)
-    v = [c.get(name) for name in ("vn", "ve", "vd")]
-    sigma_p = [c.get(name) for name in ("sd_n", "sd_e", "sd_u")]
-    sigma_v = [c.get(name) for name in ("sd_vn", "sd_ve", "sd_vd")]
-    yaw, sigma_yaw = c.get("yaw"), c.get("sd_yaw")
-    fixes = []
-    for k in range(len(t)):
-        kind = QUALITY.get(int(quality[k]), 0)
-        position, velocity = typical_sigma(kind)
-        has_v = all(column is not None for column in v)
-        fixes.append(
-            Fix(
-                t=float(t[k]),
-                arrival=float(arrival[k]),
-                latitude=float(lat[k]),
-                longitude=float(lon[k]),
-                height=float(height[k]),
-                quality=kind,
-                key=k,
-                sigma_p=(
-                    np.array([s[k] for s in sigma_p])
-                    if all(s is not None for s in sigma_p)
-                    else position
-                ),
-                v_n=np.array([column[k] for column in v]) if has_v else None,
-                sigma_v=(
-                    np.array([s[k] for s in sigma_v])
-                    if all(s is not None for s in sigma_v)
-                    else velocity
-                ),
-                yaw=None if yaw is None else float(yaw[k]),
-                sigma_yaw=0.01 if sigma_yaw is None else float(sigma_yaw[k]),
-            )
+    sheet = open_sheet(path)
+    c = read_si(sheet, ("t", "lat", "lon", "height"), EPOCH, EPOCH)
+    quality = c["quality"] if "quality" in c else np.full(len(c), 5.0)
+    kinds = [
+        QUALITY.get(int(q), UNKNOWN_QUALITY) if math.isfinite(q) else UNKNOWN_QUALITY
+        for q in quality.tolist()
+    ]
+    fixes = [_fix(c, k, kind) for k, kind in enumerate(kinds)]
+    notes = []
+    if unused := [k for k, kind in enumerate(kinds) if kind == UNKNOWN_QUALITY]:
+        first = quality[unused[0]]
+        value = f"{first:g}" if math.isfinite(first) else "empty"
+        notes.append(
+            f"{path}:{c.lines[unused[0]]}: {len(unused)} of {len(kinds)} epochs are not used: their"
+            f" quality is {value}; want 1 fixed, 2 float, 3 SBAS, 4 differential or 5 single"
         )
-    return fixes
+    return fixes, notes
 
 
-def read_columns(path: Path) -> dict[str, Array]:
-    """Columns in SI units by their name without unit. Raises BadLog for text among the numbers,
-    OSError.
-    """
-    options = pa.csv.ConvertOptions(null_values=["", "nan", "NaN"], strings_can_be_null=False)
-    try:
-        table = pa.csv.read_csv(path, convert_options=options)
-        values = {name: table[name].to_numpy().astype(np.float64) for name in table.column_names}
-    except (pa.ArrowInvalid, ValueError, TypeError) as error:
-        raise BadLog(_where(path) or f"{path}: {error}") from None
-    out = {}
-    for name, column in values.items():
-        stem, _, unit = name.strip().rpartition("_")
-        if name.strip() in NO_UNIT:
-            out[name.strip()] = column
-        elif unit in UNITS and stem:
-            out[stem] = column * UNITS[unit]
-    if not len(table):
-        raise BadLog(f"{path}: no rows below the header")
-    return out
+def _fix(c: Table, k: int, kind: int) -> Fix:
+    position, velocity = typical_sigma(kind)
+    return Fix(
+        t=float(c["t"][k]),
+        arrival=_known(c, "arrival", k, float(c["t"][k])),
+        latitude=float(c["lat"][k]),
+        longitude=float(c["lon"][k]),
+        height=float(c["height"][k]),
+        quality=kind,
+        key=k,
+        sigma_p=_three(c, SIGMA_P, k, position),
+        v_n=_three(c, VELOCITY, k, None),
+        sigma_v=_three(c, SIGMA_V, k, velocity),
+        yaw=_known(c, "yaw", k, None),
+        sigma_yaw=_known(c, "sd_yaw", k, 0.01),
+    )
 
 
-def _where(path: Path) -> str:
-    """The first cell that is no number, in words; empty when none is found."""
-    with open(path, newline="", encoding="utf-8", errors="replace") as file:
-        reader = csv.reader(file)
-        header = next(reader, [])
-        if not header:
-            return f"{path}: empty, want a header and rows"
-        for number, row in enumerate(reader, start=2):
-            if row and len(row) != len(header):
-                return f"{path}: row {number}: {len(row)} values, the header names {len(header)}"
-            for name, cell in zip(header, row, strict=False):
-                try:
-                    float(cell or "nan")
-                except ValueError:
-                    return f"{path}: row {number}, column {name}: {cell!r} is not a number"
-    return ""
+def _known(c: Table, name: str, k: int, otherwise):
+    """A number of row k; `otherwise` where the file does not have it."""
+    value = float(c[name][k]) if name in c else math.nan
+    return value if math.isfinite(value) else otherwise
 
 
-def _need(path: Path, columns: dict[str, Array], name: str) -> Array:
-    if name not in columns:
-        raise BadLog(
-            f"{path}: no column {name!r} with a unit behind it (as t_s, fx_mps2, wx_radps, lat_deg,"
-            " height_m)"
-        )
-    bad = np.flatnonzero(~np.isfinite(columns[name]))
-    if len(bad):
-        raise BadLog(f"{path}: row {bad[0] + 2}, column {name}: no number")
-    return columns[name]
+def _three(c: Table, names: tuple[str, ...], k: int, otherwise: Array | None) -> Array | None:
+    values = np.array([c[name][k] for name in names]) if all(n in c for n in names) else None
+    return values if values is not None and np.isfinite(values).all() else otherwise
 
 
-def _truth(columns: dict[str, Array], path: Path) -> DriveTruth | None:
+def _truth(table: Table) -> DriveTruth | None:
     parts = [
-        (
-            np.column_stack([columns[name] for name in names])
-            if all(name in columns for name in names)
-            else None
-        )
+        np.column_stack([table[name] for name in names]) if all(n in table for n in names) else None
         for names in (TRUE_POSITION, TRUE_VELOCITY, TRUE_ATTITUDE)
     ]
-    return (
-        DriveTruth(_need(path, columns, "t"), *parts)
-        if any(part is not None for part in parts)
-        else None
-    )
+    return DriveTruth(table["t"], *parts) if any(part is not None for part in parts) else None
 
 
 def _lever(path: Path) -> tuple[float, float, float]:
@@ -226,5 +165,7 @@ def _lever(path: Path) -> tuple[float, float, float]:
         )
         a, b, c = (float(v) for v in value)
     except (tomllib.TOMLDecodeError, TypeError, ValueError):
-        raise BadLog(f"{path}: lever_arm_b_m: want three numbers, m forward, right, down") from None
+        raise LogError(
+            f"{path}: lever_arm_b_m: want three numbers, m forward, right, down"
+        ) from None
     return a, b, c

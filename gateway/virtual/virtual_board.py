@@ -52,6 +52,7 @@ class BoardAccel:
 
     t_s: float
     counts12: tuple[int, ...]
+    index: int | None = None  # its number; None: by its time
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +62,7 @@ class BoardImu:
     t_s: float
     f_b: tuple[float, float, float]
     omega_b: tuple[float, float, float]
+    index: int | None = None  # its number; None: by its time
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,14 +175,11 @@ class VirtualBoard:
         self._housekeeping(item.t_s)
         match item:
             case BoardAccel():
-                self._sample(Acc12, item.t_s, tuple(item.counts12))
+                self._sample(Acc12, item.t_s, tuple(item.counts12), item.index)
             case BoardImu():
                 row = tuple(round(f / (ACCEL_SCALE_UG * 1e-6)) for f in item.f_b)
-                self._sample(
-                    Imu6,
-                    item.t_s,
-                    row + tuple(round(w / (GYRO_SCALE_NRAD * 1e-9)) for w in item.omega_b),
-                )
+                row += tuple(round(w / (GYRO_SCALE_NRAD * 1e-9)) for w in item.omega_b)
+                self._sample(Imu6, item.t_s, row, item.index)
             case BoardAdc():
                 self._sample(Adc, item.t_s, item.counts)
             case BoardPulse():
@@ -226,9 +225,15 @@ class VirtualBoard:
             Ack(order.command, order.token, 0 if name in ("hello", "status") else UNKNOWN), t_s
         )
 
-    def _sample(self, frame_type: type, t_s: float, row: tuple[int, ...]) -> None:
+    def _sample(
+        self, frame_type: type, t_s: float, row: tuple[int, ...], index: int | None = None
+    ) -> None:
         """A sample's index counts periods, so a gap in the items is a gap in the index."""
-        step = max(1, round((t_s - self._last_sample_s) / self.period_s)) if self._index >= 0 else 1
+        step = 1
+        if self._index >= 0 and index is not None:
+            step = max(1, index - self._index)
+        elif self._index >= 0:
+            step = max(1, round((t_s - self._last_sample_s) / self.period_s))
         if step > 1 or frame_type is not self._rows_type:
             self._send_rows()
         self._index += step

@@ -43,8 +43,8 @@ def axes(
     [estimator.axis_maps] to use it.
     """
     from inertial.attitude.axis_map import AxisMap, Figures, write_map
-    from logs.attitude_log import LogError
     from logs.axes_log import detect
+    from logs.sheet import LogError
 
     figures = Figures(zero_g_v, accel_v_per_g / GRAVITY, 0.0, math.degrees(gyro_v_per_dps))
     try:

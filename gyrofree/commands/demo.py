@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from gyrofree.commands import board as boards
-from gyrofree.commands.options import Config, Fault, Speed, Verbose, faults_of
+from gyrofree.commands.options import Config, Fault, Speed, UnitsAsNamed, Verbose, faults_of
 from gyrofree.running.process import EXIT_CONFIG as CONFIG
 from gyrofree.running.process import fail, run_service
 
@@ -75,14 +75,15 @@ def demo(
     demonstration.run(replace(plan, estimator=demonstration.ESTIMATOR.get(source, "")))
 
 
-def _check_log(path: Path, gnss: Path | None = None) -> str:
+def _check_log(path: Path, gnss: Path | None = None, as_named: bool = False) -> str:
     """Kind of log ("imu" or "cube"); a log that cannot be played ends the command with its
     reason.
     """
-    from gyrofree.running.play import LogError, kind_of
+    from gyrofree.running.play import kind_of
+    from logs.sheet import LogError
 
     try:
-        return kind_of(path, gnss)
+        return kind_of(path, gnss, as_named)
     except (LogError, OSError) as error:
         raise fail(str(error)) from None
 
@@ -107,6 +108,7 @@ def play(
     folder: Annotated[
         Path, typer.Option(help="Where journal, recordings and users are kept.")
     ] = Path("var/play"),
+    units_as_named: UnitsAsNamed = False,
     config: Config = None,
     verbose: Verbose = False,
 ) -> None:
@@ -115,19 +117,20 @@ def play(
     The columns are described in docs/logs.md. Like `gyrofree demo`, this prints one URL; with
     --link it is only the board.
     """
-    kind = _check_log(log, gnss)
+    kind = _check_log(log, gnss, units_as_named)
     if link is not None:
 
         def body(stop: threading.Event) -> None:
             from gyrofree.running import play as player
 
-            player.run(player.Options(log, gnss, speed, loop, link), stop)
+            player.run(player.Options(log, gnss, speed, loop, link, units_as_named), stop)
 
         return run_service(body, verbose)
     from gyrofree.running import demo as demonstration
 
     board = ["play", str(log.absolute()), "--speed", str(speed)] + (["--loop"] if loop else [])
     board += ["--gnss", str(gnss.absolute())] if gnss else []
+    board += ["--units-as-named"] if units_as_named else []
     demonstration.run(
         demonstration.Plan(
             folder.absolute(),

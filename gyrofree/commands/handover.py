@@ -4,6 +4,7 @@ again.
 
 import functools
 import json
+import sys
 import tomllib
 from pathlib import Path
 from typing import Annotated
@@ -16,12 +17,14 @@ from gyrofree.commands.options import (
     AsJson,
     Config,
     SessionOrFile,
+    UnitsAsNamed,
     catalogue_of,
     file_of,
     settings_of,
 )
 from gyrofree.commands.run import progress_bar
 from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
+from messages.contract.topics import TopicError, check_name
 from sessions.recording.manifest import SessionError, name_of
 
 
@@ -117,22 +120,28 @@ def import_log(
     ] = None,
     device: Annotated[str, typer.Option(help="Device name for the samples.")] = "log",
     name: Annotated[str, typer.Option(help="Added to the session's id.")] = "import",
+    units_as_named: UnitsAsNamed = False,
     as_json: AsJson = False,
     config: Config = None,
 ) -> None:
     """Make a session of a log: its samples, and the estimates of the configured estimators on
     them.
     """
-    from gateway.virtual.player import PlayError
     from gyrofree.running import importer
+    from logs.board_log import read_board_log
+    from logs.sheet import LogError
 
     settings = settings_of(config)
     try:
-        rows = list(importer.rows_of(log, gnss, settings.bus.prefix, device))
+        check_name(device)
+        source = read_board_log(log, gnss, units_as_named)
+        for note in source.notes:
+            print(f"note: {note}", file=sys.stderr)
+        rows = list(importer.rows_of(source, settings.bus.prefix, device))
         folder = _estimated(
             settings, rows, f"20240101-000000-{name}", f"made of {log.name}", settings.recorder.root
         )
-    except (PlayError, SessionError, OSError) as error:
+    except (LogError, TopicError, SessionError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
     print(json.dumps({"session": folder.name}) if as_json else folder.name)
 

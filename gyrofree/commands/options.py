@@ -29,6 +29,14 @@ SessionOrFile = Annotated[str, typer.Argument(help="Id of a session, or path of 
 Speed = Annotated[float, typer.Option(min=0.1, max=100.0, help="Seconds of the log per second.")]
 
 
+UnitsAsNamed = Annotated[
+    bool,
+    typer.Option(
+        "--units-as-named", help="Take numbers that look like another unit for what they are named."
+    ),
+]
+
+
 def settings_of(path: Path | None) -> Settings:
     """The configuration a command was given; ends the command with one line per fault."""
     try:

@@ -11,8 +11,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from gyrofree.commands.options import AsJson, show_table
-from gyrofree.running.process import EXIT_CONFIG, fail
+from gyrofree.commands.options import AsJson, UnitsAsNamed, show_table
+from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
 
 Report = Callable[[float, str], None]
 
@@ -83,6 +83,7 @@ def run(
     truth: Annotated[
         Path | None, typer.Option(help="Drives: CSV of the true attitude and position.")
     ] = None,
+    units_as_named: UnitsAsNamed = False,
     plot: Plot = None,
     as_json: AsJson = False,
 ) -> None:
@@ -99,7 +100,9 @@ def run(
             if attitude:
                 from logs.attitude import run_attitude
 
-                result = run_attitude(log, filters=names, plot=plot, progress=progress)
+                result = run_attitude(
+                    log, filters=names, plot=plot, units_as_named=units_as_named, progress=progress
+                )
             elif log.is_dir():
                 from logs.drive import run_drive
 
@@ -111,6 +114,7 @@ def run(
                     outages=parse_outages(outages),
                     filters=names,
                     truth=truth,
+                    units_as_named=units_as_named,
                     plot=plot,
                     progress=progress,
                 )
@@ -126,12 +130,29 @@ def run(
                     estimators=names,
                     tacho_aid=tacho_aid,
                     resolve=resolve,
+                    units_as_named=units_as_named,
                     plot=plot,
                     progress=progress,
                 )
     except (ValueError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
     show(result, as_json)
+    if not any(known(row) for row in result[kind_of(result)].values()):
+        raise fail("no result: the notes above say why", EXIT_FAILED)
+
+
+def kind_of(result: dict[str, Any]) -> str:
+    """What the rows of a result are: "estimators" or "filters"."""
+    return "estimators" if "estimators" in result else "filters"
+
+
+def known(row: dict[str, Any]) -> bool:
+    """Did this estimator say anything that was scored?"""
+    return any(
+        value is not None and value != [] and not (isinstance(value, list) and not any(value))
+        for name, value in row.items()
+        if name not in ("us_per_sample", "us_per_epoch", "bound_rate_rms_radps")
+    )
 
 
 def parse_outages(text: str) -> list[tuple[float, float]]:
@@ -155,7 +176,7 @@ def show(result: dict[str, Any], as_json: bool) -> None:
     if as_json:
         print(json.dumps(result, indent=2))
         return
-    kind = "estimators" if "estimators" in result else "filters"
+    kind = kind_of(result)
     rows: dict[str, dict[str, Any]] = result[kind]
     columns = list(dict.fromkeys(key for row in rows.values() for key in row))
     table = Table(kind[:-1], *columns)

@@ -161,7 +161,16 @@ def simulate(
         if condition not in CONDITIONS:
             raise ValueError(f"no condition {condition!r}; want one of {', '.join(CONDITIONS)}")
         condition = CONDITIONS[condition]
-    truth = drive_truth(seed, seconds, still, climb)
+    return observe(seed, drive_truth(seed, seconds, still, climb), condition, lever_arm_b)
+
+
+def observe(
+    seed: int,
+    truth: Truth,
+    condition: Condition,
+    lever_arm_b: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> SimulatedDrive:
+    """Samples and fixes of any motion, by the instruments and outages of a condition."""
     imu, accel_bias, gyro_bias = _imu(np.random.default_rng([seed, 11]), truth, condition.sensors)
     fixes, gross = _fixes(
         np.random.default_rng([seed, 12]), truth, condition.sensors, np.array(lever_arm_b)

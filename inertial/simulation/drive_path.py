@@ -84,8 +84,8 @@ def drive_truth(
         ]
     )
     nb = Rotation.from_euler("ZYX", euler)
-    latitude, longitude, height = _position(v_n, dt)
-    f_b, omega_b = _felt(t, latitude, longitude, height, v_n, nb)
+    latitude, longitude, height = position_of(v_n, dt)
+    f_b, omega_b = felt(t, latitude, longitude, height, v_n, nb)
     at = slice(None, None, 2)
     return Truth(
         t[at],
@@ -94,8 +94,8 @@ def drive_truth(
         height[at],
         v_n[at],
         nb.as_matrix()[at],
-        _mean(f_b),
-        _mean(omega_b),
+        interval_mean(f_b),
+        interval_mean(omega_b),
     )
 
 
@@ -146,7 +146,7 @@ def _slope(draw: np.random.Generator, way: Array, climb: float) -> Array:
     return np.arctan((weight * k * np.cos(k * way[:, None] + phase)).sum(axis=1))
 
 
-def _position(v_n: Array, dt: float) -> tuple[Array, Array, Array]:
+def position_of(v_n: Array, dt: float) -> tuple[Array, Array, Array]:
     """Latitude, longitude and height of a velocity; latitude by three fixed-point rounds of the
     quadrature (E-60).
     """
@@ -163,7 +163,7 @@ def _position(v_n: Array, dt: float) -> tuple[Array, Array, Array]:
     return latitude, longitude0 + cumulative_simpson(turn, dx=dt, initial=0.0), height
 
 
-def _felt(
+def felt(
     t: Array, latitude: Array, longitude: Array, height: Array, v_n: Array, nb: Rotation
 ) -> tuple[Array, Array]:
     """Specific force and rate in b at every time, from Newton's law in e (E-62, E-63)."""
@@ -181,7 +181,7 @@ def _felt(
     return eb.inv().apply(f_e), turning + eb.inv().apply(spin_e)
 
 
-def _mean(values: Array) -> Array:
+def interval_mean(values: Array) -> Array:
     """Mean over each sample's interval by Simpson's rule; (2 n + 1, 3) -> (n + 1, 3)."""
     mean = (values[:-2:2] + 4.0 * values[1:-1:2] + values[2::2]) / 6.0
     return np.vstack([mean[:1], mean])

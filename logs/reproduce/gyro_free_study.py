@@ -24,6 +24,7 @@ from inertial.layouts.catalogue import find
 from inertial.layouts.layout import Layout
 from inertial.rotation import to_matrix
 from inertial.simulation.table import BLOCK, TableTest
+from inertial.timing import sample_timing
 from logs.cube import run_log
 from logs.cube_log import CubeLog, read_log
 from logs.cube_run import EstimatorRun, Reference, reference
@@ -71,7 +72,7 @@ def simulated(seed: int, progress: Progress = lambda done, what: None) -> Study:
         counts=counts,
         lsb_mps2=test.sensor.count,
         index=np.arange(n),
-        period_s=test.period_s,
+        timing=sample_timing(t),
         gaps=(),
         tacho=pulse_rate(test, t),
         omega_b=np.vstack([block.omega_b for block in cut])[:n],

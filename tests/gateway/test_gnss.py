@@ -13,7 +13,7 @@ from gateway.gnss.fix import DAY_NS, RTK_FIXED, WEEK_ROLLOVER_NS, tod_of, unroll
 from gateway.gnss.link import GnssLink
 from gateway.gnss.stream import GnssStream, nmea_checksum
 from gateway.gnss.ubx import Epoch, ubx_bytes
-from gateway.virtual.player import LOG_EPOCH_S
+from gyrofree.running.log_items import LOG_EPOCH_S
 
 # Field of Fix, gpsd's name, how far apart they may be: gpsd prints rounded figures
 COMPARED = (

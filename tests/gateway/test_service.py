@@ -16,7 +16,6 @@ from gateway import service
 from gateway.gnss.ubx import Epoch, ubx_bytes
 from gateway.settings import DeviceSettings, GatewaySettings
 from gateway.virtual.board_link import PtyLink, TcpLink
-from gateway.virtual.player import LOG_EPOCH_S
 from gateway.virtual.virtual_board import (
     PLAYED,
     SIMULATED,
@@ -25,6 +24,7 @@ from gateway.virtual.virtual_board import (
     BoardPulse,
     VirtualBoard,
 )
+from gyrofree.running.log_items import LOG_EPOCH_S
 from messages.bus.session import BusSettings, open_client, open_router, subscribe
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ACCEL, BOARD, GNSS, LINK, LOCATION, TACHO, history_key

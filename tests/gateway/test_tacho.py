@@ -6,7 +6,7 @@ import random
 import pytest
 
 from gateway.samples.tacho import Tachometer
-from gateway.virtual.player import table_pulses
+from gateway.virtual.pulses import table_pulses
 
 PITCH = 2 * math.pi / 360
 

@@ -96,4 +96,4 @@ def test_a_wrong_log_is_refused_by_name(tmp_path):
     bad = np.zeros((9, 6))
     bad[4, 2] = np.nan
     code, out = call(write(tmp_path / "log.csv", names, bad))
-    assert code == 2 and "row 5" in out
+    assert code == 2 and ":6:" in out

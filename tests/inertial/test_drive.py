@@ -18,7 +18,8 @@ from inertial.navigation.navigation import NAVIGATORS, NavigatorConfig
 from inertial.navigation.smoother import smooth_drive
 from inertial.simulation.drive import simulate
 from logs.drive import run_drive
-from logs.drive_log import BadLog, read_drive_log
+from logs.drive_log import read_drive_log
+from logs.sheet import LogError
 
 Array = NDArray[np.float64]
 KEYS = {
@@ -132,28 +133,28 @@ GNSS = "t_s,lat_deg,lon_deg,height_m\n0,40,-105,1600\n"
 @pytest.mark.parametrize(
     ("imu", "said"),
     [
-        (HEADER + "0,0,0,-9.8,0,0,0\n1,0,0,x,0,0,0\n", "row 3, column fz_mps2: 'x'"),
-        (HEADER + "0,0,0,-9.8,0,0,0\n0,0,0,-9.8,0,0,0\n", "row 3, column t"),
-        (HEADER + "0,0,0,,0,0,0\n", "row 2, column fz"),
-        ("t_s,fx_mps2\n0,0\n", "no column 'fy'"),
+        (HEADER + "0,0,0,-9.8,0,0,0\n1,0,0,x,0,0,0\n", ":3: column 'fz_mps2': 'x'"),
+        (HEADER + "0,0,0,-9.8,0,0,0\n0,0,0,-9.8,0,0,0\n", ":3: column 't_s': .* does not rise"),
+        (HEADER + "0,0,0,,0,0,0\n", ":2: column 'fz_mps2'"),
+        ("t_s,fx_mps2\n0,0\n", ":1: column 'fy_mps2' is missing"),
         ("", "empty"),
     ],
 )
 def test_bad_files_are_named_by_row_and_column(tmp_path: Path, imu: str, said: str) -> None:
     (tmp_path / "imu.csv").write_text(imu)
     (tmp_path / "gnss.csv").write_text(GNSS)
-    with pytest.raises(BadLog, match=said):
+    with pytest.raises(LogError, match=said):
         run_drive(tmp_path)
 
 
 def test_units_of_the_header_and_an_unknown_filter(tmp_path: Path) -> None:
     (tmp_path / "imu.csv").write_text(
-        "t_ms,fx_g,fy_g,fz_g,wx_degps,wy_degps,wz_degps\n10,0,0,-1,180,0,0\n"
+        "t_ms,fx_g,fy_g,fz_g,wx_degps,wy_degps,wz_degps\n10,0,0,-1,180,0,0\n20,0,0,-1,180,0,0\n"
     )
     (tmp_path / "gnss.csv").write_text(GNSS)
     (tmp_path / "drive.toml").write_text("lever_arm_b_m = [1, 2, 3]\n")
     log = read_drive_log(tmp_path)
-    assert np.allclose(log.imu, [[0.01, 0, 0, -9.80665, math.pi, 0, 0]]) and log.lever_arm_b == (
+    assert np.allclose(log.imu[0], [0.01, 0, 0, -9.80665, math.pi, 0, 0]) and log.lever_arm_b == (
         1.0,
         2.0,
         3.0,

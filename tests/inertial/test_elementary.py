@@ -1,4 +1,4 @@
-"""The core's elementary functions: near the exact value everywhere, and equal bits in both builds."""
+"""The core's elementary functions: near the exact value everywhere, equal bits in both builds."""
 
 import math
 

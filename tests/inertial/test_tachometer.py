@@ -15,7 +15,7 @@ from inertial.rate.estimators import ESTIMATORS, LeastSquaresRate, ProductsRate
 from inertial.simulation.profiles import TURNING
 from inertial.simulation.table import TableTest
 from logs.cube import run_cube
-from logs.cube_log import LogError
+from logs.sheet import LogError
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.rates import rows
 from messages.contract.topics import ACCEL, ESTIMATOR, RATE, TACHO

@@ -12,8 +12,9 @@ from gyrofree.commands.main import app
 from gyrofree.running import simulate_csv
 from inertial.layouts.catalogue import find
 from logs.cube import run_cube
-from logs.cube_log import LogError, read_log
+from logs.cube_log import read_log
 from logs.cube_score import nees_mean
+from logs.sheet import LogError
 
 NAMES = find("cube").axis_names
 ENTRY = {
@@ -117,15 +118,15 @@ def test_metres_per_second_squared_are_the_same_as_counts(published, tmp_path):
         ),
         (
             lambda rows: rows[50].__setitem__(0, "0.10"),
-            r":51: t_s 0.100000 after 0.480000 does not rise.*sort",
+            r":51: column 't_s': time 0.100000 s after 0.480000 s does not rise.*sort",
         ),
         (
             lambda rows: rows[30].__delitem__(slice(4, None)),
-            r":31: 4 cells, column .* is missing; complete the row",
+            r":31: 4 cells, the header names 21: .*; complete the row",
         ),
         (
             lambda rows: rows[0].__setitem__(4, "b"),
-            r":1: column 'a21_counts' is missing \(1 of 12 axes",
+            r":1: column 'a21_counts' is missing, found t_s.*--layout",
         ),
         (lambda rows: rows[0].__setitem__(0, "time"), r":1: column 't_s' is missing"),
         (

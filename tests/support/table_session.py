@@ -10,6 +10,7 @@ from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from gyrofree.running.importer import rows_of
 from gyrofree.running.simulate_csv import write
+from logs.board_log import read_board_log
 from sessions.replay.rerun import estimates_again, write_session
 
 SESSION = "20240101-000000-table"
@@ -25,7 +26,11 @@ def table_root() -> Path:
     log = root / "log.csv"
     write(log, "published", 3, "cube", 0.05)
     inputs = write_session(
-        root / "inputs", SESSION, rows_of(log, None, "gyrofree", "cube"), "", CONFIGURATION
+        root / "inputs",
+        SESSION,
+        rows_of(read_board_log(log), "gyrofree", "cube"),
+        "",
+        CONFIGURATION,
     )
     again = estimates_again(inputs / "recording.mcap", Pipeline(EstimatorSettings(navigators=[])))
     write_session(root / "sessions", SESSION, again, "simulated table", CONFIGURATION)

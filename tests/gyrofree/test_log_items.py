@@ -3,6 +3,7 @@
 import threading
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from firmware_protocol.codec import Deframer, Frame
@@ -11,9 +12,13 @@ from firmware_protocol.ledger import Ledger
 from gateway.gnss.decoder import GnssDecoder
 from gateway.gnss.fix import RTK_FIXED
 from gateway.samples.convert import imu_si
-from gateway.virtual.player import CUBE, PlayError, load
 from gateway.virtual.virtual_board import PLAYED, BoardImu, VirtualBoard
+from gyrofree.running.log_items import items_of
+from logs.board_log import CUBE_AXES, read_board_log
+from logs.sheet import LogError
 
+CUBE = ("t_s", *(f"{name}_counts" for name in CUBE_AXES))
+REST = ["0", "0", "256"] * 2 + ["0", "0", "-256"] * 2  # counts of a cube that lies still
 IMU_HEADER = "t_s,fx_mps2,fy_mps2,fz_mps2,wx_radps,wy_radps,wz_radps\n"
 
 
@@ -55,16 +60,17 @@ def imu_rows(n: int) -> str:
 
 
 def test_the_car_drive_goes_through_the_wire_unchanged(data_dir):
-    log = load(data_dir / "car_drive")
+    log = read_board_log(data_dir / "car_drive")
     assert (
         log.kind == "imu"
-        and len(log.rows) == 54858
-        and log.period_s == pytest.approx(0.01, rel=0.002)
+        and len(log.t_s) == 54858
+        and log.timing.period_s == pytest.approx(0.01, rel=0.002)
     )
     wire = Wire()
-    board = VirtualBoard(wire, PLAYED, sample_period_s=log.period_s)
-    rows = [row for row in log.rows if row[0] < 40.0]
-    for item in log.items():
+    board = VirtualBoard(wire, PLAYED, sample_period_s=log.timing.period_s)
+    samples = np.column_stack([log.t_s, log.f_b, log.omega_b])
+    rows = samples[log.t_s < 40.0]
+    for item in items_of(log):
         if item.t_s >= 40.0:
             break
         board.take(item)
@@ -86,20 +92,22 @@ def test_the_car_drive_goes_through_the_wire_unchanged(data_dir):
     fixes = [
         fix for f in frames if f.type == Gps.TYPE for fix in decoder.feed(f.payload.data)
     ] + decoder.flush()
-    epochs = [e for e in log.gnss if rows[0][0] <= e[0] < 40.0]
+    epochs = [e for e in log.fixes if rows[0][0] <= e.t < 40.0]
     assert len(fixes) == len(epochs) > 140 and decoder.bad == 0
     for fix, epoch in zip(fixes, epochs, strict=True):
-        assert (fix.latitude_deg, fix.longitude_deg) == pytest.approx(epoch[1:3], abs=6e-10)
-        assert fix.height_m == pytest.approx(epoch[3], abs=6e-5) and fix.quality == RTK_FIXED
-        assert fix.v_n == pytest.approx(epoch[8:11], abs=6e-4)
+        assert (fix.latitude_deg, fix.longitude_deg) == pytest.approx(
+            np.degrees([epoch.latitude, epoch.longitude]), abs=6e-10
+        )
+        assert fix.height_m == pytest.approx(epoch.height, abs=6e-5) and fix.quality == RTK_FIXED
+        assert fix.v_n == pytest.approx(epoch.v_n, abs=6e-4)
 
 
 def test_gap_in_the_log_is_a_gap_in_the_index(tmp_path):
     text = imu_rows(50).splitlines(keepends=True)
-    log = load(write(tmp_path / "imu.csv", "".join(text[:20] + text[27:])))
+    log = read_board_log(write(tmp_path / "imu.csv", "".join(text[:20] + text[27:])))
     wire = Wire()
-    board = VirtualBoard(wire, PLAYED, sample_period_s=log.period_s, batch=4)
-    for item in log.items():
+    board = VirtualBoard(wire, PLAYED, sample_period_s=log.timing.period_s, batch=4)
+    for item in items_of(log):
         board.take(item)
     board.finish()
     _, ledger = events(wire)
@@ -108,14 +116,12 @@ def test_gap_in_the_log_is_a_gap_in_the_index(tmp_path):
 
 def test_cube_log_with_table_rate(tmp_path):
     header = ",".join((*CUBE, "tacho_rad_s")) + "\n"
-    rows = "".join(
-        f"{k / 100},{','.join(['17'] * 12)},{3.0 if k < 100 else -3.0}\n" for k in range(200)
-    )
-    log = load(write(tmp_path / "cube.csv", "# a comment\n" + header + rows))
+    rows = "".join(f"{k / 100},{','.join(REST)},{3.0 if k < 100 else -3.0}\n" for k in range(200))
+    log = read_board_log(write(tmp_path / "cube.csv", "# a comment\n" + header + rows))
     assert log.kind == "cube"
     wire = Wire()
-    board = VirtualBoard(wire, PLAYED, sample_period_s=log.period_s)
-    for item in log.items():
+    board = VirtualBoard(wire, PLAYED, sample_period_s=log.timing.period_s)
+    for item in items_of(log):
         board.take(item)
     board.finish()
     frames, ledger = events(wire)
@@ -159,9 +165,9 @@ def test_real_time_pacing_and_stop():
     assert not thread.is_alive() and board.samples < 100_000
 
 
-def test_last_line_that_was_cut_off_is_left_out(tmp_path, caplog):
-    log = load(write(tmp_path / "imu.csv", imu_rows(10) + "10.100,0.1,-0.2"))
-    assert len(log.rows) == 10 and "imu.csv:12" in caplog.text and "cut off" in caplog.text
+def test_last_line_that_was_cut_off_is_left_out_and_said(tmp_path):
+    log = read_board_log(write(tmp_path / "imu.csv", imu_rows(10) + "10.100,0.1,-0.2"))
+    assert len(log.t_s) == 10 and "cut off" in log.notes[-1]
 
 
 @pytest.mark.parametrize(
@@ -170,25 +176,33 @@ def test_last_line_that_was_cut_off_is_left_out(tmp_path, caplog):
         ("", "empty"),
         (IMU_HEADER, "want at least two"),
         ("t_s,fx_mps2\n1,2\n", "imu.csv:1: column 'fy_mps2' is missing"),
-        (imu_rows(3) + "11,0,zero,0,0,0,0\n", "imu.csv:5: column 'fy_mps2': 'zero' is no number"),
+        (
+            imu_rows(3) + "11,0,zero,0,0,0,0\n",
+            "imu.csv:5: column 'fy_mps2': 'zero' is no finite number",
+        ),
         (
             imu_rows(3) + "11,0,nan,0,0,0,0\n",
-            "imu.csv:5: column 'fy_mps2': 'nan'; want a finite number",
+            "imu.csv:5: column 'fy_mps2': 'nan' is no finite number",
         ),
-        (imu_rows(3) + "11,0,0,0\n", "imu.csv:5: column 'wx_radps' is missing"),
-        (imu_rows(3) + "9,0,0,0,0,0,0\n", "imu.csv:5: t_s 9.0 does not rise"),
+        (imu_rows(3) + "11,0,0,0\n", "imu.csv:5: 4 cells, the header names 7"),
         (
-            ",".join(CUBE) + "\n0," + "1," * 11 + "40000\n",
-            "column 'a43_counts': '40000'; want a whole number of 16 bits",
+            imu_rows(3) + "9,0,0,0,0,0,0\n",
+            "imu.csv:5: column 't_s': time 9.000000 s after 10.020000 s does not rise",
+        ),
+        (
+            ",".join(CUBE)
+            + "\n"
+            + "".join(f"{k / 100}," + "1," * 11 + "40000\n" for k in range(3)),
+            "column 'a43_counts' at 0.000 s: 40000; want a whole number of 16 bits",
         ),
     ],
 )
 def test_errors_name_file_row_and_column(tmp_path, text, words):
-    with pytest.raises(PlayError) as error:
-        load(write(tmp_path / "imu.csv", text))
+    with pytest.raises(LogError) as error:
+        read_board_log(write(tmp_path / "imu.csv", text))
     assert words in str(error.value)
 
 
 def test_missing_file(tmp_path):
-    with pytest.raises(PlayError, match="No such file"):
-        load(tmp_path / "no.csv")
+    with pytest.raises(FileNotFoundError):
+        read_board_log(tmp_path / "no.csv")

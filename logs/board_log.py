@@ -1,0 +1,137 @@
+"""A log of a whole board, as it is played, imported or run: its samples, and the fixes beside them.
+
+Two kinds, told apart by their header:
+
+    t_s, fx_mps2, fy_mps2, fz_mps2, wx_radps, wy_radps, wz_radps       a six-axis unit, in
+                                                                       forward-right-down
+    t_s, a11_counts, a12_counts ... a43_counts; optional tacho_rad_s   the cube
+
+and for a six-axis unit the epochs of its receiver (gnss.csv in the same folder):
+
+    t_s, lat_deg, lon_deg, height_m, quality, sd_n_m, sd_e_m, sd_u_m, vn_mps, ve_mps, vd_mps
+
+height above the ellipsoid; quality as RTKLIB counts: 1 fixed, 2 float, 3 SBAS, 4 differential, 5
+single, 0 none. Other units in the columns' names are converted.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.layouts.catalogue import CUBE
+from inertial.navigation.fix import Fix
+from inertial.plausible import doubt_of_gravity, doubt_of_rate
+from inertial.timing import Timing
+from logs.cube_log import LSB_MG, read_log
+from logs.drive_log import IMU, read_fixes
+from logs.quantities import read_si, refuse, said_of, timing_of
+from logs.sheet import LogError, Sheet, open_sheet
+
+Array = NDArray[np.float64]
+
+CUBE_AXES = tuple(f"a{sensor}{axis}" for sensor in range(1, 5) for axis in range(1, 4))
+COUNTS_16 = (-32768, 32767)  # what a frame of the wire carries
+HALF_SIDE = 0.05  # m; gravity is read without it
+
+
+@dataclass(frozen=True)
+class BoardLog:
+    """A whole log in memory, checked. Arrays over samples (n)."""
+
+    path: Path
+    kind: str  # "imu" or "cube"
+    t_s: Array  # (n,)
+    index: NDArray[np.int64]  # (n,) sample numbers; what is missing was lost
+    f_b: Array | None  # (n, 3) m/s^2 of a six-axis unit
+    omega_b: Array | None  # (n, 3) rad/s
+    counts: NDArray[np.int64] | None  # (n, 12) of a cube
+    tacho: Array | None  # (n,) rad/s
+    fixes: tuple[Fix, ...]
+    timing: Timing
+    notes: tuple[str, ...]  # for people: what is doubtful, missing or was left out
+
+    @property
+    def duration_s(self) -> float:
+        """From the first to the last sample, s."""
+        return float(self.t_s[-1] - self.t_s[0])
+
+
+def read_board_log(
+    path: Path, gnss: Path | None = None, units_as_named: bool = False, lsb_mg: float = LSB_MG
+) -> BoardLog:
+    """Read and check a log: a CSV file or a folder with imu.csv. gnss: its epochs; default gnss.csv
+    beside it, if any. Raises LogError, OSError.
+    """
+    path = Path(path)
+    if path.is_dir():
+        path = path / "imu.csv"
+    sheet = open_sheet(path)
+    if any(f"a11_{unit}" in sheet.header for unit in ("counts", "mps2", "g", "mg")):
+        return _cube(path, units_as_named, lsb_mg)
+    if gnss is None and (path.parent / "gnss.csv").is_file():
+        gnss = path.parent / "gnss.csv"
+    return _imu(path, sheet, gnss, units_as_named)
+
+
+def _imu(path: Path, sheet: Sheet, gnss: Path | None, as_named: bool) -> BoardLog:
+    table = read_si(sheet, IMU)
+    timing = timing_of(sheet, table)
+    f_b, omega_b = (
+        np.column_stack([table[name] for name in IMU[a:b]]) for a, b in ((1, 4), (4, 7))
+    )
+    doubts = [doubt_of_gravity(f_b), doubt_of_rate(table["t"], f_b, omega_b)]
+    notes = refuse(path, doubts, as_named) + said_of(path, timing, table.cut_off)
+    fixes, left_out = read_fixes(gnss) if gnss else ([], [])
+    return BoardLog(
+        path,
+        "imu",
+        table["t"],
+        timing.index,
+        f_b,
+        omega_b,
+        None,
+        None,
+        tuple(fixes),
+        timing,
+        (*notes, *left_out),
+    )
+
+
+def _cube(path: Path, as_named: bool, lsb_mg: float) -> BoardLog:
+    log = read_log(path, CUBE_AXES, lsb_mg)
+    if log.counts is None:
+        raise LogError(
+            f"{path}: a board sends counts, and this log has m/s^2: want columns a11_counts ..."
+            " (gyrofree run takes the log as it is)"
+        )
+    low, high = COUNTS_16
+    bad = np.argwhere((log.counts < low) | (log.counts > high))
+    if len(bad):
+        row, column = bad[0]
+        raise LogError(
+            f"{path}: column '{CUBE_AXES[column]}_counts' at {log.t_s[row]:.3f} s:"
+            f" {log.counts[row, column]}; want a whole number of 16 bits"
+        )
+    doubt = doubt_of_gravity(centre_force(log.f_axis), lsb_mg)
+    notes = refuse(path, [doubt], as_named) + said_of(path, log.timing, log.cut_off)
+    return BoardLog(
+        path,
+        "cube",
+        log.t_s,
+        log.index,
+        None,
+        None,
+        log.counts,
+        log.tacho,
+        (),
+        log.timing,
+        tuple(notes),
+    )
+
+
+def centre_force(f_axis: Array) -> Array:
+    """Specific force (n, 3) of a cube's centre, m/s^2, from its twelve axes (n, 12) (E-5)."""
+    layout = CUBE(HALF_SIDE)
+    return f_axis @ layout.theta_b / (len(layout.theta_b) / 3.0)

@@ -1,0 +1,123 @@
+"""Columns by what they measure: the unit stands in a column's name, the numbers come in SI.
+
+t_s, t_ms, fx_mps2, fx_g, wx_radps, wx_degps, lat_deg, height_m, vn_mps ...
+"""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.constants import GRAVITY
+from inertial.plausible import Doubt, doubt_of_time
+from inertial.timing import Timing, TimingError, sample_timing
+from logs.sheet import LogError, Sheet, Table
+
+Array = NDArray[np.float64]
+
+UNITS = {
+    "s": 1.0,
+    "ms": 1e-3,
+    "us": 1e-6,
+    "ns": 1e-9,
+    "mps2": 1.0,
+    "g": GRAVITY,
+    "mg": GRAVITY * 1e-3,
+    "radps": 1.0,
+    "degps": math.pi / 180.0,
+    "dps": math.pi / 180.0,
+    "rad": 1.0,
+    "deg": math.pi / 180.0,
+    "m": 1.0,
+    "cm": 0.01,
+    "mps": 1.0,
+    "kmph": 1.0 / 3.6,
+}
+USUAL = {"t": "s", "f": "mps2", "w": "radps", "lat": "deg", "lon": "deg", "height": "m", "v": "mps"}
+
+
+def column_of(sheet: Sheet, quantity: str) -> tuple[str, float] | None:
+    """Name of the column of a quantity ("t", "fx", "lat") and its unit in SI; None without one."""
+    for name in sheet.header:
+        stem, _, unit = name.rpartition("_")
+        if stem == quantity and unit in UNITS:
+            return name, UNITS[unit]
+    return (quantity, 1.0) if quantity in sheet.header else None
+
+
+def read_si(
+    sheet: Sheet,
+    wanted: Sequence[str],
+    optional: Sequence[str] = (),
+    may_miss: Sequence[str] = (),
+) -> Table:
+    """Quantities in SI, by their names without unit; of the optional ones those that are there.
+
+    Cells of `may_miss` may be empty and become NaN. Raises LogError as Sheet.read does.
+    """
+    found = {q: column_of(sheet, q) for q in (*wanted, *optional)}
+    missing = [q for q in wanted if found[q] is None]
+    if missing:
+        as_written = [_usual(q) for q in wanted]
+        sheet.want([_usual(q) for q in missing], f"{', '.join(as_written)} (or in other units)")
+    there = {q: pair for q, pair in found.items() if pair is not None}
+    names = [name for name, _ in there.values()]
+    free = [there[q][0] for q in may_miss if q in there]
+    table = sheet.read(names, free)
+    columns = {q: table[name] * unit for q, (name, unit) in there.items()}
+    return Table(columns, table.lines, table.cut_off)
+
+
+def timing_of(sheet: Sheet, table: Table) -> Timing:
+    """Timing of a table's column "t" (s). Raises LogError for times that do not rise or are no
+    seconds.
+    """
+    if len(table) < 2:
+        raise LogError(f"{sheet.path}: {len(table)} samples; want at least two below the header")
+    name = (column_of(sheet, "t") or ("t_s", 1.0))[0]
+    try:
+        timing = sample_timing(table["t"])
+    except TimingError as error:
+        line = table.lines[error.row]
+        raise LogError(f"{sheet.path}:{line}: column {name!r}: {error}") from None
+    if doubt := doubt_of_time(timing.period_s, name):
+        raise LogError(f"{sheet.path}: {doubt.text}")
+    return timing
+
+
+def refuse(path: Path, doubts: Sequence[Doubt | None], as_named: bool) -> list[str]:
+    """What is doubtful in a log, in words. Raises LogError unless the units are meant as named."""
+    said = [doubt.text for doubt in doubts if doubt is not None]
+    if said and not as_named:
+        raise LogError(
+            f"{path}: {'; '.join(said)}. If the numbers are right all the same (a body that never"
+            " rests, say), give --units-as-named"
+        )
+    return said
+
+
+def said_of(path: Path, timing: Timing, cut_off: bool) -> list[str]:
+    """What of a log's times a person should know."""
+    said = []
+    if timing.missing:
+        longest = max(timing.holes, key=lambda hole: hole.missing)
+        said.append(
+            f"{path}: {timing.missing} samples are missing in {len(timing.holes)} holes, the"
+            f" longest {longest.seconds:.3f} s after {longest.t_s:.3f} s"
+        )
+    if timing.jitter_s > 0.05 * timing.period_s and timing.jitter_s > timing.resolution_s:
+        said.append(
+            f"{path}: times jitter by {timing.jitter_s * 1e3:.2f} ms about a period of"
+            f" {timing.period_s * 1e3:.3f} ms: samples are taken as even"
+        )
+    if cut_off:
+        said.append(f"{path}: the last line was cut off; the rows before it are used")
+    return said
+
+
+def _usual(quantity: str) -> str:
+    stem = quantity.rstrip("xyzned") if quantity[:1] in "fwv" and len(quantity) == 2 else quantity
+    unit = USUAL.get(stem) or USUAL.get(quantity[:1] if len(quantity) == 2 else quantity)
+    return f"{quantity}_{unit}" if unit else quantity

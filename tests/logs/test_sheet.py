@@ -1,0 +1,97 @@
+"""One reader of CSV: the same numbers however they are written, and errors that name the place."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from logs.sheet import LogError, open_sheet
+
+NAMES = ("t_s", "fx_mps2", "Temp °C")
+numbers = st.floats(-1e6, 1e6, allow_nan=False).map(lambda v: round(v, 6))
+
+
+def read(path, names=("t_s", "a"), may_miss=()):
+    return open_sheet(path).read(list(names), may_miss)
+
+
+@st.composite
+def written(draw):
+    """A table and the bytes of one way to write it."""
+    table = draw(st.lists(st.tuples(numbers, numbers, numbers), min_size=1, max_size=8))
+    separator = draw(st.sampled_from([",", ";", "\t", "|"]))
+    comma = separator != "," and draw(st.booleans())
+    quoted, newline = draw(st.booleans()), draw(st.sampled_from(["\n", "\r\n", "\r"]))
+    encoding = draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "cp1252"]))
+    comment = draw(st.sampled_from(["", "# von Hand, gemessen", "% a; b", "// x|y\tz"]))
+
+    def cell(value):
+        text = f"{value:.6f}" if isinstance(value, float) else value
+        text = text.replace(".", ",") if comma and isinstance(value, float) else text
+        return f'"{text}"' if quoted else text
+
+    lines = [comment] if comment else []
+    lines.append(separator.join(cell(name) for name in NAMES))
+    for row in table:
+        lines.append(separator.join(cell(value) for value in row))
+        if draw(st.booleans()):
+            lines.append(draw(st.sampled_from(["", comment or "#", separator * 2])))
+    return np.array(table), (newline.join(lines) + newline).encode(encoding)
+
+
+@settings(max_examples=300, deadline=None)
+@given(written())
+def test_the_same_numbers_however_they_are_written(tmp_path_factory, pair):
+    table, data = pair
+    path = tmp_path_factory.mktemp("sheet") / "Messung Prüfstand (1).csv"
+    path.write_bytes(data)
+    got = read(path, NAMES)
+    np.testing.assert_array_equal(np.column_stack([got[name] for name in NAMES]), table)
+    lines = data.decode(open_sheet(path).encoding).splitlines()
+    for row, line in zip(table, got.lines, strict=True):
+        assert f"{abs(row[0]):.6f}"[:3].replace(".", "") in lines[line - 1].replace(
+            ",", ""
+        ).replace(".", "")
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"", ["empty", "header"]),
+        (b"# only this\n", ["empty"]),
+        (b"0,1\n1,2\n", [":1:", "numbers where the columns' names"]),
+        (b"t_s a\n0 1\n", [":1:", "'t_s'", "one column only", "semicolon"]),
+        (b"t_s,a,a\n0,1,2\n", [":1:", "'a' stands there twice"]),
+        (b"t_s,b\n0,1\n", [":1:", "'a' is missing", "found t_s, b"]),
+        (b"# c\nt_s,a\n0,1\n\n#x\n1,zwei\n", [":6:", "'a'", "'zwei'"]),
+        (b"t_s,a\n0,1\n\n1,nan\n", [":4:", "'a'", "'nan'"]),
+        (b"t_s,a\n0,1\n1,inf\n", [":3:", "'a'", "'inf'"]),
+        (b"t_s,a,b\n0,1,2\n1,2\n2,3,4\n", [":3:", "2 cells", "names 3"]),
+        (b't_s,a\n0,"1,5"\n', [":2:", "decimal comma", "semicolon"]),
+        (bytes(range(256)) * 8, ["not a text file"]),
+        (b"x" * 100_000, [":1:", "64 kB"]),
+        (b"t_s,a\n0," + b"1" * 3_000_000 + b"\n", ["1 MB"]),
+    ],
+)
+def test_what_cannot_be_used_is_named_with_its_place(tmp_path, data, words):
+    path = tmp_path / "log.csv"
+    path.write_bytes(data)
+    with pytest.raises(LogError) as caught:
+        read(path)
+    for word in (str(path), *words):
+        assert word in str(caught.value), caught.value
+
+
+def test_a_last_line_cut_off_is_left_out_and_said(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_bytes(b"t_s,a,b\n0,1,2\n1,2")
+    got = read(path)
+    assert got.cut_off and got["t_s"].tolist() == [0.0]
+    path.write_bytes(b"t_s,a,b\n0,1,2\n1,2,3")
+    assert not read(path).cut_off and len(read(path)) == 2
+
+
+def test_cells_that_may_miss_become_nan(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_bytes(b"t_s,a\n0,\n1,2\n2,NA\n")
+    assert np.isnan(read(path, may_miss=("a",))["a"]).tolist() == [True, False, True]
