@@ -3,7 +3,7 @@ navigation filter.
 """
 
 import math
-from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -16,6 +16,17 @@ from inertial.navigation.navigation import Mode, NavigatorConfig, Solution
 from inertial.navigation.unaided import equivalent_drift, position_error
 from inertial.simulation.drive import simulate
 from inertial.simulation.table import IDEAL
+
+
+class Told(NamedTuple):
+    """What navigation takes of ten rate estimates."""
+
+    f_b: np.ndarray
+    omega_b: np.ndarray
+    P: np.ndarray
+
+    def __len__(self) -> int:
+        return 10
 
 
 def test_drift_of_unaided_navigation_by_the_closed_form():
@@ -53,17 +64,13 @@ def test_estimates_of_a_rate_estimator_are_navigated_with():
     fixes, errors, sigma, P = list(drive.fixes), [], [], np.radians(1.0) ** 2 * np.eye(3)
     for k in range(0, len(truth.t) - 10, 10):
         t = drive.imu[k : k + 10, 0]
+        rows = slice(k + 1, k + 11)
+        drift = np.where(t[:, None] > 21.0, wander[k : k + 10], 0.0)
         said = [
-            RateOutput(
-                i, k + i, name, SimpleNamespace(f_b=truth.f_b[k + i + 1], omega_b=omega, P=P)
-            )
-            for i in range(10)
+            RateOutput(0, k, 1, name, Told(truth.f_b[rows], omega, np.tile(P, (10, 1, 1))))
             for name, omega in (
-                (
-                    "products-ekf",
-                    truth.omega_ib_b[k + i + 1] + (wander[k + i] if t[i] > 21.0 else 0.0),
-                ),
-                ("least-squares", np.full(3, 9.0)),  # not believed, so it must not matter
+                ("products-ekf", truth.omega_ib_b[rows] + drift),
+                ("least-squares", np.full((10, 3), 9.0)),  # not believed: it must not matter
             )
         ]
         for o in navigation.feed(1, 0.01, t, said):
