@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.calibration.fit import Fit
+from inertial.elementary import norm
 from inertial.layouts.layout import Layout
 from inertial.toml_file import read_versioned, write_whole
 
@@ -216,7 +217,7 @@ def _card(table: dict[str, Any]) -> Card:
         names=tuple(str(axis["name"]) for axis in axes),
         bias=values["bias_mps2"],
         scale=values["scale"],
-        direction_b=values["direction_b"] / np.linalg.norm(values["direction_b"], axis=1)[:, None],
+        direction_b=values["direction_b"] / norm(values["direction_b"])[:, None],
         position_b=values["position_b_m"],
         covariance=column("covariance").reshape(n, 7, 7),
         residual=column("residual_mps2"),

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.constants import GRAVITY, MILLI_G
+from inertial.core import native
+from inertial.elementary import applied, product
 
 Array = NDArray[np.float64]
 
@@ -202,7 +204,7 @@ class Layout:
 
     def quadratic(self, omega_b: Array) -> Array:
         """q(omega), (N,), m/s^2: what the rate omega_b (3,) adds to every axis (E-2)."""
-        return self.Q @ products(omega_b)
+        return applied(self.Q, products(omega_b))
 
     def _scaled(self, matrix: Array) -> Array:
         length = np.ones(matrix.shape[1])
@@ -221,7 +223,8 @@ class Layout:
                 f" {wanted} unknowns ({unknowns}): place axes off one plane and one line, four"
                 " triads at corners that span a tetrahedron see everything"
             )
-        return np.linalg.solve(matrix.T @ matrix, matrix.T)
+        normal = product(matrix.T, matrix)
+        return native.solve_positive(normal, np.ascontiguousarray(matrix.T))
 
 
 CORNERS = np.array(

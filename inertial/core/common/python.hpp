@@ -58,6 +58,8 @@ MatrixOut to_numpy(const Eigen::MatrixBase<Derived>& m) {
 void bind_elementary(nb::module_& m);
 void bind_rotation(nb::module_& m);
 void bind_places(nb::module_& m);
+void bind_attitude(nb::module_& m);
+void bind_alignment(nb::module_& m);
 void bind_health(nb::module_& m);
 void bind_navigation(nb::module_& m);
 
