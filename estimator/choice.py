@@ -1,4 +1,4 @@
-"""Names and files of the settings become estimators, layouts and calibration cards; a wrong one is
+"""Names and files of the settings become estimators, layouts and calibration files; a wrong one is
 refused by name.
 """
 
@@ -59,7 +59,7 @@ def beliefs(settings: EstimatorSettings) -> Beliefs:
 
 
 def load_card(path: Path) -> Card:
-    """A calibration card; raises UnknownEstimator for a file that is none or cannot be read."""
+    """A calibration file; raises UnknownEstimator for a file that is none or cannot be read."""
     try:
         return read_card(path)
     except (CardError, OSError) as error:

@@ -37,7 +37,7 @@ class RateMessages:
     def __init__(
         self, batch: pb.AccelBatch, card: str, shared: dict[tuple[Any, ...], bytes] | None = None
     ) -> None:
-        """card: id of the calibration card in use, empty for none; shared: what batches of one
+        """card: id of the calibration file in use, empty for none; shared: what batches of one
         board have in common.
         """
         first = batch.header

@@ -76,8 +76,8 @@ class EstimatorSettings(BaseModel):
     latitude_deg: float | None = Field(
         default=None, ge=-90.0, le=90.0
     )  # given: a standing body turns with the Earth
-    calibration: Path | None = None  # calibration card of a device that calibrations does not name
-    calibrations: dict[str, Path] = Field(default_factory=dict)  # calibration cards by device name
+    calibration: Path | None = None  # calibration file of a device that calibrations does not name
+    calibrations: dict[str, Path] = Field(default_factory=dict)  # calibration files by device name
     cards: Path = Path("var/cards")  # folder that a guided calibration saves its cards to
     axes: Path = Path("var/axes")  # folder that a guided detection saves its axis maps to
     axis_maps: dict[str, Path] = Field(default_factory=dict)  # axis maps in use, by device name
@@ -109,7 +109,7 @@ class EstimatorSettings(BaseModel):
         return self.layouts.get(device, self.layout)
 
     def card_of(self, device: str) -> Path | None:
-        """Calibration card of a device."""
+        """Calibration file of a device."""
         return self.calibrations.get(device, self.calibration)
 
     def vehicle_of(self, device: str) -> VehicleSettings:

@@ -10,7 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.attitude.axis_map import IMU, SI, AxisMap, Figures
-from inertial.attitude.wiring import FORCE_REST, RATE_REST, VOLT_REST, Board, Turn, WiringSession
+from inertial.attitude.wiring import (
+    FORCE_REST,
+    RATE_REST,
+    VOLT_REST,
+    BoardColumns,
+    GuidedWiring,
+    Turn,
+)
 from inertial.constants import GRAVITY
 from logs.attitude_log import SAMPLES, LogError
 
@@ -44,7 +51,7 @@ def detect(log: Path, figures: Figures = ACC_GYRO, volt_per_count: float = VOLT_
     """
     t, columns, values = _read(log)
     period = float(np.median(np.diff(t)))
-    session = WiringSession(_board(columns, figures, volt_per_count))
+    session = GuidedWiring(_board(columns, figures, volt_per_count))
     scale = np.array([volt_per_count if name.endswith("_counts") else 1.0 for name in columns])
     said: list[tuple[float, str]] = []
     for k in range(len(t)):
@@ -87,9 +94,9 @@ def _read(log: Path) -> tuple[Array, tuple[str, ...], Array]:
     return t, columns, values
 
 
-def _board(columns: tuple[str, ...], figures: Figures, volt_per_count: float) -> Board:
+def _board(columns: tuple[str, ...], figures: Figures, volt_per_count: float) -> BoardColumns:
     if columns == SAMPLES[1:]:
-        return Board(
+        return BoardColumns(
             "imu",
             IMU,
             np.array([0.01] * 3 + [0.001] * 3),
@@ -97,6 +104,6 @@ def _board(columns: tuple[str, ...], figures: Figures, volt_per_count: float) ->
             SI,
         )
     names = tuple(f"input {INPUT.fullmatch(name)[1]}" for name in columns)
-    return Board(
+    return BoardColumns(
         "adc", names, np.full(len(names), volt_per_count), np.full(len(names), VOLT_REST), figures
     )

@@ -1,4 +1,4 @@
-"""Logs on disk to a calibration card: tumbles without a table and runs on the table, told apart by
+"""Logs on disk to a calibration file: tumbles without a table and runs on the table, told apart by
 the tachometer.
 """
 

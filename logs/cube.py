@@ -354,9 +354,9 @@ def _turned(data: CubeLog, shape: Layout, omega_b: Array) -> Array:
 def _notes(data: CubeLog, truth: Reference, card: Card | None) -> list[str]:
     found = [
         (
-            f"calibration card {card.id}"
+            f"calibration file {card.id}"
             if card
-            else "no calibration card: nominal scale, positions and directions"
+            else "no calibration file: nominal scale, positions and directions"
         )
     ]
     if truth.name == "tachometer":

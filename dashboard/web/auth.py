@@ -33,7 +33,7 @@ from dashboard.web.users import (
 __all__ = [
     "Gate",
     "Role",
-    "Session",
+    "SignIn",
     "User",
     "UserStore",
     "WaitError",
@@ -49,7 +49,7 @@ PARALLEL = 2  # passwords verified at once: each takes 32 MiB and a core
 
 
 @dataclass
-class Session:
+class SignIn:
     """One sign-in; times in s since 1970."""
 
     user: str
@@ -120,7 +120,7 @@ class Gate:
         self.backoff = Backoff(settings.free_attempts, settings.longest_wait_s, clock)
         self._file = settings.users.with_name(settings.users.name + ".signed-in")
         self._lock = threading.Lock()
-        self._sessions: dict[str, Session] = self._load()
+        self._sessions: dict[str, SignIn] = self._load()
         self._verifying = asyncio.Semaphore(PARALLEL)
 
     async def sign_in(self, name: str, password: str, address: str) -> str | None:
@@ -148,7 +148,7 @@ class Gate:
         self.backoff.forgive(address)
         return self._begin(name, address, "one-time link")
 
-    def session_of(self, connection: HTTPConnection) -> tuple[Session, User] | None:
+    def session_of(self, connection: HTTPConnection) -> tuple[SignIn, User] | None:
         """Who sends this request or opens this WebSocket; None for nobody."""
         token = connection.cookies.get(self.settings.cookie, "")
         return self.look_up(_digest(token)) if token else None
@@ -157,7 +157,7 @@ class Gate:
         """What look_up takes: the hash of the cookie's id."""
         return _digest(connection.cookies.get(self.settings.cookie, ""))
 
-    def look_up(self, key: str) -> tuple[Session, User] | None:
+    def look_up(self, key: str) -> tuple[SignIn, User] | None:
         """The session and the user as the users file has him now; ends what is expired."""
         session, now = self._sessions.get(key), self._clock()
         if session is None:
@@ -180,7 +180,7 @@ class Gate:
     def _begin(self, name: str, address: str, means: str) -> str:
         token, now = secrets.token_urlsafe(32), self._clock()
         with self._lock:
-            self._sessions[_digest(token)] = Session(name, secrets.token_urlsafe(24), now, now)
+            self._sessions[_digest(token)] = SignIn(name, secrets.token_urlsafe(24), now, now)
             while len(self._sessions) > SESSIONS:
                 self._sessions.pop(next(iter(self._sessions)))
             self._save()
@@ -192,10 +192,10 @@ class Gate:
             if self._sessions.pop(key, None) is not None:
                 self._save()
 
-    def _load(self) -> dict[str, Session]:
+    def _load(self) -> dict[str, SignIn]:
         try:
             return {
-                key: Session(**entry) for key, entry in json.loads(self._file.read_text()).items()
+                key: SignIn(**entry) for key, entry in json.loads(self._file.read_text()).items()
             }
         except FileNotFoundError:
             return {}

@@ -9,7 +9,7 @@ from fastapi import HTTPException, Request
 from dashboard.data.store import Store
 from dashboard.desk import Desk
 from dashboard.settings import DashboardSettings
-from dashboard.web.auth import Gate, Role, Session, User, same_token
+from dashboard.web.auth import Gate, Role, SignIn, User, same_token
 from dashboard.web.control import Replay
 from dashboard.web.jobs import Jobs
 from dashboard.web.readings import Readings
@@ -42,7 +42,7 @@ class Front:
 class Asker:
     """The signed-in user of a request."""
 
-    session: Session
+    session: SignIn
     user: User
 
     @property

@@ -41,7 +41,7 @@ class RateBoard:
         card: Any | None = None,
         beliefs: Beliefs = Beliefs(),
     ) -> None:
-        """Names are keys of inertial.rate.estimators.VARIANTS; card: calibration card of the
+        """Names are keys of inertial.rate.estimators.VARIANTS; card: calibration file of the
         device, or None.
 
         Raises CardError for the card of another layout.

@@ -41,7 +41,7 @@ class Cube:
         self._gyro_free: GyroFreeNavigation | None = None
 
     def begin_anew(self) -> None:
-        """Another calibration card is in use: the estimators begin anew with the next batch."""
+        """Another calibration file is in use: the estimators begin anew with the next batch."""
         self._board = None
 
     @property
@@ -89,7 +89,7 @@ class Cube:
         self._common.mutes.attend(self._device, self._gyro_free.board)
 
     def _ready(self) -> tuple[RateBoard, BoardMessages]:
-        """The rate estimators with the calibration card in use; raises BadMessage for a card of
+        """The rate estimators with the calibration file in use; raises BadMessage for a card of
         another layout.
         """
         if self._board is None or self._messages is None:

@@ -1,4 +1,4 @@
-"""Orders to the estimator of a device: guided calibrations and calibration cards. Part of the
+"""Orders to the estimator of a device: guided calibrations and calibration files. Part of the
 shell: knows messages.
 
 A Pipeline hands it samples and EstimatorCommands; what it says is a function of these, except for
@@ -17,7 +17,7 @@ from estimator.convert.header import as_list, sample_header
 from estimator.convert.samples import Samples
 from inertial.calibration.card import Card, CardError, read_card, write_card
 from inertial.calibration.fit import CalibrationError
-from inertial.calibration.guided import FITTED, SAVED, Session
+from inertial.calibration.guided import FITTED, SAVED, GuidedCalibration
 from inertial.layouts.layout import Layout
 from messages.contract import gyrofree_pb2 as pb
 
@@ -37,7 +37,7 @@ class CalibrationDesk:
     def __init__(self, cards: Path) -> None:
         """cards: folder of saved cards."""
         self._cards = cards
-        self._sessions: dict[str, Session] = {}
+        self._sessions: dict[str, GuidedCalibration] = {}
         self._headers: dict[
             str, bytes
         ] = {}  # of the newest batch; bytes, because the pipeline's state is saved
@@ -132,12 +132,12 @@ class CalibrationDesk:
             raise CalibrationError(
                 f"{command.device}: no accelerometer samples yet; connect the board first"
             )
-        self._sessions[command.device] = Session(layout)
+        self._sessions[command.device] = GuidedCalibration(layout)
         self._saved.pop(command.device, None)
         self._next.pop(command.device, None)
         return "calibration started"
 
-    def _running(self, device: str) -> Session:
+    def _running(self, device: str) -> GuidedCalibration:
         if device not in self._sessions:
             raise CalibrationError(f"{device}: no calibration runs; start one first")
         return self._sessions[device]

@@ -23,8 +23,8 @@ from inertial.attitude.wiring import (
     RATE_REST,
     SAVED,
     VOLT_REST,
-    Board,
-    WiringSession,
+    BoardColumns,
+    GuidedWiring,
 )
 from messages.contract import gyrofree_pb2 as pb
 
@@ -52,7 +52,7 @@ class WiringDesk:
         """
         self._folder = folder
         self.used: dict[str, AxisMap] = {device: read_map(path) for device, path in maps.items()}
-        self._sessions: dict[str, WiringSession] = {}
+        self._sessions: dict[str, GuidedWiring] = {}
         self._newest: dict[
             tuple[str, str], bytes
         ] = {}  # newest batch of a device and source; the state is pickled
@@ -143,13 +143,13 @@ class WiringDesk:
                 f"{command.device}: no samples of an accelerometer and gyroscope board yet; connect"
                 " the board first"
             )
-        self._sessions[command.device] = WiringSession(
+        self._sessions[command.device] = GuidedWiring(
             wiring_board(self._batch(command.device, source))
         )
         self._next.pop(command.device, None)
         return "detection of axes and signs started"
 
-    def _running(self, device: str) -> WiringSession:
+    def _running(self, device: str) -> GuidedWiring:
         if device not in self._sessions:
             raise MapError(f"{device}: no detection runs; start one first")
         return self._sessions[device]
@@ -203,13 +203,13 @@ def load(settings: EstimatorSettings) -> WiringDesk:
         raise UnknownEstimator(f"[estimator] axis_maps: {error}") from None
 
 
-def wiring_board(batch: Batch) -> Board:
+def wiring_board(batch: Batch) -> BoardColumns:
     """What the columns of a board's batches are; raises MapError for counts that nothing is known
     of.
     """
     if isinstance(batch, pb.ImuBatch):
         quantum = np.array([0.01] * 3 + [0.001] * 3)  # m/s^2, rad/s
-        return Board("imu", IMU, quantum, np.array([FORCE_REST] * 3 + [RATE_REST] * 3))
+        return BoardColumns("imu", IMU, quantum, np.array([FORCE_REST] * 3 + [RATE_REST] * 3))
     n, device = batch.channels, batch.header.device
     inputs = [i for i in range(32) if batch.channel_mask >> i & 1]
     if len(inputs) != n or not (batch.accel_v_per_mps2 > 0.0 and batch.gyro_v_per_radps > 0.0):
@@ -220,10 +220,12 @@ def wiring_board(batch: Batch) -> Board:
         batch.zero_g_v, batch.accel_v_per_mps2, batch.zero_rate_v, batch.gyro_v_per_radps
     )
     names = tuple(f"input {i}" for i in inputs)
-    return Board("adc", names, np.full(n, batch.volt_per_count), np.full(n, VOLT_REST), figures)
+    return BoardColumns(
+        "adc", names, np.full(n, batch.volt_per_count), np.full(n, VOLT_REST), figures
+    )
 
 
-def _message(message: pb.WiringStatus, session: WiringSession) -> pb.WiringStatus:
+def _message(message: pb.WiringStatus, session: GuidedWiring) -> pb.WiringStatus:
     message.state, message.pose = session.state, session.pose
     message.instruction, message.message = session.instruction, session.message
     message.progress, message.complete = session.progress, session.complete

@@ -94,7 +94,7 @@ def fit(
     uid: Annotated[str, typer.Option(help="Unique id of its board, as it says in HELLO.")] = "",
     as_json: AsJson = False,
 ) -> None:
-    """Make a calibration card: one least squares over all poses and table steps, with
+    """Make a calibration file: one least squares over all poses and table steps, with
     uncertainties.
     """
     from inertial.calibration.card import as_dict, write_card
@@ -127,7 +127,7 @@ def fit(
 
 @app.command()
 def show(
-    card: Annotated[Path, typer.Argument(help="A calibration card.")], as_json: AsJson = False
+    card: Annotated[Path, typer.Argument(help="A calibration file.")], as_json: AsJson = False
 ) -> None:
     """Print a card: what is known of every axis, and how well."""
     from inertial.calibration.card import as_dict, read_card
@@ -172,7 +172,7 @@ def _print(card: Any) -> None:
 @app.command("apply")
 def apply_card(
     log: Annotated[Path, typer.Argument(help="CSV log of the same axes.")],
-    card: Annotated[Path, typer.Argument(help="The calibration card.")],
+    card: Annotated[Path, typer.Argument(help="The calibration file.")],
     out: Annotated[
         Path, typer.Option(help="CSV with a.._mps2 columns, biases and scales taken out.")
     ],
@@ -232,7 +232,7 @@ def _write(file: Any, data: Any, values: np.ndarray, card: str) -> None:
         if extra is not None:
             columns.append((",".join(names), np.reshape(extra, (len(values), -1))))
     file.write(
-        f"# corrected by calibration card {card}\n" + ",".join(head for head, _ in columns) + "\n"
+        f"# corrected by calibration file {card}\n" + ",".join(head for head, _ in columns) + "\n"
     )
     writer = csv.writer(file, lineterminator="\n")
     writer.writerows(

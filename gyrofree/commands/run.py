@@ -51,7 +51,7 @@ def run(
     ] = "cube",
     half_side: Annotated[float, typer.Option(help="Cube logs: centre to face, m.")] = 0.05,
     lsb_mg: Annotated[float | None, typer.Option(help="Cube logs in counts: mg per count.")] = None,
-    card: Annotated[Path | None, typer.Option(help="Cube logs: calibration card to apply.")] = None,
+    card: Annotated[Path | None, typer.Option(help="Cube logs: calibration file to apply.")] = None,
     tacho_aid: Annotated[
         bool,
         typer.Option(

@@ -43,7 +43,7 @@ FORCE_REST, RATE_REST, VOLT_REST = (
 
 
 @dataclass(frozen=True)
-class Board:
+class BoardColumns:
     """The columns a board sends: their names, resolution, and how much they may move at rest."""
 
     source: str
@@ -62,10 +62,10 @@ class Turn:
     by_rate: float
 
 
-class WiringSession:
+class GuidedWiring:
     """The state machine; feed() takes samples, the properties say where it stands."""
 
-    def __init__(self, board: Board) -> None:
+    def __init__(self, board: BoardColumns) -> None:
         """board: what the columns are."""
         self.board = board
         self.step = 0

@@ -1,4 +1,4 @@
-"""The calibration card: what a fit found about one device, as a TOML file that estimates can name.
+"""The calibration file: what a fit found about one device, as a TOML file that estimates can name.
 
 A corrected reading is (m - bias) / scale along direction_b at position_b_m; estimators then work
 with the layout of the card instead of the nominal one. Format version 1.
@@ -29,7 +29,7 @@ class CardError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Card:
-    """A calibration card. Arrays over the axes (N)."""
+    """A calibration file. Arrays over the axes (N)."""
 
     id: str
     date: str  # ISO 8601, UTC
@@ -54,7 +54,7 @@ class Card:
         """The calibrated layout; raises CardError for axes of another layout."""
         if nominal.axes != len(self.bias) or nominal.name != self.layout_name:
             raise CardError(
-                f"calibration card {self.id} is for layout {self.layout_name} with {len(self.bias)}"
+                f"calibration file {self.id} is for layout {self.layout_name} with {len(self.bias)}"
                 f" axes, not for {nominal.name} with {nominal.axes}: name the card of this device,"
                 " or calibrate it"
             )
@@ -190,7 +190,7 @@ def read_card(path: Path) -> Card:
     """Read a card; raises CardError for a file that is none, OSError for one that cannot be
     read.
     """
-    return read_versioned(path, "calibration card", VERSION, _card, CardError, ": calibrate again")
+    return read_versioned(path, "calibration file", VERSION, _card, CardError, ": calibrate again")
 
 
 def _card(table: dict[str, Any]) -> Card:

@@ -53,7 +53,7 @@ class _Run:
     stopped_at: float | None = None
 
 
-class Session:
+class GuidedCalibration:
     """The state machine; feed() and tacho() take data, the properties say where it stands."""
 
     def __init__(self, layout: Layout, rules: Rules = Rules()) -> None:

@@ -126,7 +126,7 @@ class Witness:
         return found
 
     def provenance(self) -> dict[str, dict[str, object]]:
-        """Per device: firmware, board, axes, and the calibration cards its estimates used."""
+        """Per device: firmware, board, axes, and the calibration files its estimates used."""
         found: dict[str, dict[str, object]] = {}
         for device, board in self._boards.copy().items():
             found.setdefault(device, {}).update(

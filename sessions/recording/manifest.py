@@ -82,7 +82,7 @@ class Manifest(BaseModel):
     unknown: int = 0  # messages on keys that are not in the topic table; not recorded
     recovery: str = ""  # what the recovery found and kept
     certificate: dict[str, dict[str, object]] = {}  # per device: certificate.DeviceCertificate
-    provenance: dict[str, dict[str, object]] = {}  # per device: firmware, board, calibration cards
+    provenance: dict[str, dict[str, object]] = {}  # per device: firmware, board, calibration files
     versions: dict[str, str] = {}
     configuration: dict[str, object] = {}
 

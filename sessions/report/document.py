@@ -312,7 +312,7 @@ def _completeness(manifest: Manifest | None, found: Analysis) -> Grid | None:
 
 def _provenance(found: Analysis, manifest: Manifest | None, sha256: str) -> list[tuple[str, str]]:
     cards = sorted({rate.calibration for rate in found.run.rates if rate.calibration})
-    rows = [("SHA-256 of the recording", sha256), ("Calibration card", ", ".join(cards) or "none")]
+    rows = [("SHA-256 of the recording", sha256), ("Calibration file", ", ".join(cards) or "none")]
     if manifest is not None:
         rows += [(f"Version of {name}", value) for name, value in sorted(manifest.versions.items())]
         rows.append(("State of the session", manifest.state))

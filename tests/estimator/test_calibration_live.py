@@ -1,4 +1,4 @@
-"""A calibration card on the live path: readings are corrected before the estimators, and every
+"""A calibration file on the live path: readings are corrected before the estimators, and every
 estimate names it.
 """
 

@@ -183,7 +183,7 @@ def test_card_survives_its_file_and_refuses_strangers(devices, tmp_path):
     with pytest.raises(CardError, match="card version 9, this program reads 1"):
         read_card(path)
     path.write_text("version = 1\nid = 'x'\n")
-    with pytest.raises(CardError, match="not a whole calibration card"):
+    with pytest.raises(CardError, match="not a whole calibration file"):
         read_card(path)
 
 
@@ -228,7 +228,7 @@ def test_the_commands_from_logs_to_a_corrected_run(tmp_path):
         scores.append(json.loads(run.stdout)["estimators"]["least-squares"]["rate_rms_radps"])
     np.testing.assert_allclose(scores[0], scores[1], rtol=0.02)
     bad = runner.invoke(app, ["calibrate", "show", str(tmp_path / "run.csv")])
-    assert bad.exit_code != 0 and "no calibration card" in bad.output
+    assert bad.exit_code != 0 and "no calibration file" in bad.output
 
 
 def test_wrong_wiring_shows_in_the_residuals(devices):

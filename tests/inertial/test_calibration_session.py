@@ -34,7 +34,7 @@ def turned(session, run, start):
 
 
 def test_poses_are_taken_one_by_one_until_it_is_good_enough():
-    one, session = device(CUBE, 5), guide.Session(CUBE)
+    one, session = device(CUBE, 5), guide.GuidedCalibration(CUBE)
     seen, wanted = set(), []
 
     def watch(s):
@@ -59,7 +59,7 @@ def test_poses_are_taken_one_by_one_until_it_is_good_enough():
 
 
 def test_a_pose_that_moves_is_not_taken_and_a_known_one_not_twice():
-    one, session = device(CUBE, 5), guide.Session(CUBE)
+    one, session = device(CUBE, 5), guide.GuidedCalibration(CUBE)
     readings = tumble(one, plan(6)[:1], rest_s=2.5)
     t = fed(session, readings)
     assert session.state == guide.TAKING and 0.3 < session.progress < 1.0
@@ -72,7 +72,7 @@ def test_a_pose_that_moves_is_not_taken_and_a_known_one_not_twice():
 
 
 def test_runs_on_the_table_find_the_positions():
-    one, session = device(CUBE, 8), guide.Session(CUBE)
+    one, session = device(CUBE, 8), guide.GuidedCalibration(CUBE)
     t = fed(session, tumble(one, plan(9)))
     for k, mounting in enumerate(MOUNTINGS):
         t = turned(session, table_run(one, mounting, seed=80 + k), t + 1.0)
@@ -92,11 +92,11 @@ def test_the_same_samples_give_the_same_card_and_a_gap_spoils_only_the_pose():
     readings = tumble(device(CUBE, 6), plan(9))
     cards = []
     for batch in (10, 7):
-        session = guide.Session(CUBE)
+        session = guide.GuidedCalibration(CUBE)
         fed(session, readings, batch=batch)
         cards.append(session.card("a", "2026-01-02T03:04:05Z"))
     assert cards[0].id == cards[1].id and (cards[0].bias == cards[1].bias).all()
-    session = guide.Session(CUBE)
+    session = guide.GuidedCalibration(CUBE)
     fed(session, readings[:300])
     assert session.state == guide.TAKING
     session.gap()
