@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from twins.alignment import carried
+from support.twins.alignment import carried
 
 from inertial import rotation
 from inertial.core import _core_plain, native

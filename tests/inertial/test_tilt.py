@@ -8,7 +8,7 @@ import vqf
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
-from twins import tilt as twins
+from support.twins import tilt as twins
 
 from inertial.attitude import filters, tilt
 from inertial.attitude.filters import ATTITUDES, PublishedTilt, VectorTilt

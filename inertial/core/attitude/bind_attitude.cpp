@@ -43,6 +43,7 @@ nb::class_<Filter> bind_filter(nb::module_& m, const char* name, const char* wha
 
 void bind_attitude(nb::module_& m) {
   nb::module_ a = m.def_submodule("attitude", "Tilt filters of six-axis boards.");
+  a.attr("__name__") = "attitude";  // pickle finds its classes there, whichever build is loaded
   bind_fields<Quaternion>(a, "Quaternion", "w x y z, unit length");
   bind_fields<Butterworth>(a, "Butterworth", "low-pass of second order");
   bind_fields<LowPass<2>>(a, "LowPass2", "memory of a low-pass of two signals");

@@ -1,6 +1,6 @@
 // The fixed-weight tilt filter, as published and in vector form (E-70 to E-76 of
 // docs/equations-attitude.md). R is the direction of the specific force: up, for a body at rest.
-// numpy twin: tests/inertial/twins/tilt.py.
+// numpy twin: tests/support/twins/tilt.py.
 #pragma once
 
 #include "common/rotation.hpp"

@@ -1,5 +1,5 @@
 // Alignment under way: what the samples of a window say between the times of its fixes (E-80 of
-// docs/equations-in-motion.md). numpy twin: tests/inertial/twins/alignment.py.
+// docs/equations-in-motion.md). numpy twin: tests/support/twins/alignment.py.
 #pragma once
 
 #include <vector>
