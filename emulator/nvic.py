@@ -6,10 +6,8 @@ pends its interrupt as long as it is high, also again after the handler's return
 level lines do.
 """
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from emulator.core import Core
+from collections.abc import Callable
+from typing import Any, Protocol
 
 BASE, SIZE = 0xE0000000, 0x10000
 SYSTICK = 15
@@ -18,10 +16,27 @@ CPUID = 0x412FC230
 RESET_KEY = 0x05FA
 
 
+class Processor(Protocol):
+    """What the controller asks of the processor that it interrupts."""
+
+    @property
+    def now(self) -> int:
+        """Clocks since power came."""
+
+    def schedule(self, at: int, action: Callable[[], None]) -> Any:
+        """Call action when the clock reaches `at`; the event can be cancelled."""
+
+    def attend(self) -> None:
+        """Leave the present slice at its next block: an interrupt may have come."""
+
+    def request_reset(self, why: str) -> None:
+        """Reset the processor as soon as the present slice ends."""
+
+
 class Nvic:
     """What pends, what is enabled, what runs."""
 
-    def __init__(self, core: "Core") -> None:
+    def __init__(self, core: Processor) -> None:
         self._core = core
         self.reset()
 

@@ -20,8 +20,8 @@ from messages.bus import orders
 from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client
 from messages.contract.topics import ESTIMATES, PIPELINE_INPUTS, REPLAY_SUFFIX, TopicError, parse
 from messages.history.answers import Asker, declare
-from messages.history.journal import JournalBusy
-from messages.history.mending import Arrival
+from messages.history.journal_folder import JournalBusy
+from messages.history.mending_state import Arrival
 from messages.history.spool import Spool
 
 log = logging.getLogger(__name__)

@@ -6,6 +6,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 import inertial
+from inertial.rate.names import USUAL
 
 KINDS = sorted(file.stem for file in (Path(inertial.__file__).parent / "layouts").glob("*.toml"))
 Metres = Annotated[float, Field(ge=-1000.0, le=1000.0)]
@@ -50,9 +51,7 @@ class EstimatorSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    rate: list[str] = Field(
-        default_factory=lambda: ["products-ekf", "least-squares"]
-    )  # gyro-free rate estimators
+    rate: list[str] = Field(default_factory=lambda: list(USUAL))  # gyro-free rate estimators
     navigators: list[str] = Field(
         default_factory=lambda: ["huber-nhc", "kf", "fpe-fuzzy"]
     )  # the first leads

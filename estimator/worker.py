@@ -20,7 +20,8 @@ from messages.bus import orders
 from messages.bus.session import decode
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import PIPELINE_INPUTS
-from messages.history.mending import Arrival, Mender, Question
+from messages.history.mending import Mender
+from messages.history.mending_state import Arrival, Question
 
 log = logging.getLogger(__name__)
 

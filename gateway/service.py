@@ -22,7 +22,8 @@ from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_c
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import GATEWAY, history_key
 from messages.history.answers import declare
-from messages.history.journal import Journal, JournalBusy
+from messages.history.journal import Journal
+from messages.history.journal_folder import JournalBusy
 
 log = logging.getLogger(__name__)
 

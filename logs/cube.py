@@ -2,35 +2,32 @@
 tachometer.
 """
 
-import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.settings import EstimatorSettings
 from inertial.calibration.card import Card, read_card
 from inertial.layouts.catalogue import find
 from inertial.layouts.layout import GeometryError, Layout
 from inertial.rate import resolved
 from inertial.rate.beliefs import make
-from inertial.rate.bound import IN_USE, rate_bound
 from inertial.rate.estimators import ESTIMATORS, ProductsRate
+from inertial.rate.names import LEADER
 from inertial.rate.sight import ALL_BLIND
 from inertial.rate.tachometer import SUFFIX
-from inertial.rotation import followed, level
 from logs.cube_axes import examine
 from logs.cube_log import CubeLog, LogError, read_log
+from logs.cube_score import bound_of, notes_of, score
+from logs.cube_track import Track, reference
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
-SURE = 5.0  # rad/s; an estimate less certain than that says "I do not know yet" and has no NEES
-AT_REST = 2e-3  # rad/s; a truth below it stands for rest
 WARM_SAMPLES = (
     560  # run on a throw-away estimator, into the first turn, so that no compiler is timed
 )
@@ -39,23 +36,6 @@ TACHO_SIGMA = (
     0.03  # rad/s; a log says neither how well its tachometer measured nor when its pulses came
 )
 REPORT_S = 0.25  # s, between reports of a tachometer that reads the same
-
-
-@dataclass(frozen=True)
-class Track:
-    """What one estimator said, arrays over samples (n)."""
-
-    name: str
-    omega_b: Array  # (n, 3) rad/s
-    P: Array  # (n, 3, 3)
-    q_nb: Array  # (n, 4)
-    angle_z: Array  # (n,) rad
-    alpha_b: Array  # (n, 3) rad/s^2
-    f_b: Array  # (n, 3) m/s^2
-    still: NDArray[np.bool_]  # (n,)
-    p_n: Array  # (n, 3) m
-    us_per_sample: float
-    blind: str = ""  # why omega was not known in more than half of the samples; empty: it was
 
 
 def nothing(done: float, what: str) -> None:
@@ -113,11 +93,11 @@ def run_cube(
         if t.blind
     ]
     progress(0.95, "bound")
-    bound = _bound(data, used.layout(shape) if used is not None else shape, truth)
+    bound = bound_of(data, used.layout(shape) if used is not None else shape, truth)
     plain = [name.partition("+")[0] for name in tracks]
     known = [*tracks, *(name for name in estimators or ESTIMATORS if name not in plain)]
     default = next(
-        (name for name, of in zip(tracks, plain, strict=True) if of == EstimatorSettings().rate[0]),
+        (name for name, of in zip(tracks, plain, strict=True) if of == LEADER),
         None,
     )
     result = {
@@ -129,7 +109,7 @@ def run_cube(
             "list": [asdict(gap) for gap in data.gaps[:SHOW_GAPS]],
         },
         "axes": examine(data, shape),
-        "notes": notes + _notes(data, truth, used),
+        "notes": notes + notes_of(data, truth, used),
     }
     if plot is not None:
         from logs.cube_plot import draw  # here: matplotlib only where something is drawn
@@ -255,118 +235,4 @@ def _reports(data: CubeLog) -> dict[int, float]:
             rate != data.tacho[k - 1] or data.t_s[k] - data.t_s[last] >= REPORT_S
         ):
             found[k], last = rate, k
-    return found
-
-
-@dataclass(frozen=True)
-class Reference:
-    """What the estimates are compared with. NaN where it is not known."""
-
-    name: str  # "truth", "tachometer" or ""
-    omega_b: Array  # (n, 3) rad/s
-    angle_z: Array  # (n,) rad, integral of omega_z; NaN without it
-
-
-def reference(data: CubeLog) -> Reference:
-    """Truth if the log has it, else the tachometer, else nothing."""
-    omega = np.full((len(data.t_s), 3), np.nan)
-    name = ""
-    if data.omega_b is not None:
-        omega, name = data.omega_b, "truth"
-    elif data.tacho is not None:
-        omega[:, 2], name = data.tacho, "tachometer"
-    step = 0.5 * np.diff(data.t_s) * (omega[1:, 2] + omega[:-1, 2])
-    return Reference(name, omega, np.concatenate([[0.0], np.cumsum(step)]) + 0.0 * omega[:, 2])
-
-
-def score(track: Track | None, truth: Reference, bound: Array | None) -> dict[str, Any]:
-    """RMS of the rate error per axis (rad/s), of the angle about z at the end, NEES (3 degrees, so
-    3 is right).
-    """
-    if track is None:
-        nothing_known = dict.fromkeys(
-            ("rate_rms_radps", "angle_error_final_rad", "bound_rate_rms_radps")
-        )
-        return {**nothing_known, "nees_mean": None, "us_per_sample": None}
-    circular = track.name.endswith(SUFFIX) and truth.name == "tachometer"
-    error = track.omega_b - truth.omega_b + (np.nan if circular else 0.0)
-    rms = np.sqrt(np.mean(error**2, axis=0))
-    return {
-        "rate_rms_radps": [_known(value) for value in rms],
-        "angle_error_final_rad": (
-            None if circular else _known(abs(track.angle_z[-1] - truth.angle_z[-1]))
-        ),
-        "bound_rate_rms_radps": [None] * 3 if bound is None else [_known(value) for value in bound],
-        "nees_mean": nees_mean(error, track.P),
-        "us_per_sample": track.us_per_sample,
-    }
-
-
-def nees_mean(error: Array, P: Array) -> float | None:
-    """Mean of e^T P^-1 e over the samples at which the estimator knew something; None without all
-    three errors.
-    """
-    sure = np.isfinite(error).all(axis=1) & (np.trace(P, axis1=1, axis2=2) < 3.0 * SURE**2)
-    if not sure.any():
-        return None
-    e, V = error[sure], P[sure]
-    try:
-        return _known(np.mean(np.einsum("ni,ni->n", e, np.linalg.solve(V, e[:, :, None])[:, :, 0])))
-    except np.linalg.LinAlgError:
-        return (
-            None  # it claims to know a component without any error: no NEES says how wrong that is
-        )
-
-
-def _known(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
-def _bound(data: CubeLog, shape: Layout, truth: Reference) -> Array | None:
-    """RMS of the posterior Cramer-Rao bound (3,), rad/s, along the true motion; None where that is
-    not known.
-    """
-    if not np.isfinite(truth.omega_b).all():
-        return None
-    omega = np.where(np.abs(truth.omega_b) < AT_REST, 0.0, truth.omega_b)
-    alpha = np.gradient(omega, data.t_s, axis=0)
-    alpha[(omega == 0.0).all(axis=1)] = (
-        0.0  # the difference across the first sample of a turn is not the table's
-    )
-    q_nb = data.q_nb if data.q_nb is not None else _turned(data, shape, omega)
-    try:
-        sigma = rate_bound(shape, data.t_s, q_nb, omega, alpha, IN_USE)
-    except GeometryError:
-        return None
-    return np.sqrt(np.mean(sigma**2, axis=0))
-
-
-def _turned(data: CubeLog, shape: Layout, omega_b: Array) -> Array:
-    """Attitude (n, 4) of a motion from its rate: levelled on the first tenth of a second, then
-    turned.
-    """
-    n = max(1, round(0.1 / data.period_s))
-    first = level(np.linalg.pinv(shape.theta_b) @ data.f_axis[:n].mean(axis=0))
-    dt = np.diff(data.t_s[: len(omega_b)])
-    return followed(first, dt[:, None] * (0.5 * (omega_b[:-1] + omega_b[1:])))
-
-
-def _notes(data: CubeLog, truth: Reference, card: Card | None) -> list[str]:
-    found = [
-        (
-            f"calibration file {card.id}"
-            if card
-            else "no calibration file: nominal scale, positions and directions"
-        )
-    ]
-    if truth.name == "tachometer":
-        found.append("scored against the tachometer: only z is known")
-    elif not truth.name:
-        found.append("neither truth nor tachometer in the log: nothing to score against")
-    if data.gaps:
-        worst = max(data.gaps, key=lambda gap: gap.seconds)
-        found.append(
-            f"{len(data.gaps)} gaps, the longest {worst.seconds:.3f} s after t_s {worst.t_s:.3f}"
-            f" (line {worst.line})"
-        )
     return found

@@ -4,7 +4,7 @@ reference.
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib
 
@@ -15,9 +15,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from logs.cube_log import CubeLog
-
-if TYPE_CHECKING:
-    from logs.cube import Reference, Track
+from logs.cube_track import Reference, Track
 
 DEG = 180.0 / np.pi
 COLOURS = (
@@ -46,8 +44,8 @@ STYLE = {
 def draw(
     path: Path,
     data: CubeLog,
-    tracks: Mapping[str, "Track"],
-    truth: "Reference",
+    tracks: Mapping[str, Track],
+    truth: Reference,
     result: Mapping[str, Any],
 ) -> None:
     """Write the picture; raises OSError."""
@@ -81,8 +79,8 @@ def _rates(
     t: np.ndarray,
     k: int,
     axis: str,
-    tracks: Mapping[str, "Track"],
-    truth: "Reference",
+    tracks: Mapping[str, Track],
+    truth: Reference,
     result,
 ) -> None:
     known = bool(np.isfinite(truth.omega_b[:, k]).any())
@@ -123,7 +121,7 @@ def _rates(
 
 
 def _angles(
-    left: Axes, right: Axes, t: np.ndarray, tracks: Mapping[str, "Track"], truth: "Reference"
+    left: Axes, right: Axes, t: np.ndarray, tracks: Mapping[str, Track], truth: Reference
 ) -> None:
     known = bool(np.isfinite(truth.angle_z).any())
     for colour, (name, track) in zip(COLOURS * 3, tracks.items(), strict=False):

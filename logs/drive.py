@@ -8,7 +8,7 @@ any filter with a high gain makes it small.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.earth import ned_between
-from inertial.navigation.batch import FilterRun, run_filters
+from inertial.navigation.batch import run_filters
 from inertial.navigation.filters import DEFAULT, FILTERS, UnknownFilter
-from inertial.navigation.fix import RTK_FIXED, Fix
+from inertial.navigation.fix import Fix
 from inertial.navigation.navigation import NavigatorConfig
-from inertial.navigation.smoother import SMOOTHERS, SmoothRun, smooth_drive
+from inertial.navigation.smoother import SMOOTHERS, smooth_drive
 from inertial.rotation import rotation_vector, to_matrix
 from logs.drive_log import DriveLog, DriveTruth, read_drive_log
+from logs.drive_result import SETTLED, Result, of_filter, of_smoother
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
@@ -39,31 +40,7 @@ USUAL = (
     "mhe-robust",
     "smoother",
 )
-SETTLED = 20.0  # s after navigation began, from which on it is scored
 COURSE_SPEED = 4.0  # m/s, above it the course is taken as the heading
-
-
-@dataclass(frozen=True)
-class Result:
-    """A filter or smoother at every fix, in one form; k rows."""
-
-    t: Array
-    fixes: list[Fix]
-    began: float
-    unseen: NDArray[np.bool_]
-    y: Array  # (k, 7) computed - measured: before the correction, or smoothed
-    left: Array | None  # (k, 6) after the correction
-    yaw: Array  # (k,) at the time of the velocity
-    x: Array  # (k, NOMINAL)
-    P: Array  # (k, 9, 9)
-    us_per_epoch: float
-
-    @property
-    def scored(self) -> NDArray[np.bool_]:
-        """Unseen fixes of the best quality there is, once navigation has settled."""
-        good = np.array([fix.quality == RTK_FIXED for fix in self.fixes], dtype=bool)
-        chosen = self.unseen & (self.t >= self.began + SETTLED)
-        return chosen & good if (chosen & good).any() else chosen
 
 
 def run_drive(
@@ -134,43 +111,6 @@ def run_all(
             smoothed = smooth_drive(log.imu, fixes, name, config)
             out[name] = None if smoothed is None else of_smoother(smoothed)
     return out
-
-
-def of_filter(run: FilterRun) -> Result:
-    """A filter's run in the common form."""
-    return Result(
-        run.t,
-        run.fixes,
-        run.began,
-        run.withheld,
-        run.innovation,
-        run.residual,
-        run.yaw,
-        run.x,
-        run.P,
-        run.seconds / max(1, run.epochs) * 1e6,
-    )
-
-
-def of_smoother(run: SmoothRun) -> Result:
-    """A smoother's run in the common form."""
-    yaw = np.arctan2(run.x[:, 9], run.x[:, 6])
-    turn = np.interp(
-        run.t - run.x[:, 28], run.t, np.unwrap(yaw)
-    )  # at the time of the receiver's velocity
-    left = np.where(run.used[:, None], run.y[:, :6], np.nan)
-    return Result(
-        run.t,
-        run.fixes,
-        run.began,
-        ~run.used,
-        run.y,
-        left,
-        turn,
-        run.x,
-        run.P,
-        run.seconds / max(1, run.epochs) * 1e6,
-    )
 
 
 def mute(

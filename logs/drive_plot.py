@@ -3,17 +3,15 @@ horizon, scores.
 """
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib
 import numpy as np
 
 from inertial.earth import ned_between
 from inertial.navigation.filters import DEFAULT
-
-if TYPE_CHECKING:
-    from logs.drive import Result
-    from logs.drive_log import DriveLog
+from logs.drive_log import DriveLog
+from logs.drive_result import Result
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt  # noqa: E402
@@ -32,7 +30,7 @@ COLOURS = (
 
 
 def draw(
-    path: Path, log: "DriveLog", results: "dict[str, Result]", scores: dict[str, dict[str, Any]]
+    path: Path, log: DriveLog, results: dict[str, Result], scores: dict[str, dict[str, Any]]
 ) -> None:
     """Write the picture, PNG by the name's end."""
     lead = results.get(DEFAULT) or next(iter(results.values()), None)
@@ -54,7 +52,7 @@ def draw(
     plt.close(figure)
 
 
-def _way(ax: Any, log: "DriveLog", lead: "Result") -> None:
+def _way(ax: Any, log: DriveLog, lead: Result) -> None:
     first = log.fixes[0]
     origin = first.latitude, first.longitude, first.height
     places = np.array([(f.latitude, f.longitude, f.height) for f in log.fixes])
@@ -66,7 +64,7 @@ def _way(ax: Any, log: "DriveLog", lead: "Result") -> None:
     ax.legend()
 
 
-def _errors(ax: Any, lead: "Result") -> None:
+def _errors(ax: Any, lead: Result) -> None:
     chosen = lead.scored
     t = lead.t[chosen] - lead.t[0]
     for k, name in enumerate(("north", "east")):

@@ -18,7 +18,8 @@ from messages.bus import session as busmod
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 from messages.history.answers import Asker
-from messages.history.mending import Arrival, Mender, Question
+from messages.history.mending import Mender
+from messages.history.mending_state import Arrival, Question
 
 log = logging.getLogger(__name__)
 

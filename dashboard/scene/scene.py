@@ -32,23 +32,15 @@ import numpy as np
 import viser
 
 from dashboard.data.device import Device
-from dashboard.data.track import Track
 from dashboard.scene.drawing import bodies, camera
 from dashboard.scene.drawing import geometry as geo
 from dashboard.scene.drawing.axis_arrows import AxisArrows
-from dashboard.scene.drawing.palette import (
-    FIX,
-    REJECTED,
-    estimator_colour,
-    number,
-    rgb,
-    truth_colour,
-)
+from dashboard.scene.drawing.palette import estimator_colour, number, rgb, truth_colour
+from dashboard.scene.drawing.trails import Trails
 from inertial.rotation import rotate
 
 ARROW_PER_RADPS = 0.55  # half sides per rad/s; 180 deg/s gives 1.7
 ARROW_LONGEST = 2.2
-FIX_SIZE, REJECTED_SIZE = 0.8, 1.4  # m; a rejected fix lies over the same fix in its usual colour
 
 LAYERS = ("truth", "estimates", "sensors", "rate", "trajectory", "fixes", "ellipsoid", "grid")
 
@@ -70,8 +62,7 @@ class SceneView:
         self._built: tuple = ()
         self._nodes: dict[str, object] = {}
         self._sent: dict[str, tuple] = {}
-        self._pieces: dict[str, int] = {}  # points of each track piece that the browser has
-        self._thinned: dict[str, int] = {}
+        self.trails = Trails(self._scene, self._nodes)
         self._arrows: AxisArrows | None = None
         self._shown = True  # False while a page has a scene of its own
         self._turning = False  # fast enough for an arrow
@@ -100,8 +91,7 @@ class SceneView:
             self._nodes["/world"].remove()
         self._nodes.clear()
         self._sent.clear()
-        self._pieces.clear()
-        self._thinned.clear()
+        self.trails.forget()
         self._built = ()
         self._arrows = None
 
@@ -128,20 +118,6 @@ class SceneView:
             visible = self._choice.layers[layer] and (layer != "rate" or self._turning)
             if node.visible != visible:
                 node.visible = visible
-
-    def update_tracks(self, device: Device) -> None:
-        """Trajectories and fixes; only pieces that grew are sent. Call under the store's lock."""
-        if device.body != "nav":
-            return  # a cube stands on its table, whatever way it went
-        for name, track in device.tracks.items():
-            if name == "fixes":
-                self._track("/world/fixes", track, rgb(FIX), FIX_SIZE)
-            elif name == "rejected":
-                self._track("/world/fixes/rejected", track, rgb(REJECTED), REJECTED_SIZE)
-            else:
-                estimator = name.split("/", 1)[1]
-                colour = rgb(estimator_colour(estimator, device.estimators("nav")))
-                self._track(f"/world/estimate/{estimator}/trajectory", track, colour)
 
     # --- building
 
@@ -295,38 +271,6 @@ class SceneView:
                 yield node, "fixes"
             elif tail in _TAILS:
                 yield node, _TAILS[tail]
-
-    def _track(
-        self, base: str, track: Track, colour: tuple[int, int, int], point_size: float = 0.0
-    ) -> None:
-        """Bring a track to the browser, as points of that size in m, or as a line when there is no
-        size.
-        """
-        if self._thinned.get(base, track.thinned) != track.thinned:
-            for path in [path for path in self._nodes if path.startswith(f"{base}/")]:
-                self._nodes.pop(path).remove()
-                self._pieces.pop(path, None)
-        self._thinned[base] = track.thinned
-        for index, piece in enumerate(track.pieces):
-            path = f"{base}/{index}"
-            if len(piece) < (1 if point_size else 2) or self._pieces.get(path) == len(piece):
-                continue
-            self._pieces[path] = len(piece)
-            line = np.asarray(piece, dtype=np.float32)
-            if point_size:
-                self._nodes[path] = self._scene.add_point_cloud(
-                    path,
-                    line,
-                    colour,
-                    point_size=point_size,
-                    point_shape="circle",
-                    precision="float32",
-                )
-            else:
-                segments = np.stack([line[:-1], line[1:]], axis=1)
-                self._nodes[path] = self._scene.add_line_segments(
-                    path, segments, colour, thickness=5.0, thickness_units="screen"
-                )
 
 
 _TAILS = {"body": "estimates", "axes": "sensors", "ellipsoid": "ellipsoid", "ground": "grid"}

@@ -83,7 +83,7 @@ class View:
             now = time.monotonic()
             if now - self._tracks_at > TRACK_S:
                 self._tracks_at = now
-                self.scene.update_tracks(device)
+                self.scene.trails.update(device)
 
     def tick_panels(self) -> None:
         """Summary, recorder and the page that is seen."""

@@ -4,16 +4,26 @@
 
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, HTTPException, Query, Request
 from fastapi.responses import FileResponse
-from pydantic import BaseModel, ConfigDict, Field
 
-from dashboard.data.device import Device
 from dashboard.web.auth import Role
 from dashboard.web.control import ControlError
 from dashboard.web.front import Asker, Front, asker, front_of, needs
+from dashboard.web.schemas import (
+    DeviceOut,
+    Health,
+    Me,
+    RecordingOut,
+    SessionOut,
+    StartRecording,
+    StartReplay,
+    device_out,
+    recorder_fields,
+    session_out,
+)
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
 from sessions.library.catalogue import SessionError, SessionInfo
@@ -23,172 +33,6 @@ RECORDER_STALE_S = 5.0
 
 SignedIn = Annotated[Asker, Depends(asker)]
 Operator = Annotated[Asker, Depends(needs(Role.operator))]
-
-
-class Strict(BaseModel):
-    """A body: no unknown keys, no conversions (true is no number), no NaN and no infinity."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
-
-
-class Health(BaseModel):
-    status: str
-    scene: bool
-    bus: bool
-
-
-class Me(BaseModel):
-    user: str
-    role: str
-    csrf: str = Field(description="to send as X-CSRF-Token with every order")
-
-
-class EstimatorOut(BaseModel):
-    name: str
-    state: str
-    message: str
-    us_per_sample: float
-    gaps: int
-
-
-class DeviceOut(BaseModel):
-    name: str
-    source: str = Field(description="hardware, simulated, emulated, played or unknown")
-    age_s: float = Field(description="since its last word, s")
-    stale: bool
-    connected: bool
-    port: str
-    message: str = Field(description="what is wrong and what to do; empty when all is well")
-    sample_rate_hz: float
-    latency_p99_s: float
-    clock_skew_ppm: float
-    lost_frames: int
-    lost_samples: int
-    bad_chunks: int
-    reconnects: int
-    reboots: int
-    firmware: str
-    uid: str
-    axes: int
-    estimators: list[EstimatorOut]
-
-
-class RecordingOut(BaseModel):
-    available: bool = Field(description="the recorder was heard of in the last seconds")
-    recording: bool
-    session: str
-    seconds: float
-    messages: int
-    bytes: int
-    lost: int
-    message: str
-    replaying: str = Field(description="id of the session being replayed, or empty")
-
-
-class StartRecording(Strict):
-    name: str = Field(default="", max_length=32, pattern=r"^([a-z0-9][a-z0-9_-]*)?$")
-    note: str = Field(default="", max_length=2000)
-
-
-class StartReplay(Strict):
-    speed: float = Field(default=1.0, ge=0.1, le=100.0)
-    t: float = Field(default=0.0, ge=0.0, le=1e7, description="begin at this second of it")
-
-
-class SessionOut(BaseModel):
-    id: str
-    devices: list[str]
-    sources: list[str]
-    start_s: float = Field(description="s since 1970, UTC")
-    seconds: float
-    state: str = Field(
-        description="recording, open (cut off, not recovered yet), closed, recovered or unreadable"
-    )
-    bytes: int
-    messages: int
-    lost: int
-    completeness: float | None = Field(
-        description="received share of what is known to have been sent, 0 to 1"
-    )
-    note: str
-    title: str = Field(description="by people, as are tags and outcome")
-    tags: list[str]
-    outcome: str
-    problem: str
-    downloadable: bool
-
-
-def device_out(device: Device, stale_s: float) -> DeviceOut:
-    """One device as JSON; a device that never sent a link status has zeros and says so in
-    `message`. Call under the store's lock.
-    """
-    heard, described = device.get("link"), device.get("board")
-    link = heard.message if heard else pb.LinkStatus()
-    board = described.message if described else pb.BoardInfo()
-    age_s = heard.age() if heard else min(latest.age() for latest in device.latest.values())
-    stale = age_s > stale_s
-    source = link.header.source or board.header.source
-    states = [
-        (name, device.get("estimator", name).message)
-        for name in sorted(device.estimators("estimator"))
-    ]
-    estimators = [
-        EstimatorOut(
-            name=name, state=s.state, message=s.message, us_per_sample=s.us_per_sample, gaps=s.gaps
-        )
-        for name, s in states
-    ]
-    return DeviceOut(
-        name=device.name,
-        source=pb.Source.Name(source).removeprefix("SOURCE_").lower()
-        if source in pb.Source.values()
-        else "unknown",
-        age_s=age_s,
-        stale=stale,
-        connected=link.connected and not stale,
-        port=link.port,
-        message=link.message if heard else "no link status yet",
-        sample_rate_hz=link.sample_rate_hz,
-        latency_p99_s=link.latency_p99_s,
-        clock_skew_ppm=link.clock_skew_ppm,
-        lost_frames=link.lost_frames,
-        lost_samples=link.lost_samples,
-        bad_chunks=link.bad_chunks,
-        reconnects=link.reconnects,
-        reboots=link.reboots,
-        firmware=board.firmware,
-        uid=board.uid,
-        axes=board.axes,
-        estimators=estimators,
-    )
-
-
-def session_out(info: SessionInfo, recording: str = "") -> SessionOut:
-    """One recorded session as JSON; `recording` is the id of the one that is being written now."""
-    expected = info.messages + info.lost
-    now = info.state == "open" and info.id == recording
-    return SessionOut(
-        id=info.id,
-        devices=list(info.devices),
-        sources=[
-            source.lower()
-            for source in info.sources
-            if source != "UNKNOWN" or len(info.sources) == 1
-        ],
-        start_s=info.start_utc_ns / 1e9,
-        seconds=info.seconds,
-        state="recording" if now else info.state,
-        bytes=info.bytes,
-        messages=info.messages,
-        lost=info.lost,
-        completeness=info.messages / expected if expected else None,
-        note=info.note,
-        title=info.annotations.title,
-        tags=info.annotations.tags,
-        outcome=info.annotations.outcome,
-        problem="" if now else info.problem,
-        downloadable=info.path is not None and info.state != "open",
-    )
 
 
 def list_sessions(front: Front, text: str = "") -> list[SessionOut]:
@@ -265,19 +109,7 @@ def recording_out(front: Front) -> RecordingOut:
     age = heard.age()
     if age > RECORDER_STALE_S:
         return out.model_copy(update={"message": f"the recorder has been silent for {age:.0f} s"})
-    return out.model_copy(update={"available": True} | _recorder_fields(heard.message))
-
-
-def _recorder_fields(status: pb.RecorderStatus) -> dict[str, Any]:
-    return {
-        "recording": status.recording,
-        "session": status.session,
-        "seconds": status.seconds,
-        "messages": status.messages,
-        "bytes": status.bytes,
-        "lost": sum(status.lost.values()),
-        "message": status.message,
-    }
+    return out.model_copy(update={"available": True} | recorder_fields(heard.message))
 
 
 def order_recorder(
@@ -293,7 +125,7 @@ def order_recorder(
         raise HTTPException(503, str(error)) from None
     if status.recording != (action == pb.RecorderCommand.ACTION_START):
         raise HTTPException(409, status.message or "the recorder did not do it")
-    return recording_out(front).model_copy(update={"available": True} | _recorder_fields(status))
+    return recording_out(front).model_copy(update={"available": True} | recorder_fields(status))
 
 
 def start_replay(front: Front, session: str, speed: float, at_s: float = 0.0) -> RecordingOut:

@@ -12,6 +12,7 @@ from dashboard.web import api
 from dashboard.web.api import SignedIn, file_of
 from dashboard.web.front import Front, front_of
 from dashboard.web.pages import render
+from dashboard.web.schemas import session_out
 from sessions.library.annotations import read_annotations
 from sessions.library.compare import METHODS, MOST, CompareError, Comparison, as_dict, compare
 from sessions.library.overlay import POINTS, drawing
@@ -32,7 +33,7 @@ def compare_page(request: Request, who: SignedIn, ids: Ids = "") -> HTMLResponse
     chosen = _ids(ids)
     if not chosen:
         raise HTTPException(422, "choose two to four sessions in the list of sessions")
-    rows = [api.session_out(api.find_session(front, session)) for session in chosen]
+    rows = [session_out(api.find_session(front, session)) for session in chosen]
     return render(request, "compare.html", who, rows=rows, methods=METHODS)
 
 

@@ -8,8 +8,9 @@ from typing import Annotated
 from fastapi import APIRouter, HTTPException, Query, Request
 from pydantic import BaseModel, Field
 
-from dashboard.web.api import Operator, SignedIn, Strict, file_of
+from dashboard.web.api import Operator, SignedIn, file_of
 from dashboard.web.front import Front, front_of
+from dashboard.web.schemas import Strict
 from dashboard.web.session_api import JobOut, start_job
 from dashboard.web.uploads import Upload
 

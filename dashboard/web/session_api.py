@@ -12,11 +12,12 @@ from fastapi import APIRouter, Depends, HTTPException, Request
 from fastapi.responses import FileResponse, Response, StreamingResponse
 from pydantic import BaseModel, Field
 
-from dashboard.web.api import Operator, SignedIn, Strict, file_of, find_session
+from dashboard.web.api import Operator, SignedIn, file_of, find_session
 from dashboard.web.auth import Role
 from dashboard.web.control import ControlError
 from dashboard.web.front import Asker, Front, front_of, needs
 from dashboard.web.jobs import Job, Jobs
+from dashboard.web.schemas import Strict
 from sessions.library.annotations import (
     Annotations,
     SessionNote,

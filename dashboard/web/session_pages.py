@@ -11,6 +11,7 @@ from dashboard.web import api
 from dashboard.web.auth import Role
 from dashboard.web.front import Front, front_of
 from dashboard.web.pages import SignedIn, render
+from dashboard.web.schemas import session_out
 from dashboard.web.session_api import REPORT_FOLDER, find_session
 from dashboard.web.trend import Point, Trend, draw
 from sessions.export.export import FORMATS
@@ -45,7 +46,7 @@ def session_page(request: Request, session: str, who: SignedIn) -> HTMLResponse:
     front = front_of(request)
     info = find_session(front, session)
     now = api.recording_out(front)
-    row = api.session_out(info, now.session if now.recording else "")
+    row = session_out(info, now.session if now.recording else "")
     manifest = _manifest(front, session)
     report = _report(front, session)
     return render(

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from estimator.devices.navigation import NavBoard, NavOutput
 from estimator.devices.rate import RateOutput
 from estimator.stream import every
-from inertial.constants import GRAVITY
 from inertial.navigation.error_model import PSI, ImuNoise
 from inertial.navigation.navigation import NAVIGATORS, NavigatorConfig
 from inertial.navigation.strapdown import C
@@ -62,25 +61,6 @@ def attitude_noise(P_omega: Array, C_nb: Array) -> Array:
     """
     P_n = C_nb @ P_omega @ C_nb.T
     return NOISE.gyro**2 + 2.0 * CORRELATED * np.minimum(np.diag(P_n), LARGEST**2)
-
-
-def position_error(b_mps2: Array, d_radps: Array, t_s: Array, g: float = GRAVITY) -> Array:
-    """Position error (n, 3) in m of unaided navigation after t_s (n,) s from rest, level: the
-    closed form (27) (E-85).
-
-    b (3,) is the accelerometers' equivalent bias in n, d (3,) the equivalent drift of the rate.
-    """
-    t = np.asarray(t_s, dtype=np.float64)[:, None]
-    return 0.5 * np.asarray(b_mps2) * t**2 + np.cross(d_radps, [0.0, 0.0, -g]) * t**3 / 6.0
-
-
-def equivalent_drift(error_m: float, b_mps2: float, t_s: float, g: float = GRAVITY) -> float:
-    """Rate drift in rad/s that by (27) gives a horizontal error after t_s s beside that of a bias
-    (E-86).
-
-    Both horizontal, as lengths; 0 where the bias alone explains more than the error.
-    """
-    return max(0.0, error_m - 0.5 * b_mps2 * t_s**2) * 6.0 / (g * t_s**3)
 
 
 class GyroFreeBoard(NavBoard):

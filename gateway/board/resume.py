@@ -24,7 +24,8 @@ from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ACCEL, ADC, BY_NAME, GNSS, IMU, LOCATION, Topic
 from messages.history.journal import Journal
 from messages.history.journal_file import Record
-from messages.history.spool import Spool, entry_of
+from messages.history.spool import Spool
+from messages.history.spool_file import entry_of
 
 REACH_S = 12.0  # a board says HELLO every ten seconds
 REACH_BYTES = 1 << 20

@@ -115,7 +115,7 @@ def compare(
     as_json: AsJson = False,
 ) -> None:
     """Layouts side by side, in one table."""
-    from inertial.layouts.layout import LAYOUTS
+    from inertial.layouts.catalogue import LAYOUTS
 
     found = [_quality(name, half_side, turn, hertz) for name in layouts or LAYOUTS]
     if plot is not None:
@@ -169,7 +169,8 @@ def optimise(
     import numpy as np
 
     from inertial.layouts import catalogue, quality, search
-    from inertial.layouts.layout import CUBE, GeometryError
+    from inertial.layouts.catalogue import CUBE
+    from inertial.layouts.layout import GeometryError
 
     region = _region(half_side, box, sphere, points)
     wish = search.Wish(axes, triads, rank, no_feedback, region, starts, seed, sensor)

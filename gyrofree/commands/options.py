@@ -78,7 +78,7 @@ def faults_of(texts: list[str] | None) -> tuple:
     """Faults of the simulated cube's axes; one that cannot be ends the command."""
     if not texts:
         return ()
-    from inertial.layouts.layout import CUBE
+    from inertial.layouts.catalogue import CUBE
     from inertial.simulation.faults import FaultError, parse
 
     try:

@@ -1,10 +1,25 @@
-"""`gyrofree replay`: the command line of playing a recording."""
+"""`gyrofree replay`: recordings listed, played, or checked against the estimators."""
 
+import datetime
+import json
+from dataclasses import asdict
+from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
+from rich.table import Table
 
-from gyrofree.commands.options import AsJson, Config, Speed, Verbose, settings_of
+from gyrofree.commands.options import (
+    AsJson,
+    Config,
+    Speed,
+    Verbose,
+    catalogue_of,
+    settings_of,
+    show_table,
+)
+from gyrofree.config import Settings
 from gyrofree.running.process import EXIT_CONFIG as CONFIG
 from gyrofree.running.process import fail, run_service
 
@@ -43,13 +58,13 @@ def replay(
     from gyrofree.running import replay as player
 
     if listing or not session:
-        return player.show_list(settings, as_json)
+        return show_list(settings, as_json)
     try:
         path = player.find(settings, session)
     except LookupError as error:
         raise fail(str(error)) from None
     if check:
-        raise typer.Exit(player.check(settings, path, as_json))
+        raise typer.Exit(compare_estimates(settings, path, as_json))
     from estimator.choice import UnknownEstimator
 
     options = player.Options(speed, at, paused, stay, tuple(rate or ()), overlay)
@@ -59,3 +74,52 @@ def replay(
         raise fail(str(error), CONFIG) from None
     except ValueError as error:
         raise fail(str(error)) from None
+
+
+def show_list(settings: Settings, as_json: bool) -> None:
+    """The catalogue on standard output."""
+    infos = catalogue_of(settings).list()
+    if as_json:
+        print(json.dumps([asdict(info) for info in infos], indent=2, default=str))
+        return
+    table = Table("id", "devices", "start (UTC)", "length", "state", "messages", "lost", "size")
+    for info in infos:
+        start = datetime.datetime.fromtimestamp(info.start_utc_ns / 1e9, datetime.UTC)
+        table.add_row(
+            info.id,
+            ", ".join(info.devices),
+            f"{start:%Y-%m-%d %H:%M:%S}",
+            f"{info.seconds:.1f} s",
+            info.state,
+            str(info.messages),
+            str(info.lost),
+            f"{info.bytes / 1e6:.2f} MB",
+        )
+    show_table(table)
+
+
+def compare_estimates(settings: Settings, path: Path, as_json: bool) -> int:
+    """Run the estimators over the recorded samples; exit code 0 when every estimate is the recorded
+    one.
+    """
+    from estimator.pipeline import Pipeline
+    from sessions.replay.reproduce import reproduce
+
+    with Console(stderr=True).status(
+        f"running the estimators over {path.stat().st_size / 1e6:.1f} MB of recording"
+    ):
+        result = reproduce(path, Pipeline(settings.estimator))
+    if as_json:
+        print(json.dumps(result.as_dict(), indent=2))
+    else:
+        table = Table("key", "equal", "different", "missing", "first difference")
+        for key, row in result.as_dict()["keys"].items():
+            table.add_row(
+                key,
+                *(str(row[name]) for name in ("equal", "different", "missing", "first_difference")),
+            )
+        show_table(table)
+        if not result.identical:
+            reason = "an estimator began before the recording, or an input is missing"
+            print(f"Estimates differ where {reason}: docs/recordings.md")
+    return 0 if result.identical else 1

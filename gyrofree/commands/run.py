@@ -207,7 +207,7 @@ def gyro_free(
     as_json: AsJson = False,
 ) -> None:
     """Every figure and table of the gyro-free cube's published table test, each beside ours."""
-    from logs.reproduce_gyro_free import reproduce
+    from logs.reproduce.gyro_free import reproduce
 
     _reproduce(
         lambda progress: reproduce(out, session=session, seed=seed, progress=progress), out, as_json
@@ -226,7 +226,7 @@ def in_motion(
     """Tables and horizon figures of the in-motion alignment, from simulated drives and a real
     one.
     """
-    from logs.reproduce_in_motion import reproduce
+    from logs.reproduce.in_motion_comparison import reproduce
 
     _reproduce(
         lambda progress: reproduce(out, data=data, seeds=seeds, progress=progress), out, as_json

@@ -12,6 +12,7 @@ file scale = 1.0                         # true m/s^2 per m/s^2 of the board's n
 import difflib
 import math
 import tomllib
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from inertial.layouts.layout import LAYOUTS, SENSORS, GeometryError, Layout, Sensor
+from inertial.layouts.layout import SENSORS, GeometryError, Layout, Sensor
 
 HERE = Path(__file__).resolve().parent
 MOST_AXES = 64
@@ -227,3 +228,19 @@ def _sensors(tables: Any, where: str) -> dict[str, Sensor]:
             ),
         )
     return found
+
+
+def _sized(name: str) -> Callable[[float], Layout]:
+    def make(half_side: float) -> Layout:
+        return built_in(name, half_side)
+
+    make.__doc__ = f"inertial/layouts/{name}.toml with half_side = L/2 in m."
+    return make
+
+
+CUBE = _sized("cube")  # the paper's cube: four triads, axes a11 a12 a13 a21 ... a43
+
+# Built-in layouts by name; array-24 has a size of its own, whatever half side is asked for.
+LAYOUTS: dict[str, Callable[[float], Layout]] = {
+    name: _sized(name) for name in ("cube", "chen-6", "nine", "edges-12", "stars-12", "array-24")
+}

@@ -8,7 +8,6 @@ which is linear in omega', p and the six products w_i w_j. Units: m, m/s^2, rad/
 Source: Hoseini and Moradi 2017, (20)-(24); docs/equations.md, E-1 to E-5.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -241,21 +240,3 @@ WIRING = (
         dtype=np.float64,
     )
 )
-
-
-def _built_in(name: str) -> Callable[[float], Layout]:
-    def make(half_side: float) -> Layout:
-        from inertial.layouts.catalogue import built_in  # here: it reads files into Layouts
-
-        return built_in(name, half_side)
-
-    make.__doc__ = f"inertial/layouts/{name}.toml with half_side = L/2 in m."
-    return make
-
-
-CUBE = _built_in("cube")  # the paper's cube: four triads, axes a11 a12 a13 a21 ... a43
-
-# Built-in layouts by name; array-24 has a size of its own, whatever half side is asked for.
-LAYOUTS: dict[str, Callable[[float], Layout]] = {
-    name: _built_in(name) for name in ("cube", "chen-6", "nine", "edges-12", "stars-12", "array-24")
-}

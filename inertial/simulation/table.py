@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.constants import GRAVITY, MILLI_G
-from inertial.layouts.layout import CUBE, Layout
+from inertial.layouts.catalogue import CUBE
+from inertial.layouts.layout import Layout
 from inertial.simulation.profiles import DEGREE, Profile, named
 
 Array = NDArray[np.float64]

@@ -10,7 +10,6 @@ gateway out; the system frees it when the process ends, however that happens.
 """
 
 import errno
-import fcntl
 import logging
 import os
 import threading
@@ -29,22 +28,11 @@ from messages.history.journal_file import (
     scan,
     walk,
 )
+from messages.history.journal_folder import JournalBusy, end_of, first_of, lock_folder, remedy_of
 
 log = logging.getLogger(__name__)
 
-LOOK_BYTES = 1 << 18  # of a segment's end, to find its last record
 RETRY_S = 2.0  # after a failed write the next attempt waits this long
-REMEDIES = {
-    errno.ENOSPC: "free some space",
-    errno.EAGAIN: "stop the other one, or set another `journal` folder",
-}
-
-
-class JournalBusy(OSError):
-    """Another gateway writes this journal; str() is one line with the remedy."""
-
-    def __str__(self) -> str:
-        return f"journal {self.filename}: {self.strerror}; {REMEDIES[errno.EAGAIN]}"
 
 
 class Journal:
@@ -80,14 +68,11 @@ class Journal:
         self._sync_message = ""
         self.place = (0, 0)  # of the last record: first sequence of its segment, offset in it
         self._lock = threading.Lock()
-        self._folder_lock: int | None = (
-            None  # descriptor of the locked file; None: the folder could not be used yet
-        )
+        # descriptor of the locked file; None: the folder could not be used yet
+        self._folder_lock: int | None = None
         self._fd: int | None = None
         self._size = self._first = 0  # of the open segment: bytes, sequence of its first record
-        self._full: list[
-            int
-        ] = []  # descriptors of finished segments that still want their fdatasync
+        self._full: list[int] = []  # finished segments that still want their fdatasync
         self._retry_at = 0.0
         self._sync_s = sync_s
         self._stop = threading.Event()
@@ -172,7 +157,7 @@ class Journal:
         """The newest records, oldest first: those in the last max_bytes of the segments."""
         found: list[Record] = []
         for name in reversed(self.segments()):
-            data = _end_of(name, max_bytes)
+            data = end_of(name, max_bytes)
             whole = data.startswith(SEGMENT_MAGIC)
             good = scan(
                 data, SEGMENT_HEAD.size if whole else max(0, data.find(RECORD_MAGIC))
@@ -198,10 +183,10 @@ class Journal:
         read.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
-        lock = _lock(self.folder)
+        lock = lock_folder(self.folder)
         try:
             for name in self.segments()[-2:]:
-                last = last_whole(_end_of(name, LOOK_BYTES))
+                last = last_whole(end_of(name))
                 if last is not None:
                     self.last_seq = max(self.last_seq, last)
                     continue
@@ -267,7 +252,7 @@ class Journal:
             self._fd = None
         self._retry_at = time.monotonic() + RETRY_S
         if not self._write_message:
-            remedy = REMEDIES.get(error.errno or 0, "make the folder writable for this user")
+            remedy = remedy_of(error)
             self._write_message = (
                 f"journal {self.folder}: {error.strerror}; data are shown but NOT KEPT; {remedy}"
             )
@@ -342,39 +327,3 @@ class Journal:
             name.unlink(missing_ok=True)
             total -= state.st_size
             log.info("%s: removed, the journal keeps %d bytes", name, self.max_bytes)
-
-
-def _lock(folder: Path) -> int:
-    """Descriptor of the folder's locked lock file; raises JournalBusy when another has it, OSError
-    without access.
-    """
-    lock = os.open(folder / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o640)
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(lock)
-        raise JournalBusy(errno.EAGAIN, "another gateway writes it", str(folder)) from None
-    except (
-        OSError
-    ) as error:  # a file system without locks, as some network ones: better a journal than none
-        log.warning(
-            "journal %s: cannot be locked (%s): let only one gateway write it",
-            folder,
-            error.strerror,
-        )
-    return lock
-
-
-def _end_of(name: Path, n: int) -> bytes:
-    """The last n bytes of a file; nothing when it has gone."""
-    try:
-        with name.open("rb") as stream:
-            stream.seek(max(0, os.fstat(stream.fileno()).st_size - n))
-            return stream.read()
-    except FileNotFoundError:
-        return b""
-
-
-def first_of(name: Path) -> int:
-    """Sequence of the first record of a segment file."""
-    return int(name.stem)

@@ -15,71 +15,15 @@ lost, and asked for later. Without, they pass at once and the filled ones come l
 import logging
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import NamedTuple
-
-from google.protobuf.message import DecodeError
 
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.header import first_field
 from messages.contract.topics import BY_NAME, REPLAY_SUFFIX, Topic
+from messages.history.mending_state import Arrival, KeyState, Question, Stream, header_of, take_out
 
 log = logging.getLogger(__name__)
 
 MAX_HELD = 60_000
 REMEMBERED = 4096  # payloads without a header: the newest are recognised when they come again
-
-
-class Arrival(NamedTuple):
-    """One message: live as it came, or filled in."""
-
-    topic: Topic
-    device: str
-    estimator: str
-    payload: bytes
-    at_ns: int  # when it came, or, filled in, when it was published; UTC
-    late: bool = False
-
-    @property
-    def name(self) -> str:
-        """Topic with its estimator."""
-        return f"{self.topic.name}/{self.estimator}" if self.estimator else self.topic.name
-
-
-class Question(NamedTuple):
-    """What to ask the publisher of a stream."""
-
-    stream: tuple[str, str]  # device, source
-    query: pb.HistoryQuery
-
-
-@dataclass
-class _Key:
-    """What is known of one topic of a stream."""
-
-    run: int
-    last: int
-    missing: list[list[int]] = field(
-        default_factory=list
-    )  # [run, first, last, countable], being asked for
-    filled: tuple[int, int] = (1, 0)  # sequences that came filled in before they came live
-    repaired: int = 0
-    lost: int = 0
-
-    def advance(self, run: int, sequence: int) -> None:
-        """A filled-in message is the newest now."""
-        follows = run == self.run and self.filled[1] == self.last
-        self.filled = (self.filled[0] if follows else sequence, sequence)
-        self.run, self.last = run, sequence
-
-
-@dataclass
-class _Stream:
-    asking: bool = False
-    full: bool = False  # holds max_held: the newest were not taken
-    held: deque[Arrival] = field(default_factory=deque)
-    waiting: deque[pb.HistoryQuery] = field(default_factory=deque)
-    tried: set[tuple[str, int, int]] = field(default_factory=set)  # beginnings that were asked for
 
 
 class Mender:
@@ -102,8 +46,8 @@ class Mender:
         """
         self._ask, self._hold, self._max_held = ask, hold, max_held
         self._topics, self._sources, self._since_ns = topics, sources, since_ns
-        self._keys: dict[tuple[str, str], _Key] = {}
-        self._streams: dict[tuple[str, str], _Stream] = {}
+        self._keys: dict[tuple[str, str], KeyState] = {}
+        self._streams: dict[tuple[str, str], Stream] = {}
         self._seen: deque[int] = deque(maxlen=REMEMBERED)  # hashes of payloads without a header
 
     @property
@@ -126,7 +70,7 @@ class Mender:
 
     def seed(self, device: str, name: str, run: int, last: int) -> None:
         """The consumer has everything of this topic up to here, from an earlier life."""
-        self._keys[device, name] = _Key(run, last)
+        self._keys[device, name] = KeyState(run, last)
 
     def taken(self) -> dict[tuple[str, str], tuple[int, int]]:
         """Run and sequence of the newest message given on, by device and topic: for `seed` in a
@@ -138,7 +82,7 @@ class Mender:
         """One live message; what can be given on now, in order."""
         if arrival.topic.source not in self._sources or arrival.device.endswith(REPLAY_SUFFIX):
             return [arrival]
-        stream = self._streams.setdefault((arrival.device, arrival.topic.source), _Stream())
+        stream = self._streams.setdefault((arrival.device, arrival.topic.source), Stream())
         if self._hold and stream.asking:
             if len(stream.held) < self._max_held:
                 stream.held.append(arrival)
@@ -155,7 +99,7 @@ class Mender:
 
     def answer(self, question: Question, reply: pb.HistoryReply | None) -> list[Arrival]:
         """The publisher's answer (None: there is none); what can be given on now, in order."""
-        stream = self._streams.setdefault(question.stream, _Stream())
+        stream = self._streams.setdefault(question.stream, Stream())
         out: list[Arrival] = []
         for item in reply.items if reply is not None else ():
             skipped = self._skipped(stream, question, item)
@@ -185,13 +129,13 @@ class Mender:
 
     # --- one message
 
-    def _pass(self, stream: _Stream, arrival: Arrival) -> list[Arrival]:
+    def _pass(self, stream: Stream, arrival: Arrival) -> list[Arrival]:
         header = header_of(arrival)
         if header is None:
             return [] if self._known(arrival.payload) else [arrival]
         key = self._keys.get((arrival.device, arrival.name))
         if key is None:
-            key = self._keys[arrival.device, arrival.name] = _Key(header.run, header.sequence)
+            key = self._keys[arrival.device, arrival.name] = KeyState(header.run, header.sequence)
             whole = 0 < self._since_ns < header.run and header.sequence > 1
             if not whole:
                 return [arrival]
@@ -220,7 +164,7 @@ class Mender:
         key.run, key.last = header.run, header.sequence
         return [arrival]
 
-    def _notice(self, stream: _Stream, arrival: Arrival, key: _Key, header: pb.Header) -> None:
+    def _notice(self, stream: Stream, arrival: Arrival, key: KeyState, header: pb.Header) -> None:
         """A gap lies before this message: ask for what is in it."""
         query = pb.HistoryQuery(
             topics=self._wanted(arrival),
@@ -250,9 +194,7 @@ class Mender:
             t.name for t in self._topics if t.source == arrival.topic.source and not t.per_estimator
         ]
 
-    def _skipped(
-        self, stream: _Stream, question: Question, item: pb.HistoryItem
-    ) -> Question | None:
+    def _skipped(self, stream: Stream, question: Question, item: pb.HistoryItem) -> Question | None:
         """Another topic had lost some before this question's beginning: what to ask instead, from
         there on.
         """
@@ -286,7 +228,7 @@ class Mender:
             return []  # never heard live: not this consumer's gap
         for gap in key.missing:
             if gap[0] == item.run and gap[1] <= item.sequence <= gap[2]:
-                _take_out(key.missing, gap, item.sequence)
+                take_out(key.missing, gap, item.sequence)
                 key.repaired += 1
                 if (item.run, item.sequence) > (key.run, key.last):
                     key.advance(item.run, item.sequence)
@@ -326,7 +268,7 @@ class Mender:
                     key.run, key.last = newest
                 key.missing.clear()
 
-    def _release(self, stream: _Stream) -> list[Arrival]:
+    def _release(self, stream: Stream) -> list[Arrival]:
         """Let go what is held, gaps and all."""
         out, held = [], list(stream.held)
         stream.held.clear()
@@ -350,25 +292,3 @@ class Mender:
             return True
         self._seen.append(mark)
         return False
-
-
-def _take_out(missing: list[list[int]], gap: list[int], sequence: int) -> None:
-    """One message of a gap has come: what is left of it before and behind."""
-    run, first, last, countable = gap
-    missing.remove(gap)
-    if first < sequence:  # a run's own first numbers may never have been
-        missing.append([run, first, sequence - 1, int(countable or first > 1)])
-    if sequence < last:
-        missing.append([run, sequence + 1, last, countable])
-
-
-def header_of(arrival: Arrival) -> pb.Header | None:
-    """The header of a message, the only part that is parsed; None for types without one and for
-    damaged bytes.
-    """
-    if "header" not in arrival.topic.type.DESCRIPTOR.fields_by_name:
-        return None
-    try:
-        return pb.Header.FromString(first_field(arrival.payload))
-    except (DecodeError, ValueError):
-        return None

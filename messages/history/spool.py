@@ -22,10 +22,9 @@ from collections.abc import Iterator
 from itertools import groupby, zip_longest
 from operator import itemgetter
 from pathlib import Path
-from typing import NamedTuple
 
 from messages.contract import gyrofree_pb2 as pb
-from messages.history.journal import Journal, first_of
+from messages.history.journal import Journal
 from messages.history.journal_file import (
     MAX_BYTES,
     PUBLISHED,
@@ -35,47 +34,24 @@ from messages.history.journal_file import (
     unpack_at,
     walk,
 )
+from messages.history.journal_folder import first_of
+from messages.history.spool_file import (
+    GLANCE_BYTES,
+    HEAD,
+    Entry,
+    Glance,
+    count,
+    entry_of,
+    older,
+    records_in,
+)
 
 log = logging.getLogger(__name__)
 
-HEAD = struct.Struct("<QQqBB")
 REPLY_BYTES = 1 << 20  # of one reply; who wants more asks on
 OVERVIEW_S = 0.5  # an overview is no finer than this
 OVERVIEW_LENGTH_S = 900.0  # and reaches back so far
-GLANCE_BYTES = 4096  # most messages are shorter
 LATE_S = 5.0  # a message is published at most so long after the time in its header
-
-
-class Entry(NamedTuple):
-    """One published message."""
-
-    position: int
-    topic: str  # "accel", "rate/products-ekf"
-    device: str
-    run: int
-    sequence: int
-    utc_ns: int
-    published_ns: int
-    payload: bytes
-
-
-class Glance(NamedTuple):
-    """Where an overview finds a message."""
-
-    utc_ns: int
-    segment: int
-    offset: int
-
-
-def entry_of(record: Record) -> Entry:
-    """The message in a record; raises struct.error for one that holds none."""
-    run, sequence, utc_ns, topic_n, device_n = HEAD.unpack_from(record.data)
-    middle = HEAD.size + topic_n
-    end = middle + device_n
-    topic, device = record.data[HEAD.size : middle].decode(), record.data[middle:end].decode()
-    return Entry(
-        record.sequence, topic, device, run, sequence, utc_ns, record.utc_ns, record.data[end:]
-    )
 
 
 class Spool:
@@ -116,7 +92,7 @@ class Spool:
             segment, offset = self.journal.place
             if segment not in self._runs:
                 self._forget_removed()
-            _count(self._runs.setdefault(segment, {}), topic, device, run, sequence)
+            count(self._runs.setdefault(segment, {}), topic, device, run, sequence)
             seen = self._glances.setdefault(
                 (topic, device), deque(maxlen=int(OVERVIEW_LENGTH_S / OVERVIEW_S))
             )
@@ -201,7 +177,7 @@ class Spool:
             return None
         first = 1
         for name in names:  # the last segment that begins before the time
-            head = next(iter(_records(name, limit=1 << 16)), None)
+            head = next(iter(records_in(name, limit=1 << 16)), None)
             if head is not None and head.utc_ns > query.from_utc_ns:
                 break
             first = first_of(name)
@@ -218,10 +194,10 @@ class Spool:
                 chosen = name
                 if found[0] <= sequence:
                     break
-            elif chosen is not None or _older(name, key[2]):
+            elif chosen is not None or older(name, key[2]):
                 break
         behind = None
-        for entry in map(entry_of, _records(chosen) if chosen else ()):
+        for entry in map(entry_of, records_in(chosen) if chosen else ()):
             if (entry.topic, entry.device, entry.run) == key:
                 if entry.sequence > sequence:
                     return entry.position if behind is None else behind
@@ -233,7 +209,7 @@ class Spool:
         for name, following in zip_longest(names, names[1:]):
             if following is not None and first_of(following) <= position:
                 continue
-            for record in _records(name, first=position):
+            for record in records_in(name, first=position):
                 yield entry_of(record)
 
     def _summary(self, name: Path) -> dict[tuple[str, str, int], list[int]]:
@@ -244,9 +220,9 @@ class Spool:
             if known is not None:
                 return dict(known)
         found: dict[tuple[str, str, int], list[int]] = {}
-        for record in _records(name):
+        for record in records_in(name):
             entry = entry_of(record)
-            _count(found, entry.topic, entry.device, entry.run, entry.sequence)
+            count(found, entry.topic, entry.device, entry.run, entry.sequence)
         with self._lock:
             self._forget_removed()
             return dict(self._runs.setdefault(first, found))
@@ -328,41 +304,3 @@ class Spool:
                 self.journal.folder,
                 error,
             )
-
-
-def _count(
-    table: dict[tuple[str, str, int], list[int]], topic: str, device: str, run: int, sequence: int
-) -> None:
-    known = table.get((topic, device, run))
-    if known is None:
-        table[topic, device, run] = [sequence, sequence]
-    else:
-        known[1] = sequence
-
-
-def _older(name: Path, run: int) -> bool:
-    """True when a segment was written before a run began, whose number is the time of its beginning
-    in ns.
-    """
-    try:
-        return name.stat().st_mtime_ns < run
-    except FileNotFoundError:
-        return True
-
-
-def _records(name: Path, limit: int = 0, first: int = 0) -> Iterator[Record]:
-    """Good records of a segment from sequence `first` on; with a limit only those in its first
-    bytes.
-
-    Nothing when retention was faster.
-    """
-    try:
-        if limit:
-            with name.open("rb") as stream:
-                data = os.read(stream.fileno(), limit)
-        else:
-            data = name.read_bytes()
-    except FileNotFoundError:
-        return
-    for _, _, record in walk(data, first=first):
-        yield record

@@ -13,7 +13,7 @@ import numpy as np
 from google.protobuf.message import DecodeError, Message
 from numpy.typing import NDArray
 
-from estimator.settings import EstimatorSettings
+from inertial.rate.names import LEADER
 from messages.contract.topics import GNSS, IMU, NAV, NOTE, RATE, TACHO, TRUTH, Topic, parse
 from sessions.library.curves import Curves, Line, Mark, bin_for, bins_of, load, save
 from sessions.library.curves_bins import Binner, PulseLine, TrackLine
@@ -206,7 +206,7 @@ def leader_of(path: Path) -> str:
     except SessionError:
         estimator = None
     names = estimator.get("rate") if isinstance(estimator, dict) else None
-    return str((names or EstimatorSettings().rate)[0])
+    return str(names[0]) if names else LEADER
 
 
 def _decoded(topic: Topic, block: Block) -> Iterator[tuple[int, Message]]:

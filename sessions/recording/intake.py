@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import Address, TopicError, parse
-from messages.history.mending import Arrival, Mender, Question
+from messages.history.mending import Mender
+from messages.history.mending_state import Arrival, Question
 from sessions.recording.manifest import Manifest
 
 

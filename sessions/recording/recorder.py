@@ -19,7 +19,7 @@ from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_c
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import RECORDER, STATUS
 from messages.history.answers import Asker
-from messages.history.mending import Question
+from messages.history.mending_state import Question
 from sessions.library.catalogue import Catalogue
 from sessions.library.remove import Retention, retain
 from sessions.recording.intake import Intake

@@ -11,7 +11,7 @@ import json
 
 import numpy as np
 
-from inertial.layouts.layout import CUBE
+from inertial.layouts.catalogue import CUBE
 from inertial.rate import products_ekf
 from inertial.rate.estimators import ProductsRate
 from inertial.simulation.drive import simulate

@@ -12,8 +12,8 @@ import sys
 
 from scipy.stats import spearmanr
 
-from logs.in_motion import methods
-from logs.reproduce_in_motion import compare, mean_covariance
+from logs.reproduce.in_motion import methods
+from logs.reproduce.in_motion_comparison import compare, mean_covariance
 
 # 3-D velocity error, m/s: the prototype's table of the comparison, columns A B C D K E F G H J
 COLUMNS = "ABCDKEFGHJ"

@@ -172,7 +172,7 @@ def estimator(folder: Path, hours: float, done: Any) -> None:
     from estimator.settings import EstimatorSettings
     from estimator.warm import warm
     from estimator.worker import Worker
-    from messages.history.mending import Arrival
+    from messages.history.mending_state import Arrival
     from messages.history.spool import Spool
 
     warm()

@@ -20,7 +20,7 @@ from messages.bus import orders
 from messages.bus.session import BusSettings, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ACCEL, CALIBRATION
-from messages.history.mending import Arrival
+from messages.history.mending_state import Arrival
 
 STATE = pb.CalibrationStatus
 

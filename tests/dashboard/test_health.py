@@ -13,7 +13,7 @@ from dashboard.scene.drawing.palette import GREY, SKY, VERMILLION, YELLOW
 from dashboard.scene.panels.base import Snapshot
 from dashboard.scene.panels.device.health import Health
 from dashboard.scene.panels.device.layout import LayoutBench, figures
-from inertial.layouts.layout import CUBE
+from inertial.layouts.catalogue import CUBE
 from inertial.layouts.quality import analyse
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp

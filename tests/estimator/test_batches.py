@@ -7,7 +7,7 @@ import pytest
 
 from estimator.devices.rate import RateBoard, RateOutput
 from estimator.packed import Doubles, varint
-from inertial.layouts.layout import CUBE, LAYOUTS
+from inertial.layouts.catalogue import CUBE, LAYOUTS
 from inertial.rate import bound, bound_live, sight
 from inertial.rate.batch import RateState
 from inertial.rate.estimators import ESTIMATORS, ProductsRate

@@ -20,7 +20,7 @@ from inertial.simulation.imperfect import tumble
 from messages.bus.session import Publishers
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ACCEL, ESTIMATOR, GATEWAY, RATE
-from messages.history.mending import Arrival, Question
+from messages.history.mending_state import Arrival, Question
 from messages.history.spool import Spool
 from tests.estimator.test_service import accel_batches
 

@@ -8,8 +8,9 @@ import time
 
 import pytest
 
-from messages.history.journal import Journal, JournalBusy
+from messages.history.journal import Journal
 from messages.history.journal_file import SEGMENT_HEAD, records, scan, walk
+from messages.history.journal_folder import JournalBusy
 
 
 def fill(journal: Journal, n: int, size: int = 100) -> None:

@@ -21,7 +21,7 @@ from gateway.virtual.board_link import PtyLink
 from messages.bus.session import Publishers
 from messages.contract.topics import BY_NAME
 from messages.history.journal_file import BOARD, Record, last_whole, pack
-from messages.history.spool import entry_of
+from messages.history.spool_file import entry_of
 
 NMEA = b"$GNGGA,120000.%02d,4717.1,N,00833.9,E,4,12,0.8,408.0,M,47.0,M,,*"
 PAST_S = 4.0  # so long ago the first byte came

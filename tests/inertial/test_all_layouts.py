@@ -5,8 +5,7 @@ it may be.
 import numpy as np
 import pytest
 
-from inertial.layouts.catalogue import find
-from inertial.layouts.layout import LAYOUTS
+from inertial.layouts.catalogue import LAYOUTS, find
 from inertial.rate.estimators import ESTIMATORS
 from inertial.simulation.table import TableTest
 

@@ -5,7 +5,7 @@ it.
 import numpy as np
 import pytest
 
-from inertial.layouts.layout import CUBE
+from inertial.layouts.catalogue import CUBE
 from inertial.rate.bound import (
     IN_USE,
     SOURCE,

@@ -14,7 +14,8 @@ from estimator.choice import UnknownEstimator, make_layout
 from estimator.settings import LayoutSettings
 from gyrofree.commands.main import app
 from inertial.layouts import catalogue, search
-from inertial.layouts.layout import CUBE, LAYOUTS, GeometryError, Layout
+from inertial.layouts.catalogue import CUBE, LAYOUTS
+from inertial.layouts.layout import GeometryError, Layout
 from inertial.layouts.quality import PRODUCT, UNKNOWNS, analyse, rate_information
 
 AXIS = {"position_m": [0.05, 0, 0], "direction": [0, 1, 0]}

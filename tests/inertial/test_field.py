@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inertial.layouts.layout import CORNERS, CUBE, LAYOUTS, WIRING, products
+from inertial.layouts.catalogue import CUBE, LAYOUTS
+from inertial.layouts.layout import CORNERS, WIRING, products
 from inertial.rate.field import (
     cube_angular_acceleration,
     cube_specific_force,

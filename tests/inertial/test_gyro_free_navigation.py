@@ -9,17 +9,11 @@ import numpy as np
 import pytest
 from support.cube_drive import cube_readings
 
-from estimator.devices.gyro_free import (
-    NOISE,
-    GyroFreeNavigation,
-    attitude_noise,
-    config_of,
-    equivalent_drift,
-    position_error,
-)
+from estimator.devices.gyro_free import NOISE, GyroFreeNavigation, attitude_noise, config_of
 from estimator.devices.rate import RateOutput
-from inertial.layouts.layout import CUBE
+from inertial.layouts.catalogue import CUBE
 from inertial.navigation.navigation import Mode, NavigatorConfig, Solution
+from inertial.navigation.unaided import equivalent_drift, position_error
 from inertial.simulation.drive import simulate
 from inertial.simulation.table import IDEAL
 

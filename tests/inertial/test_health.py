@@ -14,8 +14,8 @@ from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from inertial import core
 from inertial.core import native
-from inertial.layouts.catalogue import find
-from inertial.layouts.layout import CUBE, LAYOUTS, products
+from inertial.layouts.catalogue import CUBE, LAYOUTS, find
+from inertial.layouts.layout import products
 from inertial.rate import axis_samples, parity
 from inertial.rate.estimators import VARIANTS
 from inertial.rate.health import AxisState, HealthMonitor

@@ -9,8 +9,14 @@ import numpy as np
 import pytest
 
 from inertial.simulation.drive import Tuning, simulate
-from logs import in_motion, in_motion_draw, in_motion_real
-from logs.reproduce_in_motion import compare, inputs_of, mean_covariance, paper_tables, reproduce
+from logs.reproduce import in_motion, in_motion_draw, in_motion_real
+from logs.reproduce.in_motion_comparison import (
+    compare,
+    inputs_of,
+    mean_covariance,
+    paper_tables,
+    reproduce,
+)
 
 METHODS = (
     "KF",

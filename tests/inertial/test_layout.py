@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inertial.layouts.layout import CUBE, LAYOUTS, GeometryError, Layout, products, products_matrix
+from inertial.layouts.catalogue import CUBE, LAYOUTS
+from inertial.layouts.layout import GeometryError, Layout, products, products_matrix
 
 law = settings(deadline=None, max_examples=50)  # the first call may compile
 numbers = st.floats(-20.0, 20.0)

@@ -5,7 +5,8 @@ bad data.
 import numpy as np
 import pytest
 
-from inertial.layouts.layout import CUBE, LAYOUTS, GeometryError, Layout
+from inertial.layouts.catalogue import CUBE, LAYOUTS
+from inertial.layouts.layout import GeometryError, Layout
 from inertial.rate import least_squares
 from inertial.rate.estimators import ESTIMATORS, LeastSquaresRate
 from inertial.simulation.table import IDEAL, TableTest

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inertial.attitude import rotation
-from inertial.layouts.layout import CUBE, LAYOUTS, GeometryError, Layout
+from inertial.layouts.catalogue import CUBE, LAYOUTS
+from inertial.layouts.layout import GeometryError, Layout
 from inertial.rate import products_correct as correct
 from inertial.rate import products_kernel as kernel
 from inertial.rate import products_model as model

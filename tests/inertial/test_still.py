@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inertial.layouts.layout import CUBE, LAYOUTS
+from inertial.layouts.catalogue import CUBE, LAYOUTS
 from inertial.rate import still
 from inertial.rate.observed import sensor
 from inertial.simulation.table import TableTest

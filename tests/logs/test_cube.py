@@ -11,8 +11,9 @@ from typer.testing import CliRunner
 from gyrofree.commands.main import app
 from gyrofree.running import simulate_csv
 from inertial.layouts.catalogue import find
-from logs.cube import nees_mean, run_cube
+from logs.cube import run_cube
 from logs.cube_log import LogError, read_log
+from logs.cube_score import nees_mean
 
 NAMES = find("cube").axis_names
 ENTRY = {

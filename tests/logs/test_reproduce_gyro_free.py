@@ -8,15 +8,17 @@ import numpy as np
 import pytest
 
 from gyrofree.running import simulate_csv
+from inertial.constants import MILLI_G
 from inertial.layouts.catalogue import find
 from inertial.rate.field import cube_angular_acceleration, cube_specific_force
-from logs import reproduce_gyro_free as study
+from logs.reproduce import gyro_free_study as study
+from logs.reproduce.gyro_free import reproduce
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     out = tmp_path_factory.mktemp("reproduce")
-    return out, study.reproduce(out, seed=1)
+    return out, reproduce(out, seed=1)
 
 
 def test_table_1_is_recovered_to_a_tenth_of_a_mg_and_drift_is_ours_below_the_papers_way(made):
@@ -50,7 +52,7 @@ def test_equations_25_26_and_27(made):
         layout.S @ a, np.r_[cube_angular_acceleration(a, 0.1), cube_specific_force(a)]
     )
     # 30 deg/h beside Table 1: 1/2 b t^2 is 18.5 11.0 23.8 m, the drift adds 1/6 d g t^3 = 6.4 m
-    bias = np.array(study.PAPER_BIAS_MG) / study.MG
+    bias = np.array(study.PAPER_BIAS_MG) * MILLI_G
     error = study.closed_form(bias, study.paper_drift(), np.array([30.0]))[0]
     np.testing.assert_allclose(error, [18.54 + 6.42, 11.03, 23.83], atol=0.01)
     assert study.drift_of(error, bias, 30.0) * study.PER_HOUR == pytest.approx(30.0)
@@ -61,7 +63,7 @@ def test_a_recorded_session_without_truth(made, tmp_path):
     simulate_csv.write(log, "cw-ccw", 2)
     rows = [line.split(",") for line in log.read_text().splitlines()[1:]]
     log.write_text("\n".join(",".join(row[:14]) for row in rows) + "\n")
-    result = study.reproduce(tmp_path / "out", session=log)
+    result = reproduce(tmp_path / "out", session=log)
     assert result["reference"] == "tachometer" and result["table_1_bias_mg"]["true"] is None
     assert (
         result["estimators"]["products-ekf"]["omega_z_rms_deg_per_s"] < 5.0

@@ -14,7 +14,8 @@ from messages.bus.session import BusSettings, Publishers, open_client, open_rout
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ACCEL, LOCATION, STATUS, TACHO, parse
 from messages.history.answers import declare
-from messages.history.mending import Arrival, Mender
+from messages.history.mending import Mender
+from messages.history.mending_state import Arrival
 from messages.history.spool import Spool
 from sessions.library.catalogue import Catalogue
 from sessions.recording import recorder

@@ -4,7 +4,7 @@ send them.
 
 import numpy as np
 
-from inertial.layouts.layout import CUBE
+from inertial.layouts.catalogue import CUBE
 from inertial.simulation.arm import arm_test, centre
 from inertial.simulation.table import SensorModel
 from messages.contract import gyrofree_pb2 as pb

@@ -24,13 +24,23 @@ def free_port() -> int:
 class RunningDemo:
     """`gyrofree demo` in a folder of its own; a context manager."""
 
-    def __init__(self, folder: Path, *arguments: str, command: str = "demo") -> None:
+    def __init__(
+        self,
+        folder: Path,
+        *arguments: str,
+        command: str = "demo",
+        python: str | Path = sys.executable,
+        environment: dict[str, str] | None = None,
+    ) -> None:
+        """`python`: of the installation to run; `environment`: all of it, None for this one's."""
         self.folder = folder
         self.port, self.bus_port = free_port(), free_port()
         folder.mkdir(parents=True, exist_ok=True)
         self.log = folder / "demo.log"
+        self._environment = environment
         self._arguments = [
-            sys.executable,
+            str(python),
+            "-P",
             "-m",
             "gyrofree",
             command,
@@ -62,7 +72,11 @@ class RunningDemo:
     def __enter__(self) -> "RunningDemo":
         with self.log.open("wb") as log:
             self.process = subprocess.Popen(
-                self._arguments, stdin=subprocess.DEVNULL, stdout=log, stderr=log
+                self._arguments,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                env=self._environment,
             )
         try:
             self.wait_for(r"open\s+(http://\S+)", START)

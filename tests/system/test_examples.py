@@ -13,6 +13,7 @@ SAYS = {  # example -> a part of what it prints
     "add_wire_frame.py": "damaged: cobs, 35 bytes",
     "read_recording.py": "deg/s RMS against the tachometer",
     "run_log.py": "the worst is least-squares",
+    "subscribe_to_rates.py": "products-ekf: ",
 }
 
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dashboard.data.pose import yaw_of
-from inertial.layouts.layout import CUBE
+from inertial.layouts.catalogue import CUBE
 from inertial.rotation import from_matrix, multiply
 from messages.contract import gyrofree_pb2 as pb
 

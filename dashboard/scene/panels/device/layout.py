@@ -13,8 +13,9 @@ from dashboard.scene.drawing.palette import GREY, ORANGE, SKY, number, rgb, rows
 from dashboard.scene.panels.base import DEG, Panel, Snapshot
 from inertial.constants import MILLI_G
 from inertial.layouts import catalogue
+from inertial.layouts.catalogue import CUBE, LAYOUTS
 from inertial.layouts.draw import noise_ellipsoid
-from inertial.layouts.layout import CUBE, LAYOUTS, Layout
+from inertial.layouts.layout import Layout
 from inertial.layouts.quality import UNKNOWNS, Quality, analyse
 from inertial.rotation import from_matrix, rotate
 

@@ -8,6 +8,7 @@ import viser
 from dashboard.scene.drawing.palette import AXES, GREEN, escape, number, rgba, rows
 from dashboard.scene.panels.base import Snapshot
 from dashboard.scene.panels.guided.guided import Guided, guidance, head, silent
+from dashboard.scene.panels.guided.solid import Camera
 from inertial.constants import MILLI_G
 from messages.contract import gyrofree_pb2 as pb
 
@@ -130,39 +131,22 @@ def picture(up_b: np.ndarray, dark: bool) -> str:
     """The cube as it should stand, an arrow up, as SVG: visible faces with the names of their
     axes.
     """
-    camera = CAMERA / np.linalg.norm(CAMERA)
-    R = facing(np.asarray(up_b, dtype=float), camera)
-    right = np.cross([0.0, 0.0, 1.0], camera)
-    right /= np.linalg.norm(right)
-    over = np.cross(camera, right)
-
-    def screen(p: np.ndarray) -> tuple[float, float]:
-        return 110.0 + 44.0 * float(right @ p), 112.0 - 44.0 * float(over @ p)
-
+    camera = Camera.at(CAMERA, np.array([0.0, 0.0, 1.0]), (110.0, 112.0), 44.0)
+    R = facing(np.asarray(up_b, dtype=float), camera.towards)
     line = "#e8e8e8" if dark else "#333333"
     lowest = min(
         float((R @ np.array([x, y, z]))[2]) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)
     )
-    x, y = screen(np.array([0.0, 0.0, lowest]))
+    x, y = camera.screen(np.array([0.0, 0.0, lowest]))
     parts = [f'<ellipse cx="{x:.0f}" cy="{y:.0f}" rx="92" ry="30" fill="rgba(128,128,128,.22)"/>']
-    for axis in range(3):
-        for sign in (1.0, -1.0):
-            normal = sign * np.eye(3)[axis]
-            if float((R @ normal) @ camera) <= 0.02:
-                continue
-            a, b = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
-            corners = [
-                screen(R @ (normal + p * a + q * b))
-                for p, q in ((1, 1), (1, -1), (-1, -1), (-1, 1))
-            ]
-            points = " ".join(f"{u:.1f},{v:.1f}" for u, v in corners)
-            u, v = screen(R @ normal)
-            parts.append(
-                f'<polygon points="{points}" fill="{rgba(AXES[axis], 0.85)}" stroke="{line}"'
-                f' stroke-width="1.5" stroke-linejoin="round"/><text x="{u:.0f}" y="{v + 5:.0f}"'
-                ' text-anchor="middle" font-size="16" font-weight="700"'
-                f' fill="#000">{"+" if sign > 0 else "−"}{"xyz"[axis]}</text>'
-            )
+    for face in camera.faces(R, np.ones(3)):
+        u, v = face.middle
+        parts.append(
+            f'<polygon points="{face.points}" fill="{rgba(AXES[face.axis], 0.85)}" stroke="{line}"'
+            f' stroke-width="1.5" stroke-linejoin="round"/><text x="{u:.0f}" y="{v + 5:.0f}"'
+            ' text-anchor="middle" font-size="16" font-weight="700"'
+            f' fill="#000">{"+" if face.sign > 0 else "−"}{"xyz"[face.axis]}</text>'
+        )
     x, tip = 206.0, 40.0
     parts.append(
         f'<path d="M{x},150 V{tip + 12} M{x - 8},{tip + 14} L{x},{tip} L{x + 8},{tip + 14}"'

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from dashboard.scene.drawing.palette import AXES, GREEN, VERMILLION, escape, number, rgba, rows
 from dashboard.scene.panels.base import DEG, Snapshot
 from dashboard.scene.panels.guided.guided import Guided, guidance, head, silent
+from dashboard.scene.panels.guided.solid import Camera
 from messages.contract import gyrofree_pb2 as pb
 
 ACTION = pb.EstimatorCommand
@@ -34,6 +35,7 @@ BUTTONS = (  # label, order, icon, colour
 CAMERA = np.array(
     [-0.78, 0.42, -0.47]
 )  # from behind, right, above; n north-east-down, the nose points north
+HALF = np.array([1.15, 0.75, 0.12])  # of the board drawn
 QUARTER = np.pi / 2.0
 TURNS = {  # rotation vector of each pose against level, b
     STATUS.POSE_LEVEL: (0.0, 0.0, 0.0),
@@ -155,33 +157,15 @@ def _board(R: np.ndarray, middle: float, line: str) -> str:
     """A flat board with its nose marked, at the horizontal place `middle` of the picture; R turns b
     into n.
     """
-    camera = CAMERA / np.linalg.norm(CAMERA)
-    right = np.cross([0.0, 0.0, -1.0], -camera)
-    right /= -np.linalg.norm(right)
-    right = right if right[1] > 0.0 else -right
-    over = np.cross(camera, right)
-    over = over if over[2] < 0.0 else -over
-
-    def screen(p: np.ndarray) -> tuple[float, float]:
-        return middle + 46.0 * float(right @ p), 84.0 - 46.0 * float(over @ p)
-
-    half, parts = np.array([1.15, 0.75, 0.12]), []
-    for axis in range(3):
-        for sign in (1.0, -1.0):
-            normal = sign * np.eye(3)[axis]
-            if float((R @ normal) @ camera) <= 0.02:
-                continue
-            a, b = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
-            corners = [
-                screen(R @ (half * (normal + p * a + q * b)))
-                for p, q in ((1, 1), (1, -1), (-1, -1), (-1, 1))
-            ]
-            points = " ".join(f"{u:.1f},{v:.1f}" for u, v in corners)
-            shade = {(2, -1.0): rgba(GREEN, 0.85), (2, 1.0): "rgba(128,128,128,.85)"}.get(
-                (axis, sign), rgba(GREEN, 0.5)
-            )
-            edge = f'stroke="{line}" stroke-width="1.5" stroke-linejoin="round"'
-            parts.append(f'<polygon points="{points}" fill="{shade}" {edge}/>')
+    camera = Camera.at(CAMERA, np.array([0.0, 0.0, -1.0]), (middle, 84.0), 46.0)
+    parts = []
+    for face in camera.faces(R, HALF):
+        shade = {(2, -1.0): rgba(GREEN, 0.85), (2, 1.0): "rgba(128,128,128,.85)"}.get(
+            (face.axis, face.sign), rgba(GREEN, 0.5)
+        )
+        edge = f'stroke="{line}" stroke-width="1.5" stroke-linejoin="round"'
+        parts.append(f'<polygon points="{face.points}" fill="{shade}" {edge}/>')
+    screen = camera.screen
     nose = [screen(R @ np.array(p)) for p in ((1.6, 0.0, 0.0), (1.2, 0.28, 0.0), (1.2, -0.28, 0.0))]
     parts.append(
         f'<polygon points="{" ".join(f"{u:.1f},{v:.1f}" for u, v in nose)}" fill="{AXES[0]}"/>'

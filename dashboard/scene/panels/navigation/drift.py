@@ -9,8 +9,8 @@ import numpy as np
 from dashboard.scene.drawing.chart import Curve
 from dashboard.scene.drawing.palette import GREY, VERMILLION, number
 from dashboard.scene.panels.base import DEG, Snapshot
-from estimator.devices.gyro_free import equivalent_drift, position_error
 from inertial.constants import MILLI_G
+from inertial.navigation.unaided import equivalent_drift, position_error
 from messages.contract import gyrofree_pb2 as pb
 
 HOUR = 3600.0

@@ -11,7 +11,6 @@ the CSV of a recorded one. The paper's curves are not printed as numbers; what i
 beside ours.
 """
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,9 +24,9 @@ from inertial.layouts.catalogue import find
 from inertial.layouts.layout import Layout
 from inertial.rotation import to_matrix
 from inertial.simulation.table import BLOCK, TableTest
-from logs import reproduce_gyro_free_pages as pages
-from logs.cube import Reference, Track, reference, run_log
+from logs.cube import run_log
 from logs.cube_log import CubeLog, read_log
+from logs.cube_track import Reference, Track, reference
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
@@ -54,31 +53,6 @@ class Session:
     f_b: Array  # (n, 3) by (25), m/s^2
     still: NDArray[np.bool_]  # (n,)
     true_bias: Array | None  # (3,) m/s^2 of p, simulated sessions only
-
-
-def reproduce(
-    out: Path,
-    *,
-    session: Path | None = None,
-    seed: int = 1,
-    progress: Progress = lambda done, what: None,
-) -> dict[str, Any]:
-    """Write pictures, result.json and index.html into `out` and return the JSON.
-
-    session: CSV of a recorded run of the cube, else one is simulated from the seed. Raises
-    LogError, OSError.
-    """
-    out = Path(out)
-    out.mkdir(parents=True, exist_ok=True)
-    progress(0.0, "session")
-    found = recorded(session, progress) if session is not None else simulated(seed, progress)
-    result = evaluate(found)
-    progress(0.7, "drawing")
-    result["figures"] = pages.draw(out, found, result)
-    (out / "result.json").write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
-    pages.write_index(out, result)
-    progress(1.0, "done")
-    return result
 
 
 def simulated(seed: int, progress: Progress = lambda done, what: None) -> Session:

@@ -24,8 +24,8 @@ from inertial.simulation.drive import (
     Tuning,
     fix_errors,
 )
-from logs import in_motion
-from logs.in_motion import Errors, Inputs
+from logs.reproduce import in_motion
+from logs.reproduce.in_motion import Errors, Inputs
 from logs.score import read_drive
 
 Array = NDArray[np.float64]

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.simulation.drive import CONDITIONS, Sensors, SimulatedDrive, Tuning, simulate
-from logs import in_motion, in_motion_draw, in_motion_real
-from logs.in_motion import Begin, Errors, Inputs
+from logs.reproduce import in_motion, in_motion_draw, in_motion_real
+from logs.reproduce.in_motion import Begin, Errors, Inputs
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from inertial.simulation.drive import CONDITIONS
-from logs.in_motion import COMPONENTS, Errors
+from logs.reproduce.in_motion import COMPONENTS, Errors
 
 DEG = 180.0 / math.pi
 FAMILIES = {  # colours that stay apart for the colour-blind (Okabe and Ito)

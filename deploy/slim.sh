@@ -1,0 +1,21 @@
+#!/bin/sh
+# slim.sh VENV: take out of an environment what no service of an image uses. What stays is byte-compiled, since
+# the image is read-only. Each line says why it may go.
+set -eu
+cd "$1"
+packages=$(echo "$PWD"/lib/python3*/site-packages)
+
+# installers: nothing is installed in a container
+rm -rf "$packages"/pip "$packages"/pip-* "$packages"/setuptools* "$packages"/pkg_resources "$packages"/_distutils_hack \
+  "$packages"/distutils-precedence.pth bin/pip*
+# makers of documentation, asked for by numpydoc, which allantools names and does not import
+rm -rf "$packages"/sphinx "$packages"/sphinxcontrib "$packages"/babel "$packages"/alabaster "$packages"/numpydoc
+# Arrow's servers, clouds and headers: tables are written to files
+rm -rf "$packages"/pyarrow/libarrow_flight* "$packages"/pyarrow/_flight* "$packages"/pyarrow/libarrow_s3* \
+  "$packages"/pyarrow/include "$packages"/pyarrow/src
+# tests of packages
+find "$packages" -type d -name tests -prune -exec rm -rf {} +
+# names for debuggers: a hundred megabytes
+find "$packages" -name '*.so*' -type f -exec strip --strip-unneeded {} +
+find "$packages" \( -name '*.pyi' -o -name '*.pyx' -o -name '*.pxd' \) -delete
+bin/python -m compileall -q -j 2 "$packages" || true # some hold templates that are no Python

@@ -1,0 +1,1 @@
+"""Published studies again: the table test of the gyro-free cube, the comparison of alignments."""
