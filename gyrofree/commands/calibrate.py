@@ -74,8 +74,9 @@ def plan(
         table.add_row(str(number), one["text"], " ".join(f"{v:+.2f}" for v in one["up_b"]))
     show_table(table)
     print(
-        f"each {seconds:g} s still, worst axis then: bias ±{promised['bias_sigma_mps2'] / MILLI_G:.2f}"
-        f" mg, scale ±{promised['scale_sigma'] * 100:.3f} %, direction"
+        f"each {seconds:g} s still, worst axis then: bias"
+        f" ±{promised['bias_sigma_mps2'] / MILLI_G:.2f} mg,"
+        f" scale ±{promised['scale_sigma'] * 100:.3f} %, direction"
         f" ±{promised['misalignment_sigma_rad'] * DEG:.3f}°"
     )
 

@@ -68,9 +68,9 @@ def record(config: Config = None, verbose: Verbose = False) -> None:
     settings = settings_of(config)
 
     def body(stop: threading.Event) -> None:
-        from sessions.recording import recorder
+        from sessions.recording import service
 
-        recorder.run(settings.recorder, settings.bus, stop, settings.model_dump(mode="json"))
+        service.run(settings.recorder, settings.bus, stop, settings.model_dump(mode="json"))
 
     run_service(body, verbose)
 

@@ -5,13 +5,11 @@ Inputs go out as in replay.py, under `<device>-replay`. Estimates come from a pi
 process that is given every input from the recording's beginning, in order, also those before the
 moment a person jumps to; so at any moment they are the very ones of a run without jumps. What lies
 before is run through without being published, from the nearest of the states that are kept every
-KEEP_S of recording.
+KEEP_S of recording (states.py).
 
 Orders are ReplayCommands (`order`); the state is a ReplayStatus (`status`).
 """
 
-import logging
-import pickle
 import threading
 import time
 from collections import deque
@@ -25,16 +23,13 @@ from messages.contract.topics import ACCEL, IMU, NOTE, PIPELINE_INPUTS, Address
 from sessions.replay.replay import INPUTS, LONGEST_NAME, SUFFIX, Input, rename, renamed
 from sessions.replay.reproduce import ESTIMATES, Pipeline, first_used, give_orders
 from sessions.replay.source import Source
-
-log = logging.getLogger(__name__)
+from sessions.replay.states import KeptStates
 
 PLAYED = (*INPUTS, NOTE)
 # put behind an estimator's name when its recorded estimates are shown beside the new ones
 RECORDED = "-recorded"
 SLOWEST, FASTEST = 0.1, 100.0
 BEFORE_S = 10.0  # published at once before the moment jumped to, so that charts are not empty, s
-KEEP_S = 20.0  # of recording between two kept states
-KEPT = 400  # states
 STATUS_S = 0.2
 BEGINNING_S = 10.0  # of recording in which the estimators' first inputs are looked for
 LOOK_EVERY = 200  # inputs between two looks at the orders while running through
@@ -77,9 +72,7 @@ class Playback:
         )
         self._wake = threading.Event()
         self._sequence: dict[str, int] = {}
-        self._states: dict[
-            float, tuple[int, bytes]
-        ] = {}  # position -> log time to go on from, pickled pipeline
+        self._states = KeptStates()
         self._steps = 0
         self._batches: deque[float] = deque(
             maxlen=BATCHES
@@ -233,7 +226,7 @@ class Playback:
         self._pipeline = pipeline
         self._batches.clear()
         self._next = next(self._items, None)
-        self._kept_s = (from_ns - self.source.start_ns) / 1e9
+        self._states.go_on_from((from_ns - self.source.start_ns) / 1e9)
 
     def _advance(self, publish: bool) -> None:
         """Take the next message: pipeline first, then the bus."""
@@ -254,8 +247,9 @@ class Playback:
                 outputs = ()  # refused when it was live, too
         if publish:
             self._publish(item, outputs)
-        if self._pipeline is not None and self.position_s - self._kept_s >= KEEP_S:
-            self._keep(item)
+        due = self._pipeline is not None and self._states.due(self.position_s)
+        if due and self._next is not None and self._next.log_ns > item.log_ns:
+            self._states.keep(self.position_s, self._next.log_ns, self._pipeline)
 
     def _publish(self, item: Input, outputs: Iterable) -> None:
         device = renamed(item.address.device, self._suffix)
@@ -307,7 +301,7 @@ class Playback:
 
     def _restore(self, publish_from: float) -> None:
         """The kept state nearest before a moment, unless the present one is as near."""
-        kept = max((at for at in self._states if at <= publish_from), default=None)
+        kept = self._states.before(publish_from)
         if (
             self._next is not None
             and self.position_s <= publish_from
@@ -317,22 +311,8 @@ class Playback:
         if kept is None:
             self._begin(self.source.start_ns, self._fresh())
         else:
-            from_ns, state = self._states[kept]
-            self._begin(from_ns, pickle.loads(state))
-            self._kept_s = kept
-
-    def _keep(self, item: Input) -> None:
-        """Keep the pipeline's state here, when no other message has this one's time."""
-        if self._next is None or self._next.log_ns <= item.log_ns:
-            return
-        self._kept_s = self.position_s
-        if self.position_s in self._states or len(self._states) >= KEPT:
-            return
-        try:
-            self._states[self.position_s] = (self._next.log_ns, pickle.dumps(self._pipeline))
-        except Exception as error:  # seeking back then begins at the beginning
-            log.warning("the estimators' state cannot be kept (%s): seeking takes longer", error)
-            self._kept_s = float("inf")
+            self._begin(*self._states.at(kept))
+            self._states.go_on_from(kept)
 
     # --- where the estimators began
 

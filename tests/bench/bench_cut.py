@@ -30,7 +30,7 @@ from messages.contract.topics import ACCEL, STATUS  # noqa: E402
 from messages.history.answers import declare  # noqa: E402
 from messages.history.spool import Spool  # noqa: E402
 from sessions.library.catalogue import Catalogue  # noqa: E402
-from sessions.recording import recorder  # noqa: E402
+from sessions.recording import service as recorder  # noqa: E402
 from sessions.recording.mcap_log import read  # noqa: E402
 from sessions.recording.settings import RecorderSettings  # noqa: E402
 

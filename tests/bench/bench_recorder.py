@@ -36,7 +36,7 @@ import sys
 from pathlib import Path
 from gyrofree.running.process import stop_on_signals
 from messages.bus.session import BusSettings
-from sessions.recording import recorder
+from sessions.recording import service as recorder
 from sessions.recording.settings import RecorderSettings
 stop = stop_on_signals()
 bus = BusSettings(prefix="bench", router=sys.argv[2])

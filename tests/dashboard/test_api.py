@@ -21,7 +21,7 @@ from messages.bus import orders
 from messages.bus.session import BusSettings, Publishers, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import BOARD, ESTIMATOR, LINK
-from sessions.recording import recorder
+from sessions.recording import service as recorder
 from sessions.recording.settings import RecorderSettings
 
 

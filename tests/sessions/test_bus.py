@@ -27,7 +27,7 @@ from messages.contract.topics import (
 )
 from sessions.library.annotations import change_annotations
 from sessions.library.catalogue import Catalogue
-from sessions.recording import recorder
+from sessions.recording import service as recorder
 from sessions.recording.manifest import write_manifest
 from sessions.recording.mcap_log import read
 from sessions.recording.settings import RecorderSettings
@@ -232,7 +232,7 @@ from pathlib import Path
 from gyrofree.running.process import stop_on_signals
 from messages.bus import orders
 from messages.bus.session import BusSettings
-from sessions.recording import recorder
+from sessions.recording import service as recorder
 from sessions.recording.settings import RecorderSettings
 stop = stop_on_signals()
 bus = BusSettings(prefix="t", router=sys.argv[2])

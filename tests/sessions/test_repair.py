@@ -18,7 +18,7 @@ from messages.history.mending import Mender
 from messages.history.mending_state import Arrival
 from messages.history.spool import Spool
 from sessions.library.catalogue import Catalogue
-from sessions.recording import recorder
+from sessions.recording import service as recorder
 from sessions.recording.mcap_log import read
 from sessions.recording.settings import RecorderSettings
 
