@@ -245,7 +245,7 @@ class _Problem:
         return np.concatenate(rows)
 
     def jacobian(self, C0: Array, theta: Array) -> Array:
-        """By central differences: twelve unknowns, a few thousand samples, integrated in the core."""
+        """By central differences: twelve unknowns; the core integrates the samples."""
         columns = []
         for j in range(UNKNOWNS):
             d = np.zeros(UNKNOWNS)
