@@ -16,7 +16,6 @@ from emulator import cycles as cy
 FLASH_SIZE = 512 << 10
 EXCEPTION = 21  # UC_ERR_EXCEPTION: also what a jump to an EXC_RETURN value ends with
 NOWHERE = 0xFFFFFFF0  # no code there: emu_start's mandatory end address
-NEVER = 1 << 62
 HOOK_BLOCK = 8
 PAGE = 0x4000
 

@@ -22,8 +22,8 @@ from inertial.rate.sight import ALL_BLIND
 from inertial.rate.tachometer import SUFFIX
 from logs.cube_axes import examine
 from logs.cube_log import CubeLog, LogError, read_log
+from logs.cube_run import EstimatorRun, reference
 from logs.cube_score import bound_of, notes_of, score
-from logs.cube_track import Track, reference
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
@@ -128,7 +128,7 @@ def run_log(
     progress: Progress = nothing,
     tacho_aid: bool = False,
     resolve: bool = False,
-) -> tuple[dict[str, Track], list[str]]:
+) -> tuple[dict[str, EstimatorRun], list[str]]:
     """Tracks of the estimators that can use this layout, and why the others cannot. Raises
     LogError, CardError.
     """
@@ -176,7 +176,7 @@ def run_estimator(
     card: Card | None = None,
     tacho_aid: bool = False,
     resolve: bool = False,
-) -> Track:
+) -> EstimatorRun:
     """Every sample of a log through one estimator; missing samples are announced to it as on the
     live path.
 
@@ -221,7 +221,9 @@ def run_estimator(
             past.into(omega, P, angle, q)
             blind = 0
     said = why if 2 * blind > n else ""
-    return Track(called, omega, P, q, angle, alpha, force, still, p_n, busy / n / 1000.0, said)
+    return EstimatorRun(
+        called, omega, P, q, angle, alpha, force, still, p_n, busy / n / 1000.0, said
+    )
 
 
 def _reports(data: CubeLog) -> dict[int, float]:

@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from logs.cube_log import CubeLog
-from logs.cube_track import Reference, Track
+from logs.cube_run import EstimatorRun, Reference
 
 DEG = 180.0 / np.pi
 COLOURS = (
@@ -44,7 +44,7 @@ STYLE = {
 def draw(
     path: Path,
     data: CubeLog,
-    tracks: Mapping[str, Track],
+    tracks: Mapping[str, EstimatorRun],
     truth: Reference,
     result: Mapping[str, Any],
 ) -> None:
@@ -79,7 +79,7 @@ def _rates(
     t: np.ndarray,
     k: int,
     axis: str,
-    tracks: Mapping[str, Track],
+    tracks: Mapping[str, EstimatorRun],
     truth: Reference,
     result,
 ) -> None:
@@ -121,7 +121,7 @@ def _rates(
 
 
 def _angles(
-    left: Axes, right: Axes, t: np.ndarray, tracks: Mapping[str, Track], truth: Reference
+    left: Axes, right: Axes, t: np.ndarray, tracks: Mapping[str, EstimatorRun], truth: Reference
 ) -> None:
     known = bool(np.isfinite(truth.angle_z).any())
     for colour, (name, track) in zip(COLOURS * 3, tracks.items(), strict=False):

@@ -12,7 +12,7 @@ from inertial.rate.bound import IN_USE, rate_bound
 from inertial.rate.tachometer import SUFFIX
 from inertial.rotation import followed, level
 from logs.cube_log import CubeLog
-from logs.cube_track import Reference, Track
+from logs.cube_run import EstimatorRun, Reference
 
 Array = NDArray[np.float64]
 
@@ -20,7 +20,7 @@ SURE = 5.0  # rad/s; an estimate less certain than that says "I do not know yet"
 AT_REST = 2e-3  # rad/s; a truth below it stands for rest
 
 
-def score(track: Track | None, truth: Reference, bound: Array | None) -> dict[str, Any]:
+def score(track: EstimatorRun | None, truth: Reference, bound: Array | None) -> dict[str, Any]:
     """RMS of the rate error per axis (rad/s), of the angle about z at the end, NEES (3 degrees, so
     3 is right).
     """

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from messages.contract import gyrofree_pb2 as pb
-from sessions.replay.replay import SUFFIX
+from messages.contract.topics import REPLAY_SUFFIX
 
 ENDED_S = 5.0  # without a status a replay has ended; the next one is another
 
@@ -39,7 +39,7 @@ class Replayed:
 
     def state(self, device: str, now: float) -> str:
         """'playing', 'paused' or 'ended' for a device of a replay, '' for any other."""
-        if not device.endswith(SUFFIX):
+        if not device.endswith(REPLAY_SUFFIX):
             return ""
         if self.status is None or self.age(now) > ENDED_S:
             return "ended"
@@ -54,7 +54,7 @@ class Replayed:
     def device(self, devices: Mapping) -> str | None:
         """First one of `devices` that this replay has sent data of; None before."""
         for name in sorted(devices):
-            if name.endswith(SUFFIX) and any(
+            if name.endswith(REPLAY_SUFFIX) and any(
                 one.arrived > self.began for one in devices[name].latest.values()
             ):
                 return name

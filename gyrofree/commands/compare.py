@@ -107,6 +107,13 @@ def offsets_of(texts: list[str]) -> dict[str, float]:
 
 def show(result: "Comparison") -> None:
     """For people: deg/s."""
+    _show_offsets(result)
+    _show_differences(result)
+    if result.tracks:
+        _show_tracks(result)
+
+
+def _show_offsets(result: "Comparison") -> None:
     table = Table(
         Column("session", no_wrap=True),
         "offset, s",
@@ -131,6 +138,9 @@ def show(result: "Comparison") -> None:
             rival,
         )
     show_table(table)
+
+
+def _show_differences(result: "Comparison") -> None:
     table = Table(
         Column("session", no_wrap=True),
         "line",
@@ -145,18 +155,20 @@ def show(result: "Comparison") -> None:
         cells = (f"{math.degrees(d.rms[name]):.4g}" if name in d.rms else "-" for name in "xyz")
         table.add_row(d.session, d.line, d.against, *cells, f"{d.seconds:.1f} s")
     show_table(table)
-    if result.tracks:
-        table = Table(
-            Column("session", no_wrap=True),
-            "track",
-            "north, m",
-            "east, m",
-            "down, m",
-            "over",
-            title="RMS difference of tracks",
+
+
+def _show_tracks(result: "Comparison") -> None:
+    table = Table(
+        Column("session", no_wrap=True),
+        "track",
+        "north, m",
+        "east, m",
+        "down, m",
+        "over",
+        title="RMS difference of tracks",
+    )
+    for t in result.tracks:
+        table.add_row(
+            t.session, t.track, *(f"{part:.4g}" for part in t.rms_ned_m), f"{t.seconds:.1f} s"
         )
-        for t in result.tracks:
-            table.add_row(
-                t.session, t.track, *(f"{part:.4g}" for part in t.rms_ned_m), f"{t.seconds:.1f} s"
-            )
-        show_table(table)
+    show_table(table)

@@ -7,6 +7,7 @@ NB_MODULE(GYROFREE_MODULE, m) {
   m.attr("VERSION") = GYROFREE_VERSION;
   m.def("runs_v3", &gyrofree::runs_v3, "True where this processor runs the x86-64-v3 build of the core.");
   gyrofree::bind_elementary(m);
+  gyrofree::bind_rate(m);
   gyrofree::bind_rotation(m);
   gyrofree::bind_places(m);
   gyrofree::bind_attitude(m);

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.rate import sight
+from inertial.rate.rows import Rows
 
 Array = NDArray[np.float64]
 
@@ -170,3 +171,29 @@ class RateColumns:
             calibration=self.calibration,
             aid=TACHOMETER if self.aided[k] else "",
         )
+
+
+def columns(
+    rows: Rows,
+    *,
+    products: int,
+    biases: int,
+    aided: NDArray[np.bool_] | None = None,
+    innovation_unit: str = "",
+    excluded: int = 0,
+    calibration: str = "",
+    began_anew: bool = False,
+) -> RateColumns:
+    """Columns of what the core said row by row; so many products are seen, biases are known."""
+    named = {name: rows[name] for name in rows.dtype.names}
+    named["innovation"] = named["innovation"][:, :products]
+    named["innovation_sigma"] = named["innovation_sigma"][:, :products]
+    named["bias"] = named["bias"][:, :biases]
+    return RateColumns(
+        **named,
+        aided=np.zeros(len(rows), np.bool_) if aided is None else aided,
+        innovation_unit=innovation_unit,
+        excluded=excluded,
+        calibration=calibration,
+        began_anew=began_anew,
+    )

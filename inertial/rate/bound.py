@@ -16,10 +16,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.core import native
 from inertial.layouts.layout import Layout
-from inertial.rate import bound_live
 from inertial.rate import products_model as model
-from inertial.rate.direct import Direct
 from inertial.rate.observed import Sensor, sensor
 
 Array = NDArray[np.float64]
@@ -49,6 +48,15 @@ SOURCE_STILL = Knowledge()
 IN_USE = Knowledge(gravity=True, fixed_axis=True)  # the model of products-ekf
 
 
+def known(what: Knowledge) -> native.RateKnowledge:
+    """Knowledge for the core, which takes gravity and a fixed axis for known."""
+    out = native.RateKnowledge()
+    out.biases, out.share = what.sigma_axis**2 / what.standstill, 1.0 / what.standstill
+    out.tilt, out.bias, out.centre = (what.tilt * GRAVITY) ** 2, what.bias**2, what.centre**2
+    out.pivot, out.wander, out.axis_from = what.pivot**2, what.axis_wander**2, what.axis_from**2
+    return out
+
+
 def rate_bound(
     layout: Layout, t_s: Array, q_nb: Array, omega_b: Array, alpha_b: Array, what: Knowledge
 ) -> Array:
@@ -59,7 +67,7 @@ def rate_bound(
     """
     s = sensor(layout, what.sigma_axis)
     P, out = _prior(s, q_nb[0], what), np.empty((len(t_s), 3))
-    m, M, SQ = int(s.m), np.ascontiguousarray(s.M), np.ascontiguousarray(s.SQ)
+    m, M, SQ = s.m, s.M, np.vstack([s.SQ_alpha, s.SQ_force])
     for k in range(len(t_s)):
         dt = t_s[k] - t_s[k - 1] if k else t_s[1] - t_s[0]
         omega, still = (
@@ -143,26 +151,23 @@ def _up(q_nb: Array) -> Array:
     return -GRAVITY * down
 
 
-_follow = Direct(bound_live.step)
-
-
 class Along:
-    """The bound along an estimate instead of the truth, live (bound_live.py)."""
+    """The bound along an estimate instead of the truth, live (inertial/core/rate/bound.cpp)."""
 
     def __init__(self, layout: Layout, what: Knowledge = IN_USE) -> None:
         """Raises GeometryError for a layout that does not see omega' and p."""
-        self.sensor, self.memory = sensor(layout, what.sigma_axis), bound_live.memory(what)
+        self._native = native.RateBound(sensor(layout, what.sigma_axis), known(what))
 
     @property
     def sigma(self) -> Array | None:
         """rad/s, (3,); None before the first standstill."""
-        return self.memory.sigma.copy() if self.memory.known else None
+        return self._native.sigma if self._native.known else None
 
     def step(self, omega_b: Array, alpha_b: Array, q_nb: Array, still: bool, dt: float) -> None:
-        """One sample of the estimate: rate, angular acceleration, attitude, the still detector's
-        word.
+        """One sample of the estimate: rate, angular acceleration, attitude, the zero-velocity
+        detector's word.
         """
-        _follow(self.memory, self.sensor, omega_b, alpha_b, q_nb, still, dt)
+        self._native.step(omega_b, alpha_b, q_nb, still, dt)
 
 
 def rms(sigma: Array) -> Array:

@@ -1,10 +1,11 @@
-"""The one door to all gyro-free rate estimators: samples in, RateState out.
+"""The one door to all gyro-free rate estimators: samples in, columns of rates out.
 
 ESTIMATORS maps a name to a class that is made of a layout and has `feed`, `step` and `skip`.
 Deterministic: the same samples give the same bits. Frames and units as everywhere: b body, n
 north-east-down, SI, quaternions w x y z.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Protocol
@@ -13,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.layouts.layout import Layout
-from inertial.rate import bound, least_squares, products_ekf, sight, tachometer
-from inertial.rate import products_run as frame
-from inertial.rate import products_track as track
-from inertial.rate.batch import Phase, RateColumns, RateState
+from inertial.rate import bound, least_squares, products_ekf, tachometer
+from inertial.rate.batch import Phase, RateColumns, RateState, columns
 from inertial.rate.observed import sensor
+from inertial.rate.rows import Rows
 from inertial.rate.samples import Samples
 
 Array = NDArray[np.float64]
@@ -109,37 +109,8 @@ class LeastSquaresRate(_Stepping):
     def feed(self, t_s: Array, f_axis: Array) -> RateColumns:
         """See RateEstimator.feed."""
         rows = self._core.rows(*self._taken.take(self._core.layout, t_s, f_axis))
-        y, n = rows[:, : least_squares.ROW_P], len(rows)
-        x = rows[:, least_squares.ROW_X : least_squares.ROW_BIAS]
-        P = rows[:, least_squares.ROW_P : least_squares.ROW_X].reshape(n, 3, 3)
-        waiting = rows[:, least_squares.ROW_SAMPLES] == 0.0
-        moving = rows[:, least_squares.ROW_MOVING_S] > 0.0
-        worst = np.max(np.diagonal(P, axis1=1, axis2=2), axis=1)
-        phase = np.where(moving, Phase.INTEGRATING, Phase.STILL_AT_START).astype(np.uint8)
-        phase[waiting] = Phase.WAITING
-        blind = waiting | (moving & (worst > sight.BLIND_SIGMA**2))
-        return RateColumns(
-            omega_b=y[:, least_squares.OMEGA],
-            P=P,
-            alpha_b=x[:, :3],
-            f_b=x[:, 3:],
-            q_nb=y[:, least_squares.Q_NB],
-            angle_z=y[:, least_squares.ANGLE],
-            innovation=np.zeros((n, 0)),
-            innovation_sigma=np.zeros((n, 0)),
-            nis=np.zeros(n),
-            nis_dof=np.zeros(n, np.uint8),
-            still=rows[:, least_squares.ROW_STILL] > 0.0,
-            p_n=y[:, least_squares.P_N],
-            v_n=y[:, least_squares.V_N],
-            bias=rows[:, least_squares.ROW_BIAS : least_squares.ROW_SAMPLES],
-            phase=phase,
-            sight=np.repeat(np.where(blind, sight.BLIND, sight.VALID), 3).reshape(n, 3),
-            sign_variance=np.zeros(n),
-            bound_sigma=np.zeros((n, 3)),
-            aided=np.zeros(n, np.bool_),
-            excluded=self._core.excluded,
-            calibration=self.calibration,
+        return columns(
+            rows, products=0, biases=6, excluded=self._core.excluded, calibration=self.calibration
         )
 
     def skip(self, n: int) -> None:
@@ -174,23 +145,17 @@ class ProductsRate(_Stepping):
         force.
         """
         config = config or self.default
-        if sensor(layout, config.still.sigma_axis)["feedback"]:
+        if sensor(layout, config.still.sigma_axis).feedback:
             # the feedback S Q z acts across the axis: held to an axis, P grows by what is not
             # integrated
             config = replace(config, fixed_axis=False)
-        self.core = products_ekf.ProductsFilter(layout, config, self.method)
+        follows = bound.IN_USE if self.with_bound else None
+        self.core = products_ekf.ProductsFilter(layout, config, self.method, follows)
         self.calibration = calibration
-        self._taken = Samples()
-        self._bound = bound.Along(layout) if self.with_bound else None
-        self._unseen = (
-            config.unseen_rate**2 * np.eye(3)
-        ).ravel()  # of a standing body, which may have begun to turn
-        self._m = int(self.core.sensor["m"])
-        self._reports, self._axis_b, self._aided = (
-            tachometer.Reports(),
-            np.array([0.0, 0.0, 1.0]),
-            False,
-        )
+        self._taken, self._reports = Samples(), tachometer.Reports()
+        # of a standing body, which may have begun to turn
+        self._unseen = config.unseen_rate**2 * np.eye(3)
+        self._axis_b, self._aided = np.array([0.0, 0.0, 1.0]), False
 
     def feed(self, t_s: Array, f_axis: Array) -> RateColumns:
         """See RateEstimator.feed."""
@@ -201,37 +166,18 @@ class ProductsRate(_Stepping):
                 self._take_reports()
             # while a report waits, its time may come with any sample
             end = row + 1 if self._reports else len(t_s)
-            parts.append(self.core.rows(t_s[row:end], f_axis[row:end], self._bound))
+            parts.append(self.core.rows(t_s[row:end], f_axis[row:end]))
             aided[row:end] = self._aided
             row = end
-        return self._columns(parts[0] if len(parts) == 1 else np.concatenate(parts), aided)
+        rows = parts[0] if len(parts) == 1 else np.concatenate(parts)
+        return self._columns(rows, aided)
 
-    def _columns(self, rows: Array, aided: NDArray[np.bool_]) -> RateColumns:
-        still, started = rows[:, track.STILL] > 0.0, rows[:, track.STARTED] > 0.0
-        two, m = rows[:, track.TWO] > 0.0, self._m
-        rows[still & started, track.P : track.P + 9] += self._unseen
-        nis = np.where(started, rows[:, track.NIS], 0.0)
-        phase = np.where(still, Phase.STILL, Phase.TURNING).astype(np.uint8)
-        phase[two], phase[~started] = Phase.TWO_SIGNS, Phase.WAITING
-        return RateColumns(
-            omega_b=rows[:, track.OMEGA : track.OMEGA + 3],
-            P=rows[:, track.P : track.P + 9].reshape(-1, 3, 3),
-            alpha_b=rows[:, track.ALPHA : track.ALPHA + 3],
-            f_b=rows[:, track.F : track.F + 3],
-            q_nb=rows[:, track.Q_NB : track.Q_NB + 4],
-            angle_z=rows[:, track.ANGLE],
-            innovation=rows[:, track.INNOVATION : track.INNOVATION + m],
-            innovation_sigma=rows[:, track.SIGMA : track.SIGMA + m],
-            nis=nis,
-            nis_dof=np.where(nis != 0.0, m, 0).astype(np.uint8),
-            still=still,
-            p_n=rows[:, track.P_N : track.P_N + 3],
-            v_n=rows[:, track.V_N : track.V_N + 3],
-            bias=rows[:, track.BIAS : track.BIAS + 12],
-            phase=phase,
-            sight=rows[:, track.SIGHT : track.SIGHT + 3].astype(np.uint8),
-            sign_variance=rows[:, track.SIGN],
-            bound_sigma=rows[:, track.BOUND : track.BOUND + 3],
+    def _columns(self, rows: Rows, aided: NDArray[np.bool_] | None = None) -> RateColumns:
+        rows["P"][rows["phase"] == Phase.STILL] += self._unseen
+        return columns(
+            rows,
+            products=self.core.sensor.m,
+            biases=12,
             aided=aided,
             innovation_unit="(rad/s)^2",
             excluded=self.core.excluded,
@@ -246,36 +192,36 @@ class ProductsRate(_Stepping):
     def exclude(self, mask: int) -> None:
         """See RateEstimator.exclude."""
         self.core.exclude(mask)
-        self._m = int(self.core.sensor["m"])
 
     def tacho_axis(self, axis_b: Sequence[float]) -> None:
         """Axis in b that tachometer rates are about, any length. Raises ValueError for no
         direction.
         """
         axis = np.array(axis_b, dtype=np.float64)
-        if axis.shape != (3,) or not np.linalg.norm(axis) > 0.0:
+        size = math.sqrt(sum(v * v for v in axis.tolist())) if axis.shape == (3,) else 0.0
+        if not size > 0.0:
             raise ValueError(
                 f"axis of the tachometer {axis_b}: want three numbers that are not all zero"
             )
-        self._axis_b = axis / np.linalg.norm(axis)
+        self._axis_b = axis / size
 
     def tacho(self, t_s: float, rate: float, sigma: float, signed: bool = True) -> None:
         """See RateEstimator.tacho; it is used before the first sample after one of its time."""
         self._reports.add(t_s, rate, sigma, signed)
 
     def _take_reports(self) -> None:
-        core = self.core
-        for report in self._reports.due(float(core.memory["clock"][frame.LAST_S])):
-            if tachometer.correct(core.memory, core.watch, core.sensor, self._axis_b, report):
+        core = self.core.native
+        for report in self._reports.due(core.last_s):
+            if core.correct(*report, self._axis_b):
                 self._aided = True
 
-    def run_batch(self, t_s: Array, f_axis: Array) -> track.Track:
+    def run_batch(self, t_s: Array, f_axis: Array) -> RateColumns:
         """All samples at once: times (n,) s, growing, readings (n, N) m/s^2; the same bits as
         step() gives one by one.
 
         Raises ValueError for readings that are not finite or times that do not grow.
         """
-        return self.core.run(t_s, f_axis)
+        return self._columns(self.core.run(t_s, f_axis))
 
     @property
     def refused(self) -> dict[str, int]:
@@ -286,7 +232,7 @@ class ProductsRate(_Stepping):
 
 
 class UnscentedRate(ProductsRate):
-    """Estimator "products-ukf": the same model through sigma points (unscented.py)."""
+    """Estimator "products-ukf": the same model through sigma points (E-44)."""
 
     name = "products-ukf"
     method = "ukf"

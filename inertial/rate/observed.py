@@ -14,6 +14,7 @@ solved anew.
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.core import native
 from inertial.layouts.layout import RANK_TOLERANCE, GeometryError, Layout
 
 Array = NDArray[np.float64]
@@ -21,41 +22,24 @@ Array = NDArray[np.float64]
 UNKNOWNS = ("ω'x", "ω'y", "ω'z", "px", "py", "pz")
 
 
-MOST_AXES = 32
+MOST_AXES: int = native.RATE_MOST_AXES
+Sensor = native.RateSensor
+"""Constants of a layout with a noise, n axes, of which m combinations c see the products.
 
-# Constants of a layout with a noise; a record, which compiled functions take by reference. n axes
-# are in use.
-SENSOR = np.dtype(
-    (
-        np.record,
-        [
-            ("S", "f8", (6, MOST_AXES)),  # [omega'; p] of the axes
-            ("B", "f8", (6, MOST_AXES)),  # the m observed combinations of the products, then zeros
-            ("M", "f8", (6, 6)),  # those combinations of z
-            ("SQ", "f8", (6, 6)),  # what z adds to S a; zero for the paper's cube
-            ("W", "f8", (12, MOST_AXES)),  # axis biases to [b_alpha, b_c, b_f]
-            ("R_alpha", "f8", (3, 3)),  # (rad/s^2)^2, one sample
-            ("R_p", "f8", (3, 3)),  # (m/s^2)^2
-            ("R_c", "f8", (6, 6)),  # (rad/s)^4; identity where not used
-            (
-                "known",
-                "f8",
-                (6, 6),
-            ),  # M^T R_c^-1 M: information of one sample on the products, (rad/s)^-4
-            ("drift", "f8", (12, 12)),  # W W^T
-            ("Q", "f8", (MOST_AXES, 6)),  # z of every axis, m
-            ("theta_b", "f8", (MOST_AXES, 3)),
-            ("used", "f8", (MOST_AXES,)),  # 0 for an excluded axis, else 1
-            ("basis", "f8", (9, 9)),  # rows turn [alpha_m, c_m] into uncorrelated numbers
-            ("spread", "f8", (9,)),  # their variances
-            ("n", "i8"),
-            ("m", "i8"),
-            ("feedback", "i8"),  # SQ is not zero
-            ("plain", "i8"),  # M is the identity
-        ],
-    )
-)
-Sensor = np.record
+    W         (12, n)  axes, and their biases, to [omega', c, p]; rows of c beyond m are zero
+    M         (6, 6)   c = M z + bias
+    SQ_alpha  (3, 6)   what z adds to the measured omega'; zero for the paper's cube
+    SQ_force  (3, 6)   and to the measured p
+    R_alpha   (3, 3)   (rad/s)^2)^2, one sample; R_p (m/s^2)^2
+    R_c       (6, 6)   (rad/s)^4; identity where not used
+    known     (6, 6)   M^T R_c^-1 M: information of one sample on the products, (rad/s)^-4
+    drift     (12, 12) W W^T
+    Q         (n, 6)   z of every axis, m; theta_b (n, 3)
+    used      (n,)     0 for an excluded axis, else 1
+    basis     (9, 9)   rows turn [alpha_m, c_m] into uncorrelated numbers of variances spread (9,)
+    feedback           SQ is not zero
+    plain              M is the identity
+"""
 
 
 def sensor(layout: Layout, sigma_axis: float, excluded: int = 0) -> Sensor:
@@ -73,43 +57,35 @@ def sensor(layout: Layout, sigma_axis: float, excluded: int = 0) -> Sensor:
     S[:, keep], b = _solve(layout, keep)
     m = len(b)
     B[:m, keep] = b
-    M = B @ layout.Q
+    M = _product(B, layout.Q)
     M[np.abs(M) < 1e-12] = 0.0
     plain = m == 6 and bool(np.abs(M - np.eye(6)).max() < 1e-9)
-    SQ = S @ layout.Q
+    SQ = _product(S, layout.Q)
     scale = np.abs(S).max() * np.abs(layout.Q).max(initial=0.0)
-    feedback = bool(np.abs(SQ).max(initial=0.0) > 1e-9 * scale)
     W = np.vstack([S[:3], B, S[3:]])
-    R = sigma_axis**2 * (W @ W.T)
+    drift = _product(W, W.T)
+    R = sigma_axis**2 * drift
     R_c = np.eye(6)
     R_c[:m, :m] = R[3 : 3 + m, 3 : 3 + m]
-    whole = np.zeros((6, 6))
-    whole[: len(M)] = M
-    known = whole.T @ np.linalg.solve(R_c, whole)
     quiet = R[:9, :9].copy()
     for k in range(3 + m, 9):
         quiet[k, k] = 1.0
-    spread, basis = np.linalg.eigh(quiet)
-    out = np.zeros(1, SENSOR)[0]
-    n = layout.axes
-    for name, value in (("S", S), ("B", B), ("W", W)):
-        out[name][:, :n] = value
-    for name, value in (("Q", layout.Q), ("theta_b", layout.theta_b), ("used", used)):
-        out[name][:n] = value
-    for name, value in (
-        ("M", np.eye(6) if plain else M),
-        ("SQ", SQ),
-        ("R_alpha", R[:3, :3]),
-        ("R_p", R[9:, 9:]),
-        ("R_c", R_c),
-        ("known", known),
-        ("drift", W @ W.T),
-        ("basis", basis.T),
-        ("spread", spread),
-    ):
-        out[name][:] = value
-    out["n"], out["m"], out["feedback"], out["plain"] = n, m, feedback, plain
+    out = Sensor()
+    out.n, out.m, out.plain = layout.axes, m, plain
+    out.feedback = bool(np.abs(SQ).max(initial=0.0) > 1e-9 * scale)
+    out.W, out.M, out.drift = W, np.eye(6) if plain else M, drift
+    out.SQ_alpha, out.SQ_force = SQ[:3], SQ[3:]
+    out.R_alpha, out.R_p, out.R_c = R[:3, :3], R[9:, 9:], R_c
+    out.known = _product(M.T, native.solve_positive(R_c, M))
+    out.Q, out.theta_b, out.used = layout.Q, layout.theta_b, used
+    spread, directions = native.eigh(quiet)
+    out.basis, out.spread = directions.T, spread
     return out
+
+
+def _product(A: Array, B: Array) -> Array:
+    """A B with the same bits on every processor."""
+    return native.product(A, B)
 
 
 def _solve(layout: Layout, keep: NDArray[np.int64]) -> tuple[Array, Array]:
@@ -118,21 +94,21 @@ def _solve(layout: Layout, keep: NDArray[np.int64]) -> tuple[Array, Array]:
     """
     unit = np.array([layout.scale_m] * 3 + [1.0] * 3)
     J, Q = layout.J[keep] / unit, layout.Q[keep] / layout.scale_m
-    left, sigma, right = np.linalg.svd(J, full_matrices=True)
+    left, sigma, right = native.svd(J)
     rank = int(np.sum(sigma > RANK_TOLERANCE * sigma.max(initial=0.0)))
     if rank < 6:
         raise GeometryError(
             f"layout {layout.name}: {len(keep)} accelerometer axes observe only {rank} of the 6"
             " unknowns (angular acceleration 3, specific force 3); unseen:"
-            f" {_unseen(right[rank:])}: place axes off one plane and one line, four triads at"
+            f" {_unseen(right.T[rank:])}: place axes off one plane and one line, four triads at"
             " corners that span a tetrahedron see everything"
         )
-    S = (right.T / sigma) @ left[:, :6].T / unit[:, None]
-    rest = left[:, 6:].T
-    U, s, V = np.linalg.svd(rest @ Q, full_matrices=False)
-    m = int(np.sum(s > 1e-6)) if s.size else 0
-    B = (U[:, :m] / s[:m]).T @ rest / layout.scale_m
-    return S, V[:m].T @ B if m == 6 else B
+    S = _product(right / sigma, left.T) / unit[:, None]
+    rest = Q - _product(left, _product(left.T, Q))  # what of z no omega' and p can explain
+    U, s, V = native.svd(rest)
+    m = int(np.sum(s > 1e-6))
+    B = (U[:, :m] / s[:m]).T / layout.scale_m
+    return S, _product(V, B) if m == 6 else B
 
 
 def _unseen(directions: Array) -> str:
@@ -154,7 +130,9 @@ def carry_biases(old: Sensor, new: Sensor, bias: float) -> tuple[Array, Array]:
 
     Axis biases of sigma `bias` (m/s^2), given what the old combinations say of them.
     """
-    before, after = old.W[:, : old.n], new.W[:, : new.n]
-    inverse = np.linalg.pinv(before, rcond=1e-9)
-    free = np.eye(old.n) - inverse @ before
-    return after @ inverse, bias**2 * after @ free @ after.T
+    before, after = old.W, new.W
+    U, sigma, V = native.svd(before.T)
+    rank = int(np.sum(sigma > 1e-9 * sigma[0]))
+    inverse = _product(U[:, :rank] / sigma[:rank], V[:, :rank].T)
+    free = np.eye(old.n) - _product(inverse, before)
+    return _product(after, inverse), bias**2 * _product(_product(after, free), after.T)

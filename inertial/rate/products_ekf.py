@@ -4,30 +4,26 @@ Four triads measure w_i w_j without integration (gyro-free-imu, section 6). The 
 omega' and corrects it by the products; the sign comes from the integral. Standstill gives zero rate
 and biases; gravity's direction adds omega_x and omega_y. Layouts that see fewer combinations of the
 products use those; the rest is integration.
-Model: products_model.py (E-30 to E-39). What one sample does is compiled: products_run.py.
+Model: products_model.py (E-30 to E-39). What is done at each sample: inertial/core/rate/frame.hpp.
 """
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.core import native
 from inertial.layouts.layout import Layout
-from inertial.rate import bound_live
-from inertial.rate import products_kernel as kernel
-from inertial.rate import products_run as frame
-from inertial.rate import products_track as track
 from inertial.rate import still as stillness
-from inertial.rate.bound import IN_USE, Along
-from inertial.rate.direct import Direct
+from inertial.rate.bound import Knowledge, known
 from inertial.rate.observed import carry_biases, sensor
-from inertial.rate.products_kernel import PP, Tuning
-from inertial.rate.products_model import BIASES, STATES
-from inertial.rate.products_track import Track
+from inertial.rate.rows import Rows, after
 
 Array = NDArray[np.float64]
 
-METHODS = {"ekf": kernel.EKF, "ukf": kernel.UKF, "forget": kernel.FORGET, "horizon": kernel.HORIZON}
+METHODS = {"ekf": 0, "ukf": 1, "forget": 2, "horizon": 3}  # of Method in the core
+GRAVITY = 9.80665  # m/s^2, standard
 EARTH_RATE = 7.292115e-5  # rad/s, WGS-84
 
 
@@ -68,11 +64,11 @@ class Config:
     gravity_aid: bool = True  # tilt from gravity where the centre's motion allows
 
 
-def tuning(config: Config, method: str = "ekf") -> Tuning:
-    """Config for compiled functions."""
-    c, g = config, kernel.GRAVITY
-    north = 0.0 if c.latitude is None else EARTH_RATE * float(np.cos(c.latitude))
-    down = 0.0 if c.latitude is None else -EARTH_RATE * float(np.sin(c.latitude))
+def tuning(config: Config, method: str = "ekf") -> native.RateTuning:
+    """Config for the core."""
+    c, g, out = config, GRAVITY, native.RateTuning()
+    north = 0.0 if c.latitude is None else EARTH_RATE * native.cos(c.latitude)
+    down = 0.0 if c.latitude is None else -EARTH_RATE * native.sin(c.latitude)
     values = {
         "method": METHODS[method],
         "scale": c.scale**2,
@@ -80,6 +76,7 @@ def tuning(config: Config, method: str = "ekf") -> Tuning:
         "centre": c.centre**2,
         "pivot_drift": c.pivot_drift**2,
         "still_rate": c.still.window * c.still_rate**2,
+        "first_still_rate": c.still_rate**2,
         "products_gate": c.products_gate,
         "force_gate": c.force_gate,
         "unseen_alpha": c.unseen_alpha**2,
@@ -88,7 +85,7 @@ def tuning(config: Config, method: str = "ekf") -> Tuning:
         "tilt": (c.tilt * g) ** 2,
         "gravity": c.gravity**2,
         "pivot": c.pivot**2,
-        "centre_sees": c.gravity_aid,
+        "gravity_aid": c.gravity_aid,
         "start_turning": c.start_turning**2,
         "axis": c.axis_wander**2 if c.fixed_axis else 0.0,
         "axis_from": c.axis_from**2,
@@ -97,82 +94,71 @@ def tuning(config: Config, method: str = "ekf") -> Tuning:
         "earth_north": north,
         "earth_down": down,
     }
-    out = np.zeros(1, kernel.TUNING)[0]
-    for name in kernel.TUNING.names:
-        out[name] = values[name]
+    for name, value in values.items():
+        setattr(out, name, value)
     return out
-
-
-_run = Direct(track.run)
-_UNBOUND = bound_live.memory(IN_USE)  # what a run takes that follows no bound
 
 
 class ProductsFilter:
     """Memory and constants of one filter of one layout."""
 
-    def __init__(self, layout: Layout, config: Config = Config(), method: str = "ekf") -> None:
-        """Raises GeometryError for a layout that does not see angular acceleration and specific
-        force.
+    def __init__(
+        self,
+        layout: Layout,
+        config: Config = Config(),
+        method: str = "ekf",
+        bound: Knowledge | None = None,
+        excluded: int = 0,
+    ) -> None:
+        """bound: what the Cramer-Rao bound along the estimate knows; None: it is not followed.
+
+        Raises GeometryError for a layout that does not see angular acceleration and specific force.
         """
-        self.layout, self.config = layout, config
-        self.sensor = sensor(layout, config.still.sigma_axis)
-        self.tuning = tuning(config, method)
-        self.limits = stillness.limits(config.still)
-        self.memory, self.watch = frame.memory(), stillness.memory()
-        self.excluded = 0
+        self.layout, self.config, self.method = layout, config, method
+        self.bound, self.excluded = bound, excluded
+        self.sensor = sensor(layout, config.still.sigma_axis, excluded)
+        limits = stillness.limits(config.still)
+        self.native = native.RateProductsFilter(self.sensor, tuning(config, method), limits)
+        if bound is not None:
+            self.native.follow(sensor(layout, bound.sigma_axis), known(bound))
+
+    def __getstate__(self) -> tuple[Any, ...]:
+        made_of = self.layout, self.config, self.method, self.bound, self.excluded
+        return *made_of, self.native.snapshot()
+
+    def __setstate__(self, state: tuple[Any, ...]) -> None:
+        *made_of, image = state
+        ProductsFilter.__init__(self, *made_of)
+        self.native.restore(image)
 
     @property
     def refused(self) -> dict[str, int]:
         """Corrections not used because their NIS was beyond its gate: by the products, by gravity
         ("force").
         """
-        marks = self.memory.marks
-        return {"products": int(marks[frame.REFUSED]), "force": int(marks[frame.REFUSED_FORCE])}
+        return {"products": self.native.refused_products, "force": self.native.refused_force}
 
     @property
     def lost(self) -> int:
         """How often the filter had to start anew: a rate beyond all bounds, or a covariance that is
         none.
         """
-        return int(self.memory.marks[frame.LOST])
+        return self.native.lost
 
-    def rows(self, t_s: Array, f_axis: Array, bound: Along | None = None) -> Array:
-        """Samples (n, N), m/s^2, at t_s (n,), s, both checked: a row of products_track (n, WIDTH)
-        after each.
-
-        bound follows the estimate; without one, nothing is said of it.
-        """
-        out = np.empty((len(t_s), track.WIDTH))
-        along, whole, follows = (
-            (_UNBOUND, self.sensor, False) if bound is None else (bound.memory, bound.sensor, True)
-        )
-        _run(
-            self.memory,
-            self.watch,
-            self.sensor,
-            self.tuning,
-            self.limits,
-            along,
-            whole,
-            follows,
-            t_s,
-            f_axis,
-            out,
-        )
-        return out
+    def rows(self, t_s: Array, f_axis: Array) -> Rows:
+        """Samples (n, N), m/s^2, at t_s (n,), s, both checked: a row after each."""
+        return after(self.native, t_s, f_axis)
 
     def gap(self) -> None:
         """Samples are missing: the next step predicts across."""
-        frame.gap(self.memory, self.watch)
+        self.native.gap()
 
-    def run(self, t_s: Array, f_axis: Array) -> Track:
+    def run(self, t_s: Array, f_axis: Array) -> Rows:
         """All samples (n, N) at once; the same bits as in parts. Raises ValueError for unusable
         input.
         """
-        t_s, f_axis = (
-            np.ascontiguousarray(t_s, dtype=np.float64),
-            np.ascontiguousarray(f_axis, dtype=np.float64),
-        )
+        t_s = np.ascontiguousarray(t_s, dtype=np.float64)
+        f_axis = np.ascontiguousarray(f_axis, dtype=np.float64)
         if f_axis.shape != (len(t_s), self.layout.axes):
             raise ValueError(
                 f"readings {f_axis.shape}, want ({len(t_s)}, {self.layout.axes}) of"
@@ -182,7 +168,7 @@ class ProductsFilter:
             raise ValueError(
                 "readings that are not finite, or times that do not grow: clean the log first"
             )
-        return track.of(self.rows(t_s, f_axis))
+        return self.rows(t_s, f_axis)
 
     def exclude(self, mask: int) -> None:
         """Go on without the axes of the mask's bits; what the biases were is carried over (E-42).
@@ -192,23 +178,5 @@ class ProductsFilter:
         if mask == self.excluded:
             return
         old, new = self.sensor, sensor(self.layout, self.config.still.sigma_axis, mask)
-        T, free = carry_biases(old, new, self.config.bias)
-        m, w = self.memory, self.watch
-        w.y[:] = 0.0
-        stillness.forget(w)
-        w.n[stillness.LEARNT] = 0
-        m.kept_at[:] = -1
-        m.marks[frame.FITTED] = 0
-        for core in (m.core, m.other):
-            x, P = core[:STATES], core[STATES:PP].reshape(STATES, STATES)
-            full = np.eye(STATES)
-            full[np.ix_(BIASES, BIASES)] = T
-            x[:] = full @ x
-            P[:] = full @ P @ full.T
-            P[np.ix_(BIASES, BIASES)] += free
-            core[kernel.REST_BIAS : kernel.REST_VARIANCE] = (
-                T @ core[kernel.REST_BIAS : kernel.REST_VARIANCE]
-            )
-            variance = P[BIASES, BIASES]
-            core[kernel.REST_VARIANCE : kernel.LEVEL] = core[kernel.LEVEL : kernel.REST] = variance
+        self.native.exclude(new, *carry_biases(old, new, self.config.bias))
         self.sensor, self.excluded = new, mask

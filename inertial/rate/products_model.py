@@ -15,12 +15,11 @@ its function.
 
 b_alpha, b_c, b_f: what axis biases add. The angle is a state because gravity, turning in a tilted
 body, tells how far it has turned: what that corrects in u it must correct in the angle too. Written
-for the reader, with every zero; the same without them is products_kernel.py. Compiled; no time of
-day, no files.
+for the reader, with every zero; the same by blocks is inertial/core/rate, proven equal by
+tests/inertial/test_products.py.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from inertial.attitude.rotation import from_rotation_vector, skew, to_dcm
@@ -44,7 +43,6 @@ FIRST = np.array([0, 0, 0, 1, 1, 2])  # i and j of w_i w_j, in the order of layo
 SECOND = np.array([0, 1, 2, 1, 2, 2])
 
 
-@njit(cache=True)
 def squares(omega: Array) -> Array:
     """z(omega), (6,), (rad/s)^2 (E-2)."""
     z = np.empty(6)
@@ -53,7 +51,6 @@ def squares(omega: Array) -> Array:
     return z
 
 
-@njit(cache=True)
 def squares_jacobian(omega: Array) -> Array:
     """dz/domega, (6, 3)."""
     D = np.zeros((6, 3))
@@ -63,21 +60,19 @@ def squares_jacobian(omega: Array) -> Array:
     return D
 
 
-@njit(cache=True)
 def transition(x: Array, alpha_m: Array, SQ: Array, dt: float, turning: bool) -> Array:
     """State after dt (s) with mean measured omega' alpha_m (3,) (E-31); a body known to be still
     keeps its rate.
     """
     y = x.copy()
     if turning:
-        y[0:3] += dt * (alpha_m - x[3:6] - np.ascontiguousarray(SQ[0:3]) @ squares(x[0:3]))
+        y[0:3] += dt * (alpha_m - x[3:6] - SQ[0:3] @ squares(x[0:3]))
     middle = 0.5 * (x[0:3] + y[0:3])
     y[21] += dt * middle[2]
     y[12:15] = to_dcm(from_rotation_vector(-dt * middle)) @ x[12:15]
     return y
 
 
-@njit(cache=True)
 def transition_jacobian(x: Array, y: Array, SQ: Array, dt: float, turning: bool) -> Array:
     """d transition / dx, (22, 22), at x with result y; to first order in the turn of one sample
     (E-32).
@@ -90,7 +85,7 @@ def transition_jacobian(x: Array, y: Array, SQ: Array, dt: float, turning: bool)
     F[12:15, 0:3] = turned
     F[21, 2] = dt
     if turning:
-        F[0:3, 0:3] -= dt * np.ascontiguousarray(SQ[0:3]) @ squares_jacobian(x[0:3])
+        F[0:3, 0:3] -= dt * SQ[0:3] @ squares_jacobian(x[0:3])
         for i in range(3):
             F[i, 3 + i] = -dt
         F[12:15, 3:6] = -0.5 * dt * turned
@@ -98,13 +93,11 @@ def transition_jacobian(x: Array, y: Array, SQ: Array, dt: float, turning: bool)
     return F
 
 
-@njit(cache=True)
 def measured_products(x: Array, M: Array) -> Array:
     """c_m predicted by x, (6,), (rad/s)^2, without the spread of omega (E-33)."""
     return M @ squares(x[0:3]) + x[6:12]
 
 
-@njit(cache=True)
 def measured_products_jacobian(x: Array, M: Array) -> Array:
     """d measured_products / dx, (6, 22)."""
     H = np.zeros((6, STATES))
@@ -114,7 +107,6 @@ def measured_products_jacobian(x: Array, M: Array) -> Array:
     return H
 
 
-@njit(cache=True)
 def products_spread(P: Array) -> tuple[Array, Array]:
     """Mean (6,) and covariance (6, 6) that the spread of omega adds to its products (E-34).
 
@@ -131,21 +123,19 @@ def products_spread(P: Array) -> tuple[Array, Array]:
     return mean, covariance
 
 
-@njit(cache=True)
 def measured_force(x: Array, alpha: Array, SQ: Array) -> Array:
     """p_m predicted by x and omega' alpha (3,), (3,), m/s^2 (E-35)."""
     W = skew(x[0:3])
     moved = skew(alpha) @ x[18:21] + W @ (W @ x[18:21])
-    return x[12:15] + x[15:18] + moved + np.ascontiguousarray(SQ[3:6]) @ squares(x[0:3])
+    return x[12:15] + x[15:18] + moved + SQ[3:6] @ squares(x[0:3])
 
 
-@njit(cache=True)
 def measured_force_jacobian(x: Array, alpha: Array, SQ: Array) -> Array:
     """d measured_force / dx, (3, 22), omega' taken as known."""
     H = np.zeros((3, STATES))
     omega, r, W = x[0:3], x[18:21], skew(x[0:3])
     H[:, 0:3] = np.outer(omega, r) - 2.0 * np.outer(r, omega) + np.sum(omega * r) * np.eye(3)
-    H[:, 0:3] += np.ascontiguousarray(SQ[3:6]) @ squares_jacobian(omega)
+    H[:, 0:3] += SQ[3:6] @ squares_jacobian(omega)
     H[:, 18:21] = skew(alpha) + W @ W
     for i in range(3):
         H[i, 12 + i] = 1.0

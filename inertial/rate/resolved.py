@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.attitude.rotation import from_rotation_vector, level, multiply, to_dcm
-from inertial.rate import products_track as track
-from inertial.rate.products_kernel import PP, Q_NB
-from inertial.rate.products_model import STATES, TURNED, squares
+from inertial.rate.batch import Phase
+from inertial.rate.products_model import TURNED, squares
 
 if TYPE_CHECKING:
     from inertial.rate.products_ekf import ProductsFilter
@@ -56,24 +55,22 @@ def resolve(core: "ProductsFilter", t_s: Array, f_axis: Array) -> Resolved | Non
         np.ascontiguousarray(t_s),
         np.ascontiguousarray(f_axis),
     )  # a log's columns lie apart
-    n, best, decided, rows = len(t_s), None, -1, np.zeros((0, track.WIDTH))
+    n, best, decided, phases = len(t_s), None, -1, np.zeros(0, np.uint8)
     for first in range(0, n, PART):
         part = core.rows(t_s[first : first + PART], f_axis[first : first + PART])
-        rows = np.concatenate([rows, part])
-        last, now = part[-1], len(rows) - 1
-        two = rows[:, track.TWO] > 0.0
-        if last[track.STARTED] > 0.0 and not two.any():
+        phases = np.concatenate([phases, part["phase"]])
+        last, now, two = part["phase"][-1], len(phases) - 1, phases == Phase.TWO_SIGNS
+        if last != Phase.WAITING and not two.any():
             return None
-        if not two.any() or last[track.TWO] > 0.0:
+        if not two.any() or last == Phase.TWO_SIGNS:
             continue
-        if last[track.STILL] > 0.0:
+        if part["still"][-1]:
             break
         decided = decided if decided >= 0 else now
-        state = core.memory["core"].copy()
-        x, P = state[:STATES], state[STATES:PP].reshape(STATES, STATES)[:6, :6]
+        x, P, q_nb = core.native.x, core.native.P[:6, :6], core.native.q_nb
         spread = float(np.trace(_then(P, t_s[now] - t_s[0], 0.0, core)))
         if best is None or spread < best[0]:
-            best = spread, now, x, P, state[Q_NB : Q_NB + 4]
+            best = spread, now, x, P, q_nb
         if now >= decided + AFTER:
             break
     return (
@@ -84,7 +81,7 @@ def resolve(core: "ProductsFilter", t_s: Array, f_axis: Array) -> Resolved | Non
 def _then(P: Array, seconds: float, dt: float, core: "ProductsFilter") -> Array:
     """Covariance of omega so many seconds earlier, from P (6, 6) of [omega, b_alpha]."""
     J = np.hstack([np.eye(3), seconds * np.eye(3)])
-    return J @ P @ J.T + seconds * dt * core.sensor["R_alpha"]
+    return J @ P @ J.T + seconds * dt * core.sensor.R_alpha
 
 
 def _back(
@@ -92,13 +89,13 @@ def _back(
 ) -> Resolved:
     """From the state at the last of these samples to the first."""
     s, n = core.sensor, len(t_s)
-    alpha = f_axis @ s["S"][:3, : f_axis.shape[1]].T
+    alpha = f_axis @ s.W[:3].T
     omega, spread, angle, q = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty(n), np.empty((n, 4))
     omega[-1], angle[-1], q[-1] = x[:3], x[TURNED], q_nb
     for k in range(n - 1, -1, -1):
         if k < n - 1:
             dt = t_s[k + 1] - t_s[k]
-            gained = 0.5 * (alpha[k] + alpha[k + 1]) - x[3:6] - s["SQ"][:3] @ squares(omega[k + 1])
+            gained = 0.5 * (alpha[k] + alpha[k + 1]) - x[3:6] - s.SQ_alpha @ squares(omega[k + 1])
             omega[k] = omega[k + 1] - dt * gained
             middle = 0.5 * (omega[k] + omega[k + 1])
             angle[k], q[k] = (

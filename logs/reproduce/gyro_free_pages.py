@@ -15,7 +15,7 @@ import numpy as np
 from inertial.constants import MILLI_G
 from logs.cube_plot import COLOURS, REFERENCE, STYLE
 from logs.reproduce import gyro_free_study as study
-from logs.reproduce.gyro_free_study import Session
+from logs.reproduce.gyro_free_study import Study
 
 DEG = 180.0 / np.pi
 TITLES = {
@@ -38,7 +38,7 @@ figcaption{color:#555}
 """
 
 
-def draw(out: Path, s: Session, result: dict[str, Any]) -> list[dict[str, str]]:
+def draw(out: Path, s: Study, result: dict[str, Any]) -> list[dict[str, str]]:
     """Write the seven pictures; file, title and caption of each. Raises OSError."""
     drawn: tuple[tuple[str, str, Callable[[Any, Any, Any], str]], ...] = (
         ("1-raw.png", "Raw data of the four triads", _raw),
@@ -63,7 +63,7 @@ def draw(out: Path, s: Session, result: dict[str, Any]) -> list[dict[str, str]]:
     return figures
 
 
-def _time(s: Session) -> np.ndarray:
+def _time(s: Study) -> np.ndarray:
     return s.log.t_s - s.log.t_s[0]
 
 
@@ -71,7 +71,7 @@ def _legend(axes: Any, **where: Any) -> None:
     axes.legend(frameon=False, fontsize=8, ncols=3, **where)
 
 
-def _raw(figure: Any, s: Session, result: dict[str, Any]) -> str:
+def _raw(figure: Any, s: Study, result: dict[str, Any]) -> str:
     t = _time(s)
     counts = s.log.counts if s.log.counts is not None else s.log.f_axis
     grid = figure.subplots(2, 2, sharex=True)
@@ -88,7 +88,7 @@ def _raw(figure: Any, s: Session, result: dict[str, Any]) -> str:
     return "Each sensor along its own axes, as read."
 
 
-def _force(figure: Any, s: Session, result: dict[str, Any]) -> str:
+def _force(figure: Any, s: Study, result: dict[str, Any]) -> str:
     t, axes = _time(s), figure.subplots()
     for k, name in enumerate("xyz"):
         axes.plot(t, s.f_b[:, k], color=XYZ[k], linewidth=0.8, label=f"$p_{name}$")
@@ -97,7 +97,7 @@ def _force(figure: Any, s: Session, result: dict[str, Any]) -> str:
     return "x and y show gravity through the table's tilt as it turns; z reads +1 g."
 
 
-def _biases(figure: Any, s: Session, result: dict[str, Any]) -> str:
+def _biases(figure: Any, s: Study, result: dict[str, Any]) -> str:
     axes, table = figure.subplots(), result["table_1_bias_mg"]
     rows = [
         ("paper", "paper, Table 1"),
@@ -123,7 +123,7 @@ def _biases(figure: Any, s: Session, result: dict[str, Any]) -> str:
     return f"Other sensors, other biases: what compares is their size. Ours in x and y: {how}."
 
 
-def _alpha(figure: Any, s: Session, result: dict[str, Any]) -> str:
+def _alpha(figure: Any, s: Study, result: dict[str, Any]) -> str:
     t, axes = _time(s), figure.subplots()
     axes.plot(t, s.alpha_b[:, 2], color=COLOURS[0], linewidth=0.6, label="$\\dot\\omega_z$ by (26)")
     if s.log.omega_b is not None:
@@ -137,13 +137,13 @@ def _alpha(figure: Any, s: Session, result: dict[str, Any]) -> str:
     )
 
 
-def _reference(s: Session) -> tuple[np.ndarray | None, str]:
+def _reference(s: Study) -> tuple[np.ndarray | None, str]:
     if s.log.tacho is not None:
         return s.log.tacho, "tachometer"
     return (s.log.omega_b[:, 2], "truth") if s.log.omega_b is not None else (None, "")
 
 
-def _rate(figure: Any, s: Session, result: dict[str, Any]) -> str:
+def _rate(figure: Any, s: Study, result: dict[str, Any]) -> str:
     t, (upper, lower) = _time(s), figure.subplots(2, 1, sharex=True, height_ratios=(2, 1.2))
     other, name = _reference(s)
     for colour, (estimator, track) in zip((COLOURS[1], COLOURS[0]), s.tracks.items(), strict=True):
@@ -159,7 +159,7 @@ def _rate(figure: Any, s: Session, result: dict[str, Any]) -> str:
     return _numbers(result, "omega_z_rms_deg_per_s", "RMS error {:.2f} °/s")
 
 
-def _angle(figure: Any, s: Session, result: dict[str, Any]) -> str:
+def _angle(figure: Any, s: Study, result: dict[str, Any]) -> str:
     t, (upper, lower) = _time(s), figure.subplots(2, 1, sharex=True, height_ratios=(2, 1.2))
     for colour, (estimator, track) in zip((COLOURS[1], COLOURS[0]), s.tracks.items(), strict=True):
         upper.plot(t, track.angle_z * DEG, color=colour, label=TITLES[estimator])
@@ -178,7 +178,7 @@ def _angle(figure: Any, s: Session, result: dict[str, Any]) -> str:
     return _numbers(result, "angle_error_deg", "at the end off by {:+.1f}°")
 
 
-def _position(figure: Any, s: Session, result: dict[str, Any]) -> str:
+def _position(figure: Any, s: Study, result: dict[str, Any]) -> str:
     axes = figure.subplots()
     for colour, name in zip((COLOURS[1], COLOURS[0]), s.tracks, strict=True):
         t, error = study.navigation_error(s, name)

@@ -26,7 +26,7 @@ from inertial.rotation import to_matrix
 from inertial.simulation.table import BLOCK, TableTest
 from logs.cube import run_log
 from logs.cube_log import CubeLog, read_log
-from logs.cube_track import Reference, Track, reference
+from logs.cube_run import EstimatorRun, Reference, reference
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
@@ -42,20 +42,20 @@ SHORTEST_STILL_S, GUARD_S = 1.0, 0.3
 
 
 @dataclass(frozen=True)
-class Session:
+class Study:
     """A run with everything the figures need. Arrays over samples (n)."""
 
     log: CubeLog
     layout: Layout
     truth: Reference
-    tracks: dict[str, Track]
+    tracks: dict[str, EstimatorRun]
     alpha_b: Array  # (n, 3) by (26), rad/s^2
     f_b: Array  # (n, 3) by (25), m/s^2
     still: NDArray[np.bool_]  # (n,)
     true_bias: Array | None  # (3,) m/s^2 of p, simulated sessions only
 
 
-def simulated(seed: int, progress: Progress = lambda done, what: None) -> Session:
+def simulated(seed: int, progress: Progress = lambda done, what: None) -> Study:
     """The paper's motion with its sensors, long enough for 30 s after the first standstill."""
     test = TableTest(seed=seed, profile="published")
     n = round((5.0 + SECONDS + 0.5) / test.period_s)
@@ -84,13 +84,13 @@ def simulated(seed: int, progress: Progress = lambda done, what: None) -> Sessio
     return replace(_run(log, test.layout, progress), true_bias=true_bias)
 
 
-def recorded(path: Path, progress: Progress = lambda done, what: None) -> Session:
+def recorded(path: Path, progress: Progress = lambda done, what: None) -> Study:
     """A recorded run of the cube; its tachometer or its truth says when it stood still."""
     layout = find("cube", 0.05)
     return _run(read_log(path, layout.axis_names), layout, progress)
 
 
-def _run(log: CubeLog, layout: Layout, progress: Progress) -> Session:
+def _run(log: CubeLog, layout: Layout, progress: Progress) -> Study:
     tracks, _ = run_log(
         log, layout, None, [PAPERS_WAY, OURS], lambda done, what: progress(0.7 * done, what)
     )
@@ -99,7 +99,7 @@ def _run(log: CubeLog, layout: Layout, progress: Progress) -> Session:
         log.tacho if log.tacho is not None else None if log.omega_b is None else log.omega_b[:, 2]
     )
     still = np.abs(rate) < TURNING if rate is not None else tracks[OURS].still
-    return Session(log, layout, reference(log), tracks, x[:, :3], x[:, 3:], still, None)
+    return Study(log, layout, reference(log), tracks, x[:, :3], x[:, 3:], still, None)
 
 
 def pulse_rate(test: TableTest, t_s: Array) -> Array:
@@ -129,7 +129,7 @@ def intervals(still: NDArray[np.bool_], period_s: float) -> list[slice]:
     ]
 
 
-def equivalent_bias(s: Session) -> tuple[Array, bool]:
+def equivalent_bias(s: Study) -> tuple[Array, bool]:
     """Equivalent bias of p (3,), m/s^2, from the still intervals, and whether it was told apart
     from the tilt.
 
@@ -179,7 +179,7 @@ def drift_of(error: Array, bias: Array, seconds: float) -> float:
     return float(np.hypot(rest[0], rest[1]) / GRAVITY)
 
 
-def navigation_error(s: Session, name: str) -> tuple[Array, Array]:
+def navigation_error(s: Study, name: str) -> tuple[Array, Array]:
     """Times (n,), s since navigation began, and position error (n, 3), m, in the body axes of that
     moment.
 
@@ -196,7 +196,7 @@ def navigation_error(s: Session, name: str) -> tuple[Array, Array]:
     )
 
 
-def evaluate(s: Session) -> dict[str, Any]:
+def evaluate(s: Study) -> dict[str, Any]:
     """Every number, the paper's beside ours; what cannot be known is None."""
     bias, apart = equivalent_bias(s)
     result: dict[str, Any] = {

@@ -15,6 +15,7 @@ from google.protobuf.message import DecodeError, Message
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import control_key, recorder_control_key, replay_control_key
 
+OVERDUE = b"Timeout"  # what Zenoh answers, here or in the router, when the time is over
 REASON_LENGTH = 500  # characters of a refusal that are passed on
 
 C = TypeVar("C", bound=Message)
@@ -109,9 +110,10 @@ def give(
 def _read(reply: zenoh.Reply, kind: Kind[C, A], patience_s: float) -> A:
     """The answer in a reply; raises Refused or NoAnswer."""
     if reply.ok is None:
-        if reply.replier_id is None:  # by Zenoh itself, when the time was over
+        said = reply.err.payload.to_bytes()
+        if reply.replier_id is None or said == OVERDUE:
             raise NoAnswer(f"{kind.who} did not answer within {patience_s:g} s: {kind.look}")
-        reason = reply.err.payload.to_bytes().decode(errors="replace")[:REASON_LENGTH]
+        reason = said.decode(errors="replace")[:REASON_LENGTH]
         raise Refused(f"{kind.who}: {reason}")
     payload = reply.ok.payload.to_bytes()
     try:

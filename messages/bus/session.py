@@ -131,16 +131,6 @@ def connected(session: zenoh.Session) -> bool:
     return bool(list(session.info.routers_zid()))
 
 
-def wait_connected(session: zenoh.Session, timeout_s: float) -> bool:
-    """Wait for the router; False when it did not come in time."""
-    end = time.monotonic() + timeout_s
-    while not connected(session):
-        if time.monotonic() > end:
-            return False
-        time.sleep(0.02)
-    return True
-
-
 class LateSession:
     """A client session that comes when the router does; until then what would be said has nobody to
     hear it.

@@ -19,8 +19,8 @@ from pathlib import Path
 from google.protobuf.message import Message
 
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import ACCEL, IMU, NOTE, PIPELINE_INPUTS, Address
-from sessions.replay.replay import INPUTS, LONGEST_NAME, SUFFIX, Input, rename, renamed
+from messages.contract.topics import ACCEL, IMU, NOTE, PIPELINE_INPUTS, REPLAY_SUFFIX, Address
+from sessions.replay.replay import INPUTS, LONGEST_NAME, Input, rename, renamed
 from sessions.replay.reproduce import ESTIMATES, Pipeline, first_used, give_orders
 from sessions.replay.source import Source
 from sessions.replay.states import KeptStates
@@ -53,7 +53,7 @@ class Playback:
         at_s: float = 0.0,
         paused: bool = False,
         show_recorded: bool = False,
-        suffix: str = SUFFIX,
+        suffix: str = REPLAY_SUFFIX,
     ) -> None:
         """`show_recorded` puts the recorded estimates beside the new ones. Raises what Source
         raises, and ValueError for a speed outside 0.1 to 100."""

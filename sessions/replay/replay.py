@@ -11,10 +11,18 @@ from dataclasses import dataclass
 import zenoh
 from google.protobuf.message import Message
 
-from messages.contract.topics import BOARD, LINK, LOCATION, PIPELINE_INPUTS, TRUTH, Address, Topic
+from messages.contract.topics import (
+    BOARD,
+    LINK,
+    LOCATION,
+    PIPELINE_INPUTS,
+    REPLAY_SUFFIX,
+    TRUTH,
+    Address,
+    Topic,
+)
 
 INPUTS: tuple[Topic, ...] = (*PIPELINE_INPUTS, LINK, BOARD, TRUTH, LOCATION)
-SUFFIX = "-replay"
 LONGEST_NAME = 32  # of a device, see messages.contract.topics.NAME
 MATCH_S = 0.25  # at most, for the router to say that somebody listens to a key
 DRAIN_S = (
@@ -31,7 +39,7 @@ class Input:
     message: Message
 
 
-def renamed(device: str, suffix: str = SUFFIX) -> str:
+def renamed(device: str, suffix: str = REPLAY_SUFFIX) -> str:
     """Name of a device when it is replayed; an empty suffix keeps the name."""
     return device[: LONGEST_NAME - len(suffix)] + suffix
 

@@ -24,7 +24,8 @@ from reportlab.platypus import (
     TableStyle,
 )
 
-from sessions.report.document import Document, Grid
+from sessions.report.document import Document
+from sessions.report.grids import Grid
 
 FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
 INK, DIM, LINE = colors.HexColor("#16202a"), colors.HexColor("#5b6770"), colors.HexColor("#d6dce1")

@@ -22,14 +22,13 @@ from scipy.stats import chi2
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
 
-from inertial.rate import products_ekf, products_track, resolved, sight  # noqa: E402
+from inertial.rate import resolved, sight  # noqa: E402
 from inertial.rate.bound import IN_USE, SOURCE, SOURCE_STILL, plot_bound, rate_bound, rms  # noqa: E402
 from inertial.rate.estimators import ESTIMATORS, ProductsRate  # noqa: E402
 from inertial.rate.products_ekf import Config  # noqa: E402
 from inertial.simulation.profiles import DEGREE, TURNING  # noqa: E402
 from inertial.simulation.table import SensorModel, TableTest  # noqa: E402
 
-UNSEEN = products_ekf.Config().unseen_rate ** 2  # what a published covariance of a standstill adds
 SEEN = 3.0 * DEGREE  # rad/s; a slower rate has no sign that matters
 SETTLED_S = 2.0  # s; what a start while turning costs before is in the other figures
 PUBLISHED = ("published", "wobble", "fast")
@@ -63,12 +62,8 @@ def track(name: str, log: Log, late: bool = False, **options):
     """
     estimator = ESTIMATORS[name](log.table.layout, **options)
     if hasattr(estimator, "core"):
-        rows = estimator.core.rows(log.t_s, np.ascontiguousarray(log.readings))
-        out, valid = (
-            products_track.of(rows),
-            rows[:, products_track.SIGHT : products_track.SIGHT + 3] == sight.VALID,
-        )
-        P = out.P + UNSEEN * np.eye(3) * (out.still & out.started)[:, None, None]
+        out = estimator.run_batch(log.t_s, np.ascontiguousarray(log.readings))
+        P, valid = out.P, out.sight == sight.VALID
         if late:
             fresh = ESTIMATORS[name](log.table.layout, **options)
             past = resolved.resolve(fresh.core, log.t_s, np.ascontiguousarray(log.readings))
@@ -207,8 +202,6 @@ def main() -> None:
     """All figures."""
     seeds = int(sys.argv[1]) if len(sys.argv) > 1 else 10
     pictures = Path(sys.argv[2]) if len(sys.argv) > 2 else None
-    for name in ESTIMATORS:
-        figures(name, "published", 1)  # compiles
     print(json.dumps({"bench": "rate-cost"} | cost()), flush=True)
     for case in CASES:
         print(

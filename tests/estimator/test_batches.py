@@ -7,8 +7,9 @@ import pytest
 
 from estimator.devices.rate import RateBoard, RateOutput
 from estimator.packed import Doubles, varint
+from inertial.core import native
 from inertial.layouts.catalogue import CUBE, LAYOUTS
-from inertial.rate import bound, bound_live, sight
+from inertial.rate import bound
 from inertial.rate.batch import RateState
 from inertial.rate.estimators import ESTIMATORS, ProductsRate
 from inertial.rate.observed import sensor
@@ -100,20 +101,20 @@ def test_a_batch_with_a_sample_that_cannot_be_used_is_refused_whole():
 @pytest.mark.parametrize("kind", ["cube", "stars-12", "nine"])
 def test_information_of_the_products_is_that_of_matrices(kind):
     s, omega = sensor(LAYOUTS[kind](0.05), 0.04), np.array([0.7, -1.1, 2.3])
-    H = s["M"] @ squares_jacobian(omega)
-    expected = np.diag(H.T @ np.linalg.solve(s["R_c"], H))
-    np.testing.assert_allclose(sight.information(*omega, s), expected, rtol=1e-9, atol=1e-9)
+    H = s.M @ squares_jacobian(omega)
+    expected = np.diag(H.T @ np.linalg.solve(s.R_c, H))
+    np.testing.assert_allclose(native.rate_information(omega, s), expected, rtol=1e-9, atol=1e-9)
 
 
 def test_the_live_bound_is_that_of_whole_matrices():
     """Standstill, then turning on a fixed axis: every step against the same by whole matrices."""
-    table, what, n = TableTest(1), bound.IN_USE, bound_live.EVERY
+    table, what, n = TableTest(1), bound.IN_USE, 8
     block, s, live = (
         table.block(0),
         sensor(table.layout, what.sigma_axis),
         bound.Along(table.layout),
     )
-    P, steps = None, 0
+    P, steps, SQ = None, 0, np.vstack([s.SQ_alpha, s.SQ_force])
     for k in range(700):
         omega, alpha, q = block.omega_b[k], block.alpha_b[k], block.q_nb[k]
         still = not omega.any() and not alpha.any()
@@ -123,10 +124,10 @@ def test_the_live_bound_is_that_of_whole_matrices():
         P = bound._prior(s, q, what) if P is None else P
         x = np.zeros(STATES)
         x[:3], x[12:15] = omega, bound._up(q)
-        P = bound._moved(P, x, alpha, s.SQ, s, n * 0.01, still, what, n)
+        P = bound._moved(P, x, alpha, SQ, s, n * 0.01, still, what, n)
         P = bound._seen(P, measured_products_jacobian(x, s.M), s.R_c / n)
         R = s.R_p + (0.0 if still else what.centre**2) * np.eye(3)
-        P = bound._seen(P, measured_force_jacobian(x, alpha, s.SQ), R / n)
+        P = bound._seen(P, measured_force_jacobian(x, alpha, SQ), R / n)
         if still:
             R = np.diag([1e-10] * 6)
             R[3:, 3:] = s.R_alpha / n

@@ -5,10 +5,13 @@ bad data.
 import numpy as np
 import pytest
 
+from inertial.attitude.rotation import multiply, to_dcm
+from inertial.core import native
 from inertial.layouts.catalogue import CUBE, LAYOUTS
 from inertial.layouts.layout import GeometryError, Layout
-from inertial.rate import least_squares
 from inertial.rate.estimators import ESTIMATORS, LeastSquaresRate
+from inertial.rate.observed import sensor
+from inertial.rate.products_model import squares
 from inertial.simulation.table import IDEAL, TableTest
 
 
@@ -110,10 +113,42 @@ def test_a_reading_that_is_no_number_is_refused_by_every_estimator(name):
         ESTIMATORS[name](CUBE(0.05)).step(0, 0.0, a)
 
 
+def derivative(y, u, s):
+    """dy/dt of (omega, q_nb, angle, v_n, p_n) by E-6, u = S a - bias."""
+    omega, q = y[:3], y[3:7]
+    x = u - np.vstack([s.SQ_alpha, s.SQ_force]) @ squares(omega)
+    turned = 0.5 * multiply(q, np.concatenate([[0.0], omega]))
+    force = to_dcm(q / np.linalg.norm(q)) @ x[3:] + np.array([0.0, 0.0, 9.80665])
+    return np.concatenate([x[:3], turned, [omega[2]], force, y[8:11]])
+
+
+def runge_kutta(y, before, after, s, dt):
+    middle = 0.5 * (before + after)
+    k1 = derivative(y, before, s)
+    k2 = derivative(y + 0.5 * dt * k1, middle, s)
+    k3 = derivative(y + 0.5 * dt * k2, middle, s)
+    k4 = derivative(y + dt * k3, after, s)
+    y = y + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    y[3:7] /= np.linalg.norm(y[3:7])
+    return y
+
+
+@pytest.mark.parametrize("kind", ["cube", "edges-12"])
+def test_the_core_integrates_as_the_equations_say(kind):
+    s, draw = sensor(LAYOUTS[kind](0.05), 0.04), np.random.default_rng(7)
+    for _ in range(20):
+        y, before, after = draw.normal(size=14), draw.normal(size=6), draw.normal(size=6)
+        y[3:7] /= np.linalg.norm(y[3:7])
+        d = native.rate_derivative(y, before, s)
+        np.testing.assert_allclose(d, derivative(y, before, s), rtol=1e-12, atol=1e-12)
+        expected = runge_kutta(y, before, after, s, 0.01)
+        said = native.rate_runge_kutta(y, before, after, s, 0.01)
+        np.testing.assert_allclose(said, expected, rtol=1e-12, atol=1e-12)
+
+
 def test_derivative_of_a_steady_turn():
-    y = least_squares.memory()["y"].copy()
-    y[least_squares.OMEGA] = [0.0, 0.0, 2.0]
-    d = least_squares.derivative(y, np.zeros(6), np.zeros((6, 6)))
-    np.testing.assert_allclose(d[least_squares.Q_NB], [0.0, 0.0, 0.0, 1.0], atol=1e-15)
-    assert d[least_squares.ANGLE] == 2.0
-    assert d[10] == least_squares.GRAVITY
+    y = np.zeros(14)
+    y[:4] = [0.0, 0.0, 2.0, 1.0]
+    d = native.rate_derivative(y, np.zeros(6), sensor(CUBE(0.05), 0.04))
+    np.testing.assert_allclose(d[3:7], [0.0, 0.0, 0.0, 1.0], atol=1e-15)
+    assert d[7] == 2.0 and d[10] == 9.80665

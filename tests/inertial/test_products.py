@@ -1,17 +1,20 @@
 """The products filter: derivatives, exactness, consistency, the published figures, faults."""
 
+import os
+import pickle
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support import rate_twin as twin
 
-from inertial.attitude import rotation
+from inertial.core import native
 from inertial.layouts.catalogue import CUBE, LAYOUTS
 from inertial.layouts.layout import GeometryError, Layout
-from inertial.rate import products_correct as correct
-from inertial.rate import products_kernel as kernel
 from inertial.rate import products_model as model
-from inertial.rate import turns
 from inertial.rate.estimators import ESTIMATORS, LeastSquaresRate, ProductsRate
 from inertial.rate.observed import sensor
 from inertial.rate.products_ekf import Config, ProductsFilter, tuning
@@ -19,7 +22,7 @@ from inertial.rate.sight import AMBIGUOUS, BLIND, VALID
 from inertial.simulation.profiles import PROFILES, TURNING
 from inertial.simulation.table import IDEAL, TableTest
 
-law = settings(deadline=None, max_examples=40)  # the first call compiles
+law = settings(deadline=None, max_examples=40)
 numbers = st.floats(-5.0, 5.0)
 states = st.lists(numbers, min_size=22, max_size=22).map(np.array)
 vectors = st.lists(numbers, min_size=3, max_size=3).map(np.array)
@@ -89,90 +92,67 @@ def test_force_jacobian_matches_central_differences(x, alpha):
     np.testing.assert_allclose(model.measured_force_jacobian(x, alpha, SQ), expected, atol=1e-6)
 
 
+def covariance(seed):
+    root = np.random.default_rng(seed).normal(size=(22, 22)) * 0.1
+    return root @ root.T
+
+
+def agrees(said, expected):
+    """x, P and, where there was an innovation, NIS and density of the core and of its twin."""
+    x, P, *likelihood = expected
+    np.testing.assert_allclose(said[0], x, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(said[1], P, atol=1e-8)
+    assert (said[1] == said[1].T).all()
+    for a, b in zip(said[2:], likelihood, strict=False):
+        assert a == pytest.approx(b, rel=1e-6)
+
+
+@law
+@given(x=states, alpha=vectors, seed=st.integers(0, 99), fixed=st.booleans())
+def test_the_core_predicts_as_whole_matrices_do(x, alpha, seed, fixed):
+    P, dt = covariance(seed), 0.01
+    on_axis = fixed and bool(np.linalg.norm(x[:3]) > 0.1)
+    for kind in ("edges-12", "cube"):
+        s = sensor(LAYOUTS[kind](0.05), 0.04)
+        for turning in (True, False):
+            held = on_axis and turning and kind == "cube"
+            said = native.rate_predict(x, P, alpha, dt, turning, held, False, s)
+            agrees(said, twin.predict(x, P, alpha, s, dt, turning, held))
+
+
 @law
 @given(x=states, alpha=vectors, seed=st.integers(0, 99))
-def test_the_kernel_is_the_model_without_its_zeros(x, alpha, seed):
-    """Prediction and all three corrections against the same by whole matrices."""
-    s, t, dt = sensor(LAYOUTS["edges-12"](0.05), 0.04), tuning(Config()), 0.01
-    root = np.random.default_rng(seed).normal(size=(22, 22)) * 0.1
-    P = root @ root.T
-    F = model.transition_jacobian(x, model.transition(x, alpha, s.SQ, dt, True), s.SQ, dt, True)
-    mine, mine_P = x.copy(), P.copy()
-    none, work = (0.0, 0.0, 0.0), np.zeros(kernel.WORK)
-    kernel.predict(
-        mine,
-        mine_P.reshape(-1),
-        work,
-        tuple(alpha),
-        (1.0, 0.0, 0.0, 1.0, 0.0, 1.0),
-        dt,
-        True,
-        s,
-        none,
-    )
-    np.testing.assert_allclose(mine, model.transition(x, alpha, s.SQ, dt, True), atol=1e-12)
-    np.testing.assert_allclose(mine_P, F @ P @ F.T, atol=1e-9)
-    assert (mine_P == mine_P.T).all()
-    mean, spread = model.products_spread(P)
-    H, y = model.measured_products_jacobian(x, s.M), np.arange(6.0)
-    C = H @ P @ H.T + s.R_c + spread
-    e = y - model.measured_products(x, s.M) - mean
-    t["products_gate"] = t["force_gate"] = np.inf
-    out, all_y = np.zeros(kernel.OUT), np.concatenate([np.zeros(3), y, np.zeros(3)])
-
-    def agrees(call, H, C, e):
-        mine, mine_P = x.copy(), P.copy()
-        said = call(mine, mine_P.reshape(-1))
-        if said is not None:
-            assert said[0] == pytest.approx(e @ np.linalg.solve(C, e), rel=1e-6)
-            assert -2.0 * np.log(said[1]) == pytest.approx(np.linalg.slogdet(C)[1], abs=1e-8)
-        np.testing.assert_allclose(mine, x + P @ H.T @ np.linalg.solve(C, e), rtol=1e-6, atol=1e-6)
-        np.testing.assert_allclose(mine_P, P - P @ H.T @ np.linalg.solve(C, H @ P), atol=1e-8)
-
-    agrees(lambda x, P: correct.by_products(x, P, work, all_y, tuple(x[:3]), s, t, out), H, C, e)
-    H, p = model.measured_force_jacobian(x, alpha, s.SQ), np.arange(3.0)
-    arm = x[18:21] @ x[18:21] + np.trace(P[18:21, 18:21])
-    C = H @ P @ H.T + s.R_p + (t.centre + arm * s.R_alpha[0, 0]) * np.eye(3)
-    e = p - model.measured_force(x, alpha, s.SQ)
-    agrees(
-        lambda x, P: correct.by_force(x, P, work, tuple(p), tuple(alpha), tuple(alpha), True, s, t),
-        H,
-        C,
-        e,
-    )
-    late = alpha + np.array(
-        [0.3, -0.2, 0.5]
-    )  # the Jacobian is that of the mean before, the prediction that of now
-    H = model.measured_force_jacobian(x, late, s.SQ)
-    doubt = np.trace(P[18:21, 18:21]) * float((alpha - late) @ (alpha - late))
-    C = H @ P @ H.T + s.R_p + (t.centre + arm * s.R_alpha[0, 0] + doubt) * np.eye(3)
-    agrees(
-        lambda x, P: correct.by_force(x, P, work, tuple(p), tuple(alpha), tuple(late), True, s, t),
-        H,
-        C,
-        e,
-    )
-    H, C = np.eye(6, 22), P[:6, :6] + np.diag([t.still_rate] * 3 + [0.0] * 3)
-    C[3:, 3:] += s.R_alpha
-    e = np.concatenate([-x[:3], alpha - x[3:6]])
-    agrees(lambda x, P: correct.by_standstill(x, P, work, tuple(alpha), none, s, t), H, C, e)
+def test_the_core_corrects_as_whole_matrices_do(x, alpha, seed):
+    P, t = covariance(seed), tuning(Config())
+    t.products_gate = t.force_gate = np.inf
+    c_m, p, late = np.arange(6.0), np.arange(3.0), alpha + np.array([0.3, -0.2, 0.5])
+    for kind in ("edges-12", "cube"):
+        s = sensor(LAYOUTS[kind](0.05), 0.04)
+        agrees(native.rate_by_products(x, P, c_m, False, s, t), twin.by_products(x, P, c_m, s))
+        agrees(
+            native.rate_by_force(x, P, p, alpha, late, True, s, t),
+            twin.by_force(x, P, p, alpha, late, s, t),
+        )
+        agrees(
+            native.rate_by_standstill(x, P, alpha, s, t), twin.by_standstill(x, P, alpha, s, t)[:2]
+        )
 
 
 @law
-@given(v=vectors, scale=st.sampled_from([1e-6, 1e-3, 0.05, 0.1, 1.0]))
-def test_turns_without_arrays_are_those_with(v, scale):
-    turn, other = v * scale, np.array([0.4, -0.2, 0.1, 0.8])
-    q = rotation.from_rotation_vector(turn)
-    np.testing.assert_allclose(turns.quaternion(*turn), q, rtol=1e-14, atol=1e-15)
-    np.testing.assert_allclose(
-        turns.turn_matrix(*turn), rotation.to_dcm(q).ravel(), rtol=1e-13, atol=1e-14
-    )
-    np.testing.assert_allclose(
-        turns.product(tuple(other), tuple(q)), rotation.multiply(other, q), rtol=1e-14, atol=1e-15
-    )
-    up = np.array([0.3, 0.2, 9.7])
-    expected = rotation.tilt_correction(q, up, 1.0)
-    np.testing.assert_allclose(turns.upright(tuple(q), *up), expected, rtol=1e-13, atol=1e-14)
+@given(x=states, alpha=vectors, seed=st.integers(0, 99))
+def test_points_of_what_is_not_linear_are_those_of_all_states(x, alpha, seed):
+    P, t, s = covariance(seed), tuning(Config()), sensor(LAYOUTS["edges-12"](0.05), 0.04)
+    t.products_gate, c_m = np.inf, np.arange(6.0)
+    said = native.rate_predict(x, P, alpha, 0.01, True, False, True, s)
+    agrees(said, twin.predict_unscented(x, P, alpha, s, 0.01))
+    said = native.rate_by_products(x, P, c_m, True, s, t)
+    agrees(said, twin.by_products_unscented(x, P, c_m, s))
+
+
+def test_an_innovation_beyond_the_gate_changes_nothing():
+    x, P, s, t = np.zeros(22), covariance(1), sensor(CUBE(0.05), 0.04), tuning(Config())
+    said = native.rate_by_products(x, P, np.full(6, 1e3), False, s, t)
+    assert (said[0] == x).all() and (said[1] == P).all() and said[2] > t.products_gate
 
 
 def test_spread_of_the_products_is_that_of_random_rates():
@@ -290,7 +270,7 @@ def test_a_flat_layout_uses_the_products_it_sees():
     cube = CUBE(0.05)
     flat = Layout("flat", cube.r_b * [1, 1, 0], cube.theta_b, 0.05)
     filtered = ProductsFilter(flat)
-    assert 0 < filtered.sensor["m"] < 6
+    assert 0 < filtered.sensor.m < 6
     table = TableTest(2, layout=flat)
     states, omegas = run(ProductsRate(flat), table, 16.0)
     assert rms_deg(states, omegas).max() < 4.0
@@ -394,3 +374,54 @@ def test_a_body_that_turns_freely_is_not_held_to_an_axis():
     track = ProductsRate(cube).run_batch(dt * np.arange(1500), np.array(rows))
     error = np.rad2deg(track.omega_b - truth)[600:]
     assert np.sqrt(np.mean(error**2, axis=0)).max() < 3.0
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_a_pickled_estimator_goes_on_to_the_bit(name):
+    table = TableTest(6)
+    block = table.block(0)
+    estimator = ESTIMATORS[name](table.layout)
+    estimator.feed(block.t_s[:700], block.readings[:700])
+    estimator.exclude(0b100)
+    estimator.feed(block.t_s[700:720], block.readings[700:720])
+    again = pickle.loads(pickle.dumps(estimator))
+    one, other = (e.feed(block.t_s[720:], block.readings[720:]) for e in (estimator, again))
+    for field in ("omega_b", "P", "q_nb", "p_n", "nis", "bound_sigma", "phase"):
+        assert getattr(one, field).tobytes() == getattr(other, field).tobytes()
+    assert one.excluded == other.excluded == 0b100
+
+
+def test_the_state_of_another_version_is_refused():
+    core = ProductsFilter(CUBE(0.05))
+    with pytest.raises(ValueError, match="another version"):
+        core.native.restore(core.native.snapshot() + b"x")
+
+
+@pytest.mark.parametrize("name", ["products-ekf", "products-ukf", "products-mhe"])
+def test_both_builds_of_the_core_give_the_same_bits(name):
+    """In a process of its own each: GYROFREE_CORE names the build."""
+    said = {
+        subprocess.run(
+            [sys.executable, "-c", DIGEST.format(name=name)],
+            env={**os.environ, "GYROFREE_CORE": build},
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
+        for build in ("plain", "")
+    }
+    assert len(said) == 1 and len(said.pop().strip()) == 64
+
+
+DIGEST = """
+import hashlib
+from inertial.rate.estimators import ESTIMATORS
+from inertial.simulation.table import TableTest
+table = TableTest(5, profile="wobble")
+block = table.block(0)
+rows = ESTIMATORS["{name}"](table.layout).feed(block.t_s, block.readings)
+digest = hashlib.sha256()
+for field in ("omega_b", "P", "q_nb", "p_n", "v_n", "nis", "bias", "bound_sigma", "sight"):
+    digest.update(getattr(rows, field).tobytes())
+print(digest.hexdigest())
+"""

@@ -4,12 +4,22 @@ afterwards.
 
 import numpy as np
 import pytest
+from support import rate_twin as twin
 
-from inertial.rate import products_track as track
 from inertial.rate import resolved, sight
+from inertial.rate.batch import Phase
 from inertial.rate.estimators import ProductsRate
-from inertial.rate.products_kernel import PP
-from inertial.rate.products_model import PIVOT, STATES
+from inertial.rate.products_ekf import tuning
+from inertial.rate.products_model import (
+    BIASES,
+    FIRST,
+    OMEGA,
+    PIVOT,
+    SECOND,
+    STATES,
+    TURNED,
+    U,
+)
 from inertial.simulation.profiles import TURNING
 from inertial.simulation.table import TableTest
 
@@ -38,27 +48,25 @@ def begun(request):
 
 def test_the_size_is_known_within_a_tenth_of_a_second_and_its_sign_is_not(begun):
     rows, omega, _ = begun
-    assert rows[10, track.STARTED] and rows[10, track.TWO]
-    assert (rows[8:16, track.SIGHT + 2] == sight.AMBIGUOUS).all()
-    size = np.sqrt(
-        np.sum(rows[15, :3] ** 2) + np.trace(rows[15, track.P : track.P + 9].reshape(3, 3))
-    )
+    assert rows["phase"][10] == Phase.TWO_SIGNS
+    assert (rows["sight"][8:16, 2] == sight.AMBIGUOUS).all()
+    size = np.sqrt(np.sum(rows["omega_b"][15] ** 2) + np.trace(rows["P"][15]))
     assert size == pytest.approx(omega[15, 2], rel=0.5)
 
 
 def test_between_two_signs_the_estimate_is_their_mean_and_its_sigma_says_so(begun):
     rows, omega, _ = begun
-    two = rows[:, track.TWO] > 0.0
-    error = rows[two, 2] - omega[two, 2]
-    assert (np.abs(error) < 4.0 * np.sqrt(rows[two, track.P + 8])).all()
-    assert not (rows[two, track.SIGHT + 2] == sight.VALID).any()
+    two = rows["phase"] == Phase.TWO_SIGNS
+    error = rows["omega_b"][two, 2] - omega[two, 2]
+    assert (np.abs(error) < 4.0 * np.sqrt(rows["P"][two, 2, 2])).all()
+    assert not (rows["sight"][two, 2] == sight.VALID).any()
 
 
 def test_no_rate_that_is_called_valid_has_the_wrong_sign(begun):
     rows, omega, _ = begun
-    valid = rows[:, track.SIGHT + 2] == sight.VALID
+    valid = rows["sight"][:, 2] == sight.VALID
     assert valid[300:].all()
-    assert (rows[valid, 2] * omega[valid, 2] > 0.0).all()
+    assert (rows["omega_b"][valid, 2] * omega[valid, 2] > 0.0).all()
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -109,8 +117,45 @@ def test_noise_of_angular_acceleration_does_not_seem_to_measure_the_pivot():
     layout, t_s, readings, *_ = log(9, centre_b=centre)
     core = ProductsRate(layout).core
     for end in (540, 700, 900):
-        start = int(core.memory["marks"][7])
+        start = core.native.steps
         core.rows(t_s[start:end], readings[start:end])
-        state = core.memory["core"]
-        sigma = np.sqrt(np.diag(state[STATES:PP].reshape(STATES, STATES))[PIVOT])
-        assert (np.abs(state[:STATES][PIVOT] - centre)[:2] < 5.0 * sigma[:2]).all()
+        sigma = np.sqrt(np.diag(core.native.P)[PIVOT])
+        assert (np.abs(core.native.x[PIVOT] - centre)[:2] < 5.0 * sigma[:2]).all()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_first_fit_is_that_of_whole_matrices(seed):
+    """E-46: eight samples, both signs; the core keeps the likelier one first."""
+    layout, t_s, readings, *_ = log(seed, profile=TURNING)
+    core, n, dt = ProductsRate(layout).core, 8, 0.01
+    rows = core.rows(t_s[:n], readings[:n])
+    while rows["phase"][-1] == Phase.WAITING:
+        rows = core.rows(t_s[n : n + 1], readings[n : n + 1])
+        n += 1
+    s, t = core.sensor, tuning(core.config)
+    y = readings[n - 8 : n] @ s.W.T
+    mean = y.mean(axis=0)
+    outer = np.zeros((3, 3))
+    outer[FIRST, SECOND] = outer[SECOND, FIRST] = mean[3:9]
+    sizes, directions = np.linalg.eigh(outer)
+    results = []
+    for sign in (1.0, -1.0):
+        prior, P = known_before(mean, sizes[2], s, t)
+        prior[:3] = sign * np.sqrt(sizes[2]) * directions[:, 2]
+        results.append(twin.StartFit(y, dt, s, t, prior, P).solve(prior))
+    x, P, _ = max(results, key=lambda r: r[2])
+    P[:3, :3] += 8 * dt * dt * s.R_alpha
+    np.testing.assert_allclose(core.native.x, x, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(core.native.P, P, rtol=1e-4, atol=1e-6)
+
+
+def known_before(mean, size, s, t):
+    """State and covariance before any sample, of a body that turns with products of this size."""
+    x, P, up = np.zeros(STATES), np.zeros((STATES, STATES)), mean[9:] / np.linalg.norm(mean[9:])
+    x[U] = 9.80665 * up
+    P[np.ix_(BIASES, BIASES)] = t.bias * s.drift
+    P[OMEGA, OMEGA], P[PIVOT, PIVOT] = 25.0 * np.eye(3), t.pivot * np.eye(3)
+    along = np.outer(up, up)
+    P[U, U] = t.gravity * along + t.tilt * (np.eye(3) - along) + t.pivot * size**2 * np.eye(3)
+    P[TURNED, TURNED] = 1e-8
+    return x, P

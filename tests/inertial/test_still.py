@@ -1,8 +1,10 @@
-"""The still detector on simulated standstill and turning."""
+"""The zero-velocity detector on simulated standstill and turning."""
 
 import numpy as np
 import pytest
+from support.still_twin import StillTwin
 
+from inertial.core import native
 from inertial.layouts.catalogue import CUBE, LAYOUTS
 from inertial.rate import still
 from inertial.rate.observed import sensor
@@ -18,19 +20,19 @@ def answers(profile, rates=None, seed=1):
     names.
     """
     table = TableTest(seed, profile=profile)
-    watch = still.memory()
+    watch = native.RateDetector()
     said, turning, depths = [], [], []
     for number in range(3):
         block = table.block(number)
         for row in range(len(block.t_s)):
-            still.take(watch, SENSOR, block.readings[row], table.period_s)
+            watch.take(SENSOR, block.readings[row], table.period_s)
             # who stands believes to stand: what the filter would say
             omega = (
                 (np.zeros(3) if said and said[-1] else block.omega_b[row])
                 if rates is None
                 else rates
             )
-            answer, depth = still.detect(watch, SENSOR, LIMITS, omega, SURE, table.period_s)
+            answer, depth = watch.detect(SENSOR, LIMITS, omega, SURE, table.period_s)
             said.append(answer)
             depths.append(depth)
             turning.append(abs(block.omega_b[row, 2]))
@@ -47,7 +49,7 @@ def test_a_slow_turn_about_a_tilted_axis_is_not_still_though_the_rate_is_not_kno
     """10 deg/s, two degrees from the vertical: the readings scatter like noise and the products say
     nothing.
     """
-    watch, rate, tilt = still.memory(), np.deg2rad(10.0), np.deg2rad(2.0)
+    watch, rate, tilt = native.RateDetector(), np.deg2rad(10.0), np.deg2rad(2.0)
     noise = np.random.default_rng(4).normal(0.0, 0.04, (1000, 12))
     said = []
     for k in range(1000):
@@ -55,8 +57,8 @@ def test_a_slow_turn_about_a_tilted_axis_is_not_still_though_the_rate_is_not_kno
         force = -9.80665 * np.array(
             [np.sin(tilt) * np.cos(angle), -np.sin(tilt) * np.sin(angle), np.cos(tilt)]
         )
-        still.take(watch, SENSOR, CUBE(0.05).theta_b @ force + noise[k], 0.01)
-        said.append(still.detect(watch, SENSOR, LIMITS, np.zeros(3), 100.0 * np.eye(3), 0.01)[0])
+        watch.take(SENSOR, CUBE(0.05).theta_b @ force + noise[k], 0.01)
+        said.append(watch.detect(SENSOR, LIMITS, np.zeros(3), 100.0 * np.eye(3), 0.01)[0])
     assert np.mean(said) < 0.02
 
 
@@ -91,26 +93,26 @@ def test_a_wrong_rate_is_overruled_by_axes_that_keep_still():
 
 
 def test_a_gap_empties_the_window():
-    watch = still.memory()
+    watch = native.RateDetector()
     for _ in range(130):
-        still.take(watch, SENSOR, np.zeros(12), 0.01)
-        answer, _ = still.detect(watch, SENSOR, LIMITS, np.zeros(3), SURE, 0.01)
+        watch.take(SENSOR, np.zeros(12), 0.01)
+        answer, _ = watch.detect(SENSOR, LIMITS, np.zeros(3), SURE, 0.01)
     assert answer
-    still.forget(watch)
-    still.take(watch, SENSOR, np.zeros(12), 0.01)
-    assert not still.detect(watch, SENSOR, LIMITS, np.zeros(3), SURE, 0.01)[0]
+    watch.forget()
+    watch.take(SENSOR, np.zeros(12), 0.01)
+    assert not watch.detect(SENSOR, LIMITS, np.zeros(3), SURE, 0.01)[0]
 
 
 def test_the_newest_samples_of_a_standstill_are_not_learnt():
     table = TableTest(2)
-    watch, block = still.memory(), table.block(0)
+    watch, block = native.RateDetector(), table.block(0)
     for row in range(480):
-        still.take(watch, SENSOR, block.readings[row], 0.01)
-        still.detect(watch, SENSOR, LIMITS, np.zeros(3), SURE, 0.01)
-    n = watch["n"][still.LEARNING]
+        watch.take(SENSOR, block.readings[row], 0.01)
+        watch.detect(SENSOR, LIMITS, np.zeros(3), SURE, 0.01)
+    n = watch.learning
     assert 0 < n <= 480 - 64 - 24
-    y = SENSOR["S"][:, :12] @ block.readings[480 - 64 - n : 480 - 64].mean(axis=0)
-    np.testing.assert_allclose(watch["reference"][:3], y[:3], atol=1e-9)
+    y = SENSOR.W @ block.readings[480 - 64 - n : 480 - 64].mean(axis=0)
+    np.testing.assert_allclose(watch.reference, y, atol=1e-9)
 
 
 def test_noise_alone_seldom_denies_a_standstill():
@@ -125,4 +127,20 @@ def test_windows_that_do_not_fit_are_refused():
 
 
 def test_layouts_without_products_watch_the_angular_acceleration():
-    assert sensor(LAYOUTS["nine"](0.05), 0.04)["m"] == 0
+    assert sensor(LAYOUTS["nine"](0.05), 0.04).m == 0
+
+
+@pytest.mark.parametrize("profile", ["published", "slow", "wobble"])
+@pytest.mark.parametrize("kind", ["cube", "nine"])
+def test_the_detector_is_that_of_its_definitions(profile, kind):
+    table = TableTest(3, profile=profile, layout=LAYOUTS[kind](0.05))
+    s, watch = sensor(table.layout, 0.0408), native.RateDetector()
+    twin, block, still_now = StillTwin(s, still.Config()), table.block(0), 0
+    for row in range(len(block.t_s)):
+        omega = np.zeros(3) if still_now else block.omega_b[row]
+        watch.take(s, block.readings[row], 0.01)
+        said = watch.detect(s, LIMITS, omega, SURE, 0.01)
+        assert said == twin.step(block.readings[row], omega, SURE, 0.01)
+        still_now = said[0]
+        assert watch.learning == twin.learning
+    np.testing.assert_allclose(watch.reference, twin.reference, atol=1e-9)

@@ -56,6 +56,7 @@ MatrixOut to_numpy(const Eigen::MatrixBase<Derived>& m) {
 
 // One for each subject; module.cpp calls them all.
 void bind_elementary(nb::module_& m);
+void bind_rate(nb::module_& m);
 void bind_rotation(nb::module_& m);
 void bind_places(nb::module_& m);
 void bind_attitude(nb::module_& m);

@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Track:
+class EstimatorRun:
     """What one estimator said, arrays over samples (n)."""
 
     name: str

@@ -1,0 +1,259 @@
+#include "rate/frame.hpp"
+
+namespace gyrofree::rate {
+namespace {
+
+constexpr double LONGEST_GAP_S = 0.5;  // after a longer one the rate is unknown
+constexpr int WINDOW = 24;             // samples of the moving horizon
+constexpr int ITERATIONS = 2;          // of Gauss and Newton
+constexpr int ALWAYS_UNLIKE = 50;      // samples in a row without gravity: u and the pivot are found anew
+constexpr double FASTEST = 120.0;      // rad/s, twice what +-16 g allow at 5 cm of the axis
+constexpr int FREE_FOR = 200;          // samples
+constexpr double FEW_SAY_AT_MOST = 2.0;  // of the balance, by a fit of few samples
+
+// omega that many samples before one with state `end`, by what was measured of omega' since (E-49).
+Vector3 back(const StateVector& end, const Measurement& now, const Measurement& then, long samples, double dt) {
+  const Vector3 gained = (now - then).segment<3>(ALPHA_M) - samples * end.segment<3>(BIAS_ALPHA);
+  return end.segment<3>(OMEGA) - dt * gained;
+}
+
+}  // namespace
+
+void Frame::gap() {
+  watch_.forget();
+  kept_.clear();
+  arrivals_.clear();
+  fitted_ = 0;
+}
+
+// The rate is unknown: wait for a standstill, or start while turning.
+void Frame::restart() {
+  gap();
+  started_ = still_ = moved_ = false;
+  branches_ = 0;
+  first_.filter = Filter();
+}
+
+void Frame::tick(double t_s) {
+  const double dt = t_s - last_s_;
+  last_s_ = t_s;
+  if (dt > LONGEST_GAP_S) {
+    restart();
+  } else if (dt > 0.0) {
+    dt_ = dt;
+  }
+  ++steps_;
+}
+
+void Frame::advance(const Constants& c, double t_s, const double* a) {
+  tick(t_s);
+  watch_.take(c.sensor, a, dt_);
+  said_ = Said();
+  Filter& f = first_.filter;
+  if (!started_)
+    for (int i = 0; i < 3; ++i) f.P(OMEGA + i, OMEGA + i) = UNKNOWN_RATE * UNKNOWN_RATE;
+  const Verdict verdict = watch_.detect(c.sensor, c.limits, f.omega(), f.omega_covariance(), dt_);
+  if (!started_) return wait(c, verdict.still);
+  if (fitted_ > 0) {
+    still_ = verdict.still;
+    fit_start(c, verdict.still);
+    diverged();
+    return;
+  }
+  const long now = watch_.newest();
+  const long first = begin_of_motion(verdict, now);
+  still_ = verdict.still;
+  const bool fixed = !still_ && on_axis(c);
+  if (still_) arrivals_.clear();
+  run(c, first, now, fixed, nullptr);
+  if (static_cast<Method>(c.tuning.method) == Method::HORIZON && !still_) horizon(c, now, fixed);
+  if (branches_ == 2) two_signs(still_);
+  if (diverged()) return;
+  if (still_ && !moved_) stay();
+  count(c);
+}
+
+void Frame::wait(const Constants& c, bool still) {
+  still_ = still;
+  if (still) {
+    begin(c);
+  } else if (turns(watch_, c.sensor, c.tuning)) {
+    started_ = moved_ = true;
+    branches_ = 2;
+    fitted_ = FEWEST;
+    balance_ = fit(c);
+  }
+}
+
+void Frame::begin(const Constants& c) {
+  begin_still(first_.filter, c.sensor, c.tuning, watch_.mean_of(c.limits.window));
+  started_ = true;
+  branches_ = 1;
+}
+
+// Both signs anew; how much likelier the first is. By few samples that is not known well.
+double Frame::fit(const Constants& c) {
+  const double ratio = begin_turning(first_, second_, watch_, c.sensor, c.tuning, fitted_);
+  return fitted_ >= SURE_FROM ? ratio : std::min(ratio, FEW_SAY_AT_MOST);
+}
+
+// One more sample of a start while turning: fitted anew now and then, carried on between (E-46).
+void Frame::fit_start(const Constants& c, bool still) {
+  const int n = ++fitted_;
+  if (still) {  // it was no turn
+    begin(c);
+    moved_ = false;
+    fitted_ = 0;
+  } else if (std::find(std::begin(FITS), std::end(FITS), n) != std::end(FITS)) {
+    balance_ = fit(c);
+    branches_ = balance_ > DECIDED ? 1 : 2;
+  } else {
+    const long now = watch_.newest();
+    for (Start* begun : {&first_, &second_}) carry(begun->filter, watch_.y(now), watch_.dt(now), c.sensor, c.tuning);
+  }
+  if (n >= MOST) {  // from here a filter, that does not know yet whether the axis is fixed
+    fitted_ = 0;
+    free_for_ = FREE_FOR;
+  }
+}
+
+// First sample to run: the newest one, or where a turn began that is noticed now.
+long Frame::begin_of_motion(const Verdict& verdict, long now) {
+  if (verdict.still) {
+    if (now % EVERY == 0) kept_.keep(now, first_.filter);
+    return now;
+  }
+  if (!still_) return now;
+  moved_ = true;
+  const long first = kept_.nearest(now - verdict.depth, now);
+  if (first >= 0) {
+    first_.filter = *kept_.of(first);
+    taken_back_ += now - first;
+  }
+  kept_.clear();
+  return first >= 0 ? first : now;
+}
+
+// Does omega keep its direction? Not while omega' across it, summed over 16 or 64 samples, is more than
+// noise. A body found to turn freely is taken for one for a while, and omega's variance across grows
+// (E-45).
+bool Frame::on_axis(const Constants& c) {
+  Filter& f = first_.filter;
+  const double square = f.speed_squared();
+  if (c.tuning.axis == 0.0 || square <= c.tuning.axis_from) return false;
+  const Vector3 omega = f.omega();
+  for (const int length : {16, 64}) {
+    if (watch_.filled_samples() <= length) break;
+    const Measurement sum = watch_.total(watch_.newest()) - watch_.total(watch_.newest() - length);
+    const Vector3 gained = sum.segment<3>(ALPHA_M) - length * f.x.segment<3>(BIAS_ALPHA);
+    const double along = dot(gained, omega);
+    const double across = square_of(gained) - along * along / square;
+    if (across > c.tuning.axis_limit * length * c.sensor.R_alpha(0, 0) && free_for_ < FREE_FOR) free_for_a_while(c);
+  }
+  if (free_for_ > 0) --free_for_;
+  return free_for_ == 0;
+}
+
+void Frame::free_for_a_while(const Constants& c) {
+  if (free_for_ == 0) first_.filter.P.block<3, 3>(OMEGA, OMEGA) += c.tuning.axis_lost * Matrix3::Identity();
+  free_for_ = FREE_FOR;
+}
+
+// Samples first to now through the filter of each sign. end: the products are linear about what omega
+// was by that state of the newest sample.
+void Frame::run(const Constants& c, long first, long now, bool fixed, const StateVector* end) {
+  const bool keeps = static_cast<Method>(c.tuning.method) == Method::HORIZON && !still_;
+  for (long sample = first; sample <= now; ++sample) {
+    const bool eighth = sample % EVERY == 0;
+    if (eighth && keeps) arrivals_.keep(sample, first_.filter);
+    Vector3 at;
+    if (end != nullptr) at = back(*end, watch_.total(now), watch_.total(sample), now - sample, dt_);
+    const Moment moment{watch_.dt(sample), !still_, fixed, eighth ? EVERY * dt_ : 0.0, end == nullptr ? nullptr : &at};
+    step(first_.filter, c.sensor, c.tuning, watch_.y(sample), moment, said_);
+    if (branches_ == 2) step(second_.filter, c.sensor, c.tuning, watch_.y(sample), moment, other_said_);
+  }
+}
+
+// The window again, about what its end says, when it is due and all of it was turning (E-49).
+void Frame::horizon(const Constants& c, long now, bool fixed) {
+  if (branches_ != 1) return;
+  const long first = now + 1 - WINDOW;
+  for (int iteration = 0; iteration < ITERATIONS; ++iteration) {
+    const Filter* arrival = arrivals_.of(first);
+    if (arrival == nullptr) return;
+    const StateVector end = first_.filter.x;
+    first_.filter = *arrival;
+    run(c, first, now, fixed, &end);
+  }
+}
+
+void Frame::swap_signs() {
+  std::swap(first_.filter, second_.filter);
+  balance_ = -balance_;
+}
+
+// Keep the better one of two signs first, and only that once it is sure.
+void Frame::two_signs(bool still) {
+  balance_ += elementary::log(said_.density / other_said_.density) - 0.5 * (said_.misfit - other_said_.misfit);
+  if (balance_ < 0.0) {
+    swap_signs();
+    std::swap(said_, other_said_);
+  }
+  if (still || balance_ > DECIDED) branches_ = 1;
+}
+
+// Start anew when the rate is beyond all bounds or no number at all, or its covariance is none any more.
+bool Frame::diverged() {
+  const Filter& f = first_.filter;
+  const Matrix3 P = f.omega_covariance();
+  if (f.speed_squared() < FASTEST * FASTEST && P(0, 0) > 0.0 && P(1, 1) > 0.0 && P(2, 2) > 0.0) return false;
+  ++lost_;
+  restart();
+  said_ = Said();
+  return true;
+}
+
+// Position and angle count from the end of the first standstill.
+void Frame::stay() {
+  Filter& f = first_.filter;
+  f.v_n.setZero();
+  f.p_n.setZero();
+  f.x(ANGLE) = 0.0;
+  f.P.row(ANGLE).setZero();
+  f.P.col(ANGLE).setZero();
+}
+
+void Frame::count(const Constants& c) {
+  if (!said_.used) ++refused_;
+  if (said_.force_used) {
+    unlike_ = 0;
+    return;
+  }
+  ++refused_force_;
+  ++unlike_;
+  if (unlike_ % ALWAYS_UNLIKE != 0) return;
+  // not one bump: gravity's direction or the pivot is not what was believed
+  Filter& f = first_.filter;
+  f.P.block<3, 3>(LIFT, LIFT) += c.tuning.tilt * Matrix3::Identity();
+  f.P.block<3, 3>(PIVOT, PIVOT) += c.tuning.pivot * Matrix3::Identity();
+}
+
+void Frame::exchange_axes(const Matrix<MEASURED>& T, const Matrix<MEASURED>& unknown) {
+  watch_.unlearn();
+  kept_.clear();
+  fitted_ = 0;
+  Covariance full = Covariance::Identity();
+  for (int i = 0; i < MEASURED; ++i)
+    for (int j = 0; j < MEASURED; ++j) full(bias_state(i), bias_state(j)) = T(i, j);
+  for (Start* begun : {&first_, &second_}) {
+    Filter& f = begun->filter;
+    f.x = product(full, f.x);
+    f.P = product_transposed(product(full, f.P), full);
+    symmetrise(f.P);
+    add_to_biases(f.P, unknown, 1.0);
+    f.rest_bias = product(T, f.rest_bias);
+    f.rest_variance = f.level = bias_variances(f.P);
+  }
+}
+
+}  // namespace gyrofree::rate

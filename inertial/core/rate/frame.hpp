@@ -1,0 +1,138 @@
+// From samples to states of a products filter: start, standstill, the taking back of unnoticed turns,
+// two signs at once, the moving horizon.
+//
+// A turn begins before the detector sees it. The filter keeps its states of the last 128 samples of
+// standstill, every eighth; when a turn is noticed it goes back to where that began and runs those
+// samples again as turning. At a start while turning the products give omega but for its sign. The first
+// samples are fitted for both (start.cpp), then two filters run, until what they say of omega' and of
+// gravity's turn tells the signs apart (E-46).
+#pragma once
+
+#include "rate/start.hpp"
+
+namespace gyrofree::rate {
+
+constexpr int EVERY = 8;  // samples between states that are kept
+constexpr double UNKNOWN_RATE = 10.0;  // rad/s, sigma before any standstill
+constexpr double DECIDED = 14.0;  // of the balance of two signs: one wrong in a million
+
+// States before some of the newest samples, by the samples' numbers.
+template <int Size>
+class KeptStates {
+ public:
+  KeptStates() { clear(); }
+  void clear() {
+    for (long& number : at_) number = NONE;
+  }
+  void keep(long sample, const Filter& f) {
+    const long k = sample / EVERY % Size;
+    states_[k] = f;
+    at_[k] = sample;
+  }
+  const Filter* of(long sample) const {
+    if (sample < 0 || sample % EVERY != 0) return nullptr;
+    const long k = sample / EVERY % Size;
+    return at_[k] == sample ? &states_[k] : nullptr;
+  }
+  // The one nearest to `wanted` of the newest DEPTH samples up to `now`; its sample, or -1.
+  long nearest(long wanted, long now) const {
+    long best = NONE;
+    for (const long at : at_) {
+      if (at < 0 || at > now || now - at >= DEPTH) continue;
+      if (best < 0 || std::abs(at - wanted) < std::abs(best - wanted)) best = at;
+    }
+    return best;
+  }
+
+ private:
+  static constexpr long NONE = -1;
+  Filter states_[Size];
+  long at_[Size];
+};
+
+// What the frame works by; constant between two changes of the axes in use.
+struct Constants {
+  Sensor sensor;
+  Tuning tuning;
+  StillLimits limits;
+};
+
+// A tachometer's report: the rate about axis_b at t_s.
+struct Report {
+  double t_s;
+  double rate;   // rad/s
+  double sigma;  // rad/s
+  bool is_signed;
+  Vector3 axis_b;  // of unit length
+};
+
+class Frame {
+ public:
+  // One sample of all axes, m/s^2, read at t_s (s, growing).
+  void advance(const Constants& c, double t_s, const double* a);
+  // Samples are missing: the next step predicts across.
+  void gap();
+  // Other axes are in use: what the biases were becomes T b plus what was not known of the axes (E-42).
+  void exchange_axes(const Matrix<MEASURED>& T, const Matrix<MEASURED>& unknown);
+  // Correct the state after the newest sample by an older report (E-50). False, and nothing is changed,
+  // when it is too old, contradicts by more than 6 sigma, or nothing is known.
+  bool correct(const Constants& c, const Report& report);
+
+  const Filter& filter() const { return first_.filter; }
+  const Filter& other() const { return second_.filter; }
+  const Said& said() const { return said_; }
+  Measurement newest() const { return watch_.y(watch_.newest()); }
+  bool started() const { return started_; }
+  bool still() const { return still_; }
+  bool two_signs() const { return branches_ == 2; }
+  double balance() const { return balance_; }  // log of the likelihood ratio of the two signs
+  double last_s() const { return last_s_; }
+  double dt() const { return dt_; }
+  long steps() const { return steps_; }
+  long refused_products() const { return refused_; }
+  long refused_force() const { return refused_force_; }
+  long lost() const { return lost_; }
+
+ private:
+  void tick(double t_s);
+  void restart();
+  void wait(const Constants& c, bool still);
+  void begin(const Constants& c);
+  double fit(const Constants& c);
+  void fit_start(const Constants& c, bool still);
+  long begin_of_motion(const Verdict& verdict, long now);
+  bool on_axis(const Constants& c);
+  void free_for_a_while(const Constants& c);
+  void run(const Constants& c, long first, long now, bool fixed, const StateVector* end);
+  void horizon(const Constants& c, long now, bool fixed);
+  void two_signs(bool still);
+  void swap_signs();
+  bool diverged();
+  void count(const Constants& c);
+  void stay();
+
+  Watch watch_;
+  Start first_;
+  Start second_;  // of the other sign, while there are two
+  KeptStates<DEPTH / EVERY + 1> kept_;
+  KeptStates<4> arrivals_;  // of the moving horizon: states before samples of this turn
+  Said said_;
+  Said other_said_;
+  double last_s_ = std::numeric_limits<double>::quiet_NaN();
+  double dt_ = 0.01;
+  double balance_ = 0.0;
+  bool started_ = false;
+  bool still_ = false;
+  bool moved_ = false;  // since the first standstill
+  int branches_ = 0;    // signs that are followed
+  int fitted_ = 0;      // samples of a start while turning that is still being fitted
+  int free_for_ = 0;    // samples for which the body is taken to turn freely
+  long unlike_ = 0;     // samples in a row whose force was refused
+  long refused_ = 0;
+  long refused_force_ = 0;
+  long taken_back_ = 0;
+  long steps_ = 0;
+  long lost_ = 0;
+};
+
+}  // namespace gyrofree::rate

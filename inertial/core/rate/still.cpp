@@ -1,0 +1,202 @@
+#include "rate/still.hpp"
+
+namespace gyrofree::rate {
+namespace {
+
+constexpr int LENGTHS[] = {4, 8, 16, 32, 64, 128};  // samples over which omega' is summed
+
+double square(double x) { return x * x; }
+
+}  // namespace
+
+void Watch::forget() {
+  filled = still_for = quiet_for = slow_for = learning = 0;
+  gathered.setZero();
+}
+
+void Watch::unlearn() {
+  forget();
+  ring_y.setZero();
+  learnt = 0;
+}
+
+void Watch::take(const Sensor& s, const double* a, double dt) {
+  const Eigen::Index k = count % DEPTH, now = count % (2 * DEPTH);
+  const Eigen::Index before = (count + 2 * DEPTH - 1) % (2 * DEPTH);
+  ring_dt(k) = dt;
+  for (int i = 0; i < s.n; ++i) ring_a(i, k) = a[i];
+  ring_y.col(k) = s.measure(a);
+  if (filled == 0) ring_total.col(before).setZero();
+  ring_total.col(now) = ring_y.col(k) + ring_total.col(before);
+  ++count;
+  ++filled;
+}
+
+Measurement Watch::mean_of(int window) const {
+  Measurement out = Measurement::Zero();
+  for (int ago = 0; ago < window; ++ago) out += y(newest() - ago) / window;
+  return out;
+}
+
+// Mean square of the axes about their means over the window, (m/s^2)^2 (E-20); running sums, made
+// anew now and then.
+double Watch::scatter(const Sensor& s, int window) {
+  const Eigen::Index now = newest() % DEPTH;
+  if (filled == window || count % DEPTH == 0) {
+    offset = ring_a.col(now);
+    sum.setZero();
+    sum_of_squares.setZero();
+    for (int ago = 0; ago < window; ++ago) {
+      const Vector<MOST_AXES> d = ring_a.col((newest() - ago) % DEPTH) - offset;
+      sum += d;
+      sum_of_squares += d.cwiseProduct(d);
+    }
+  } else {
+    const Vector<MOST_AXES> come = ring_a.col(now) - offset;
+    const Vector<MOST_AXES> gone = ring_a.col((newest() - window) % DEPTH) - offset;
+    sum += come - gone;
+    sum_of_squares += come.cwiseProduct(come) - gone.cwiseProduct(gone);
+  }
+  double total = 0.0, axes = 0.0;
+  for (int i = 0; i < s.n; ++i) {
+    if (s.used(i) == 0.0) continue;
+    total += sum_of_squares(i) - sum(i) * sum(i) / window;
+    axes += 1.0;
+  }
+  return total / ((window - 1) * axes);
+}
+
+// Mean y over the window that ended `ago` samples ago.
+Measurement Watch::mean(int window, int ago) const {
+  const long last = newest() - ago;
+  if (filled <= window + ago) return total(last) / window;
+  return (total(last) - total(last - window)) / window;
+}
+
+// Chi-square of the mean [omega', c] of the window against the reference (E-21).
+double Watch::moved(const Sensor& s, int window, double drift) const {
+  const double share = 1.0 / window + 1.0 / learnt;
+  const Measurement all = mean(window) - reference;
+  double chi2 = 0.0;
+  for (int k = 0; k < s.spread.size(); ++k) {
+    double along = 0.0;
+    for (int r = 0; r < PRODUCTS_M + s.m; ++r) along += s.basis(k, r) * all(r);
+    chi2 += along * along / (s.spread(k) * share + drift * drift);
+  }
+  return chi2;
+}
+
+// Chi-square of the sum of omega' over the newest samples against the bias of this standstill (E-23).
+double Watch::turned(const Sensor& s, int length, double drift) const {
+  const double share = length * (1.0 + static_cast<double>(length) / learnt);
+  const Measurement d = total(newest()) - total(newest() - length) - length * reference;
+  double chi2 = 0.0;
+  for (int r = 0; r < 3; ++r) chi2 += square(d(ALPHA_M + r)) / (s.R_alpha(r, r) * share + square(length * drift));
+  return chi2;
+}
+
+// Chi-square of the mean p of the window against that of this standstill (E-24).
+double Watch::tilted(const Sensor& s, int window, double drift) const {
+  const double share = 1.0 / window + 1.0 / learnt;
+  const Measurement d = mean(window) - reference;
+  double chi2 = 0.0;
+  for (int r = 0; r < 3; ++r) chi2 += square(d(FORCE_M + r)) / (s.R_p(r, r) * share + drift * drift);
+  return chi2;
+}
+
+// Chi-square of the mean p of the window against that of `span` samples ago, which must be there (E-24).
+double Watch::swung(const Sensor& s, const StillLimits& c, int span) const {
+  const Measurement d = mean(c.window) - mean(c.window, span);
+  double chi2 = 0.0;
+  for (int r = 0; r < 3; ++r)
+    chi2 += square(d(FORCE_M + r)) / (s.R_p(r, r) * 2.0 / c.window + square(c.drift_steady));
+  return chi2;
+}
+
+// Has gravity kept its direction for as long as the caller's rate leaves in doubt (E-25)? told:
+// chi-square of a rate of zero.
+bool Watch::settled(const Sensor& s, const StillLimits& c, const Vector3& omega, const Matrix3& P,
+                    double told) const {
+  const double most = norm_of(omega) + 2.0 * std::sqrt(largest_variance(P));
+  if (learnt > 0 && most < c.sure_rate) return true;
+  const int span = learnt > 0 && most <= c.likely_rate ? c.brief_span : c.steady_span;
+  if (filled < span + c.window) return false;
+  const double swing = swung(s, c, span);
+  return swing <= c.steady_limit && (told >= c.rate_limit || told + swing < c.begin_limit);
+}
+
+double rate_excludes_zero(const Vector3& omega, const Matrix3& P, double slack) {
+  const Cholesky<Matrix3> factor(P + slack * slack * Matrix3::Identity());
+  return square_of(factor.whitened(omega));
+}
+
+// 0 while a standing body stands on; else how many samples ago it began to move (E-23, E-24).
+int Watch::began(const Sensor& s, const StillLimits& c) const {
+  if (learning < c.window) return 0;
+  double worst = 1.0;
+  int depth = 0;
+  for (const int length : LENGTHS) {
+    if (length >= std::min(still_for, filled - 1)) break;
+    const double ratio = turned(s, length, c.drift_now) / c.turn_limit;
+    if (ratio > worst) {
+      worst = ratio;
+      depth = length + length / 2;
+    }
+  }
+  if (depth == 0 && tilted(s, c.window, c.drift_tilt) > c.tilt_limit) depth = c.guard;
+  return std::min(depth, DEPTH - 8);
+}
+
+// One more sample of standstill; the one `guard` samples ago becomes part of the reference.
+void Watch::learn(const StillLimits& c) {
+  ++still_for;
+  if (still_for <= c.guard) return;
+  ++learning;
+  gathered += y(newest() - c.guard);
+  if (learning < c.window) return;
+  learnt = learning;
+  reference = gathered / learning;
+}
+
+bool Watch::restless() {
+  quiet_for = slow_for = 0;
+  return false;
+}
+
+bool Watch::stands(const Sensor& s, const StillLimits& c, const Vector3& omega, const Matrix3& P, double dt) {
+  if (hold > 0) --hold;
+  if (filled < c.window || scatter(s, c.window) > c.spread_limit * square(c.sigma_axis) || hold > 0)
+    return restless();
+  const double told = rate_excludes_zero(omega, P, c.rate_slack);
+  const bool slow = told < c.rate_limit;
+  if (!settled(s, c, omega, P, told)) return restless();
+  if (learnt == 0 || (moved(s, c.window, c.drift) <= c.quiet_limit &&
+                      moved(s, c.short_window, c.drift) <= c.quiet_limit)) {
+    ++quiet_for;
+    slow_for = 0;
+    return slow || quiet_for * dt >= c.patience_s;
+  }
+  quiet_for = 0;
+  slow_for = slow ? slow_for + 1 : 0;
+  return slow_for * dt >= 2.0 * c.patience_s;
+}
+
+Verdict Watch::detect(const Sensor& s, const StillLimits& c, const Vector3& omega, const Matrix3& P, double dt) {
+  const bool standing = still_for > 0;
+  const bool still = stands(s, c, omega, P, dt);
+  int depth = standing ? began(s, c) : 0;
+  if (still && depth == 0) {
+    learn(c);
+    return {true, 0};
+  }
+  if (standing && depth == 0) depth = std::min({std::max(depth, 2 * c.window), still_for, DEPTH - 8});
+  still_for = learning = 0;
+  gathered.setZero();
+  if (standing) {
+    quiet_for = 0;
+    hold = c.hold;
+  }
+  return {false, depth};
+}
+
+}  // namespace gyrofree::rate

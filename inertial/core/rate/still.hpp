@@ -1,0 +1,81 @@
+// Zero-velocity detector: is the body still? Questions on the newest samples, with stated limits
+// (E-20 to E-25). What is asked, and why: inertial/rate/still.py; numpy twin:
+// tests/support/still_twin.py.
+#pragma once
+
+#include "rate/sensor.hpp"
+
+namespace gyrofree::rate {
+
+struct StillLimits {
+  double sigma_axis, spread_limit, quiet_limit, turn_limit, tilt_limit, steady_limit, drift_steady;
+  double rate_limit, rate_slack, sure_rate, likely_rate, begin_limit, patience_s;
+  double drift, drift_now, drift_tilt;
+  int window, short_window, steady_span, brief_span, guard, hold;
+};
+
+constexpr int DEPTH = 128;  // samples remembered
+
+struct Verdict {
+  bool still;
+  int depth;  // when a standstill ends: how many samples ago the turn began
+};
+
+class Watch {
+ public:
+  // After a gap: the window must fill anew; the reference of the last standstill stays.
+  void forget();
+  // Of other axes than before: nothing that was learnt of them holds.
+  void unlearn();
+  // Remember one sample of all axes.
+  void take(const Sensor& s, const double* a, double dt);
+  // Is the sample taken last one of standstill, by the caller's omega and its covariance?
+  Verdict detect(const Sensor& s, const StillLimits& c, const Vector3& omega, const Matrix3& P, double dt);
+
+  long newest() const { return count - 1; }
+  int filled_samples() const { return filled; }
+  int learning_samples() const { return learning; }
+  const Measurement& learnt_mean() const { return reference; }
+  Measurement y(long sample) const { return ring_y.col(sample % DEPTH); }
+  double dt(long sample) const { return ring_dt(sample % DEPTH); }
+  // Sum of all y up to a sample of the last 256, but for a constant.
+  Measurement total(long sample) const { return ring_total.col((sample + 2 * DEPTH) % (2 * DEPTH)); }
+  Measurement mean_of(int window) const;
+
+ private:
+  double scatter(const Sensor& s, int window);
+  Measurement mean(int window, int ago = 0) const;
+  double moved(const Sensor& s, int window, double drift) const;
+  double turned(const Sensor& s, int length, double drift) const;
+  double tilted(const Sensor& s, int window, double drift) const;
+  double swung(const Sensor& s, const StillLimits& c, int span) const;
+  bool settled(const Sensor& s, const StillLimits& c, const Vector3& omega, const Matrix3& P, double told) const;
+  int began(const Sensor& s, const StillLimits& c) const;
+  bool stands(const Sensor& s, const StillLimits& c, const Vector3& omega, const Matrix3& P, double dt);
+  bool restless();
+  void learn(const StillLimits& c);
+
+  Matrix<MOST_AXES, DEPTH> ring_a = Matrix<MOST_AXES, DEPTH>::Zero();
+  Matrix<MEASURED, DEPTH> ring_y = Matrix<MEASURED, DEPTH>::Zero();
+  Matrix<MEASURED, 2 * DEPTH> ring_total = Matrix<MEASURED, 2 * DEPTH>::Zero();
+  Vector<DEPTH> ring_dt = Vector<DEPTH>::Zero();
+  // Of the readings in the window: one of them, and sum and sum of squares of what they differ by.
+  Vector<MOST_AXES> offset = Vector<MOST_AXES>::Zero();
+  Vector<MOST_AXES> sum = Vector<MOST_AXES>::Zero();
+  Vector<MOST_AXES> sum_of_squares = Vector<MOST_AXES>::Zero();
+  Measurement reference = Measurement::Zero();  // mean y of the last standstill
+  Measurement gathered = Measurement::Zero();   // of this standstill without its newest samples
+  long count = 0;       // samples taken
+  int filled = 0;       // of them without a gap
+  int still_for = 0;    // samples of this standstill
+  int quiet_for = 0;    // samples that look still
+  int slow_for = 0;     // samples that look still but for biases that have moved
+  int learnt = 0;       // samples behind the reference
+  int learning = 0;     // of this standstill
+  int hold = 0;         // samples before there can be a standstill again
+};
+
+// Chi-square of zero rate: omega^T (P + slack^2 I)^-1 omega (E-22).
+double rate_excludes_zero(const Vector3& omega, const Matrix3& P, double slack);
+
+}  // namespace gyrofree::rate
