@@ -17,7 +17,7 @@ void act(Carried& now, const Vector3& f_b, const Vector3& omega_b, const Biases&
 
 }  // namespace
 
-std::vector<Carried> carried(const Window& samples, const Eigen::Map<const Eigen::VectorXd>& times,
+std::vector<Carried> carried(const WindowSamples& samples, const Eigen::Map<const Eigen::VectorXd>& times,
                              const Biases& bias) {
   std::vector<Carried> out;
   out.reserve(static_cast<std::size_t>(times.size()));

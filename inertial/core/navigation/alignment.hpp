@@ -20,7 +20,7 @@ struct Biases {
 };
 
 // Samples t (n,), f_b and omega_b (n, 3); sample i acts from t[i - 1] to t[i].
-struct Window {
+struct WindowSamples {
   Eigen::Map<const Eigen::VectorXd> t;
   Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>> f_b;
   Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>> omega_b;
@@ -28,7 +28,7 @@ struct Window {
 
 // At every later one of the times (m + 1), which lie inside the samples (E-80). Times beyond the last
 // sample stay at what was reached.
-std::vector<Carried> carried(const Window& samples, const Eigen::Map<const Eigen::VectorXd>& times,
+std::vector<Carried> carried(const WindowSamples& samples, const Eigen::Map<const Eigen::VectorXd>& times,
                              const Biases& bias);
 
 }  // namespace gyrofree::navigation

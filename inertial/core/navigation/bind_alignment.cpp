@@ -20,7 +20,7 @@ nb::tuple carried_of(const VectorIn& t, const MatrixIn& f_b, const MatrixIn& ome
     throw std::invalid_argument("samples: want t (n,), f_b (n, 3), omega_b (n, 3)");
   if (times.shape(0) == 0) throw std::invalid_argument("times: want one at least");
   const auto n = static_cast<Eigen::Index>(t.shape(0));
-  const Window samples{map(t), {f_b.data(), n, 3}, {omega_b.data(), n, 3}};
+  const WindowSamples samples{map(t), {f_b.data(), n, 3}, {omega_b.data(), n, 3}};
   const auto rows = carried(samples, map(times), {vector(bias_accel, "bias_accel"), vector(bias_gyro, "bias_gyro")});
   auto C = new_array<nb::ndarray<nb::numpy, double, nb::ndim<3>>>({rows.size(), 3, 3});
   auto u = new_array<MatrixOut>({rows.size(), 3});
