@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.constants import GRAVITY
-from inertial.navigation.earth import gravity
+from inertial.earth import gravity
 from inertial.rate.field import cube_angular_acceleration, cube_specific_force
 from sessions.report.data import Accel, Rate, Run
 from sessions.report.segments import STEP, Segment, reference
