@@ -15,10 +15,6 @@ import numpy as np
 import inertial
 from inertial.attitude.filters import ATTITUDES
 from inertial.navigation.alignment_motion import MotionSettings, MotionWindow
-from inertial.navigation.batch import run_filters
-from inertial.navigation.fix import RTK_FIXED, Fix
-from inertial.navigation.navigation import NAVIGATORS, Mode
-from inertial.navigation.smoother import smooth_drive
 from inertial.rate.estimators import ESTIMATORS
 from inertial.rate.health import HealthMonitor
 from inertial.simulation.faults import AxisFault, Faults
@@ -57,7 +53,6 @@ def warm() -> None:
     """
     logging.disable(logging.INFO)  # the made-up motion is no news
     try:
-        _warm_navigators()
         _warm_rates()
         _warm_health()
         _warm_attitudes()
@@ -106,58 +101,12 @@ def _warm_health() -> None:
         )
 
 
-def _warm_navigators() -> None:
-    for name in (
-        "kf",
-        "huber-nhc",
-        "fpe-fuzzy",
-        "mhe-robust",
-    ):  # the compiled code is the same for all others
-        navigator = NAVIGATORS[name]()
-        f, w = np.array([0.0, 0.0, -9.8]), np.zeros(3)
-        for k in range(1200):
-            t = 0.01 * k
-            if k in (1110, 1150, 1190):
-                navigator.fix(_fix(t - 0.05))
-            navigator.imu(t, f, w)
-            navigator.solution()
-        if navigator.mode != Mode.NAVIGATING:
-            raise RuntimeError(
-                "the made-up drive did not reach navigation: warm.py does not fit alignment.py any"
-                " more"
-            )
-
-
-def _warm_offline() -> None:
-    """The runs over whole drives: not needed live, so only this module's command makes them
-    ready.
-    """
-    n = 1200
-    imu = np.column_stack(
-        [0.01 * np.arange(n), np.tile([0.0, 0.0, -9.8], (n, 1)), np.zeros((n, 3))]
-    )
-    fixes = [_fix(t) for t in (11.05, 11.45, 11.85)]
-    run = run_filters(imu, fixes, ["kf"])["kf"]
-    if not len(run.t) or smooth_drive(imu, fixes) is None:
-        raise RuntimeError(
-            "the made-up drive did not reach navigation: warm.py does not fit alignment.py any more"
-        )
-
-
-def _fix(t: float) -> Fix:
-    sigma = np.full(3, 0.02)
-    return Fix(
-        t, t, 0.7, 0.1, 100.0 + t, RTK_FIXED, sigma, np.array([5.0, 0.0, 0.0]), np.full(3, 0.05)
-    )
-
-
 def main() -> None:
     """Entry point."""
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
     dropped = drop_stale()
     started = time.perf_counter()
     warm()
-    _warm_offline()
     print(
         f"compile cache ready in {time.perf_counter() - started:.1f} s ({dropped} stale files"
         " dropped)"

@@ -20,6 +20,7 @@ from inertial.navigation.batch import run_filters
 from inertial.navigation.filters import DEFAULT, FILTERS, UnknownFilter
 from inertial.navigation.fix import Fix
 from inertial.navigation.navigation import NavigatorConfig
+from inertial.navigation.results import place_of
 from inertial.navigation.smoother import SMOOTHERS, smooth_drive
 from inertial.rotation import rotation_vector, to_matrix
 from logs.drive_log import DriveLog, DriveTruth, read_drive_log
@@ -198,20 +199,20 @@ def against_truth(result: Result, truth: DriveTruth) -> dict[str, Any]:
     out: dict[str, Any] = {}
     parts, places = [], []
     if truth.q_nb is not None:
-        C_bn = x[:, 6:15].reshape(-1, 3, 3).transpose(0, 2, 1)
+        C_bn = x["C_nb"].transpose(0, 2, 1)
         psi = rotation_vector(to_matrix(truth.q_nb[near]) @ C_bn)
         out["tilt_rms_rad"], out["heading_rms_rad"] = _rms(psi[:, :2]), _rms(psi[:, 2:])
         parts, places = [psi], [0, 1, 2]
     if truth.v_n is not None:
         v = np.column_stack([np.interp(t, truth.t, column) for column in truth.v_n.T])
         out["velocity_h_rms_mps"], out["velocity_v_rms_mps"] = (
-            _rms((x[:, 3:6] - v)[:, :2]),
-            _rms((x[:, 3:6] - v)[:, 2:]),
+            _rms((x["v_n"] - v)[:, :2]),
+            _rms((x["v_n"] - v)[:, 2:]),
         )
-        parts, places = [*parts, x[:, 3:6] - v], [*places, 3, 4, 5]
+        parts, places = [*parts, x["v_n"] - v], [*places, 3, 4, 5]
     if truth.position is not None:
         p = np.column_stack([np.interp(t, truth.t, column) for column in truth.position.T])
-        d = np.column_stack(ned_between(p.T, x[:, :3].T)) * (1.0, 1.0, -1.0)
+        d = np.column_stack(ned_between(p.T, place_of(x))) * (1.0, 1.0, -1.0)
         out["position_h_rms_m"], out["position_v_rms_m"] = _rms(d[:, :2]), _rms(d[:, 2:])
         parts, places = [*parts, d], [*places, 6, 7, 8]
     if len(places) == 9 and len(t):

@@ -10,6 +10,7 @@ import numpy as np
 
 from inertial.earth import ned_between
 from inertial.navigation.filters import DEFAULT
+from inertial.navigation.results import place_of
 from logs.drive_log import DriveLog
 from logs.drive_result import Result
 
@@ -56,7 +57,7 @@ def _way(ax: Any, log: DriveLog, lead: Result) -> None:
     first = log.fixes[0]
     origin = first.latitude, first.longitude, first.height
     places = np.array([(f.latitude, f.longitude, f.height) for f in log.fixes])
-    fixes, way = ned_between(origin, places.T), ned_between(origin, lead.x[:, :3].T)
+    fixes, way = ned_between(origin, places.T), ned_between(origin, place_of(lead.x))
     ax.plot(fixes[1], fixes[0], ".", ms=2, color="#E69F00", label="fixes")
     ax.plot(way[1], way[0], lw=1.2, color=COLOURS[0], label="solution")
     ax.set_aspect("equal", adjustable="datalim")

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from inertial.navigation.batch import FilterRun
 from inertial.navigation.fix import RTK_FIXED, Fix
+from inertial.navigation.results import Table
 from inertial.navigation.smoother import SmoothRun
 
 Array = NDArray[np.float64]
@@ -25,7 +26,7 @@ class Result:
     y: Array  # (k, 7) computed - measured: before the correction, or smoothed
     left: Array | None  # (k, 6) after the correction
     yaw: Array  # (k,) at the time of the velocity
-    x: Array  # (k, NOMINAL)
+    x: Table  # (k,), columns NOMINAL of inertial.navigation.results
     P: Array  # (k, 9, 9)
     us_per_epoch: float
 
@@ -55,9 +56,10 @@ def of_filter(run: FilterRun) -> Result:
 
 def of_smoother(run: SmoothRun) -> Result:
     """A smoother's run in the common form."""
-    yaw = np.arctan2(run.x[:, 9], run.x[:, 6])
+    forward = run.x["C_nb"][:, :, 0]
+    yaw = np.arctan2(forward[:, 1], forward[:, 0])
     turn = np.interp(
-        run.t - run.x[:, 28], run.t, np.unwrap(yaw)
+        run.t - run.x["lag_velocity"], run.t, np.unwrap(yaw)
     )  # at the time of the receiver's velocity
     left = np.where(run.used[:, None], run.y[:, :6], np.nan)
     return Result(

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from estimator.devices.navigation import NavBoard, NavOutput
 from estimator.devices.rate import RateOutput
 from estimator.stream import every
-from inertial.navigation.error_model import PSI, ImuNoise
+from inertial.elementary import product
+from inertial.navigation.error_model import ImuNoise
 from inertial.navigation.navigation import NAVIGATORS, NavigatorConfig
-from inertial.navigation.strapdown import C
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,9 @@ NOISE = ImuNoise(
     sigma_bias_gyro=math.radians(6.0),
     tau=10.0,
     shake=0.0,
-)  # of the estimates, not of the readings; 0.5 % of scale error under 1 g is such a rate error in a cube of 10 cm
+)
+# of the estimates, not of the readings; 0.5 % of scale error under 1 g is such a rate error in a
+# cube of 10 cm
 CORRELATED = 1.0  # s, for how long the error that a covariance tells of is one and the same
 LARGEST = math.radians(60.0)  # rad/s; a rate that is less certain than that is not known at all
 SIGMA_RATE = math.radians(6.0)  # rad/s, of the rate's error when navigation begins
@@ -59,7 +61,7 @@ def attitude_noise(P_omega: Array, C_nb: Array) -> Array:
     """Density (3,) of the attitude error's noise in n, rad^2/s, of a rate with covariance P_omega
     (3, 3), b (E-87).
     """
-    P_n = C_nb @ P_omega @ C_nb.T
+    P_n = product(product(C_nb, P_omega), C_nb.T)
     return NOISE.gyro**2 + 2.0 * CORRELATED * np.minimum(np.diag(P_n), LARGEST**2)
 
 
@@ -114,6 +116,6 @@ class GyroFreeNavigation:
     def _believe(self, P_omega: Array) -> None:
         """Let the filters' process noise be what the rate estimator says of itself now."""
         for navigator in self.board.navigators.values():
-            C_nb = navigator.x[C].reshape(3, 3)
-            if C_nb.any():  # it navigates
-                navigator.model.noise[PSI] = attitude_noise(P_omega, C_nb)
+            if navigator.navigating:
+                noise = attitude_noise(P_omega, navigator.nominal.C_nb)
+                navigator.believe_attitude_noise(noise)

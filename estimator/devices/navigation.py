@@ -2,6 +2,7 @@
 
 import logging
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -73,21 +74,39 @@ class NavBoard:
         step = every(period_s, self._limit)
         self._newest = float(t_s[-1]) if epoch != self._epoch else max(self._newest, float(t_s[-1]))
         self._epoch = epoch
-        out = []
-        for row in range(len(t_s)):
-            index = first_index + row
-            for name, navigator in self.navigators.items():
-                for correction in navigator.imu(float(t_s[row]), f_b[row], omega_b[row]):
-                    if (
-                        correction.reason
-                        and not correction.fix.withheld
-                        and not correction.accepted
-                    ):
-                        log.info("%s: %s: fix refused: %s", self.device, name, correction.reason)
-                    out.append(NavOutput(row, index, name, correction))
-                if index % step == step - 1:
-                    out.append(NavOutput(row, index, name, navigator.solution()))
-        return out
+        imu = np.column_stack([t_s, f_b, omega_b])
+        spoken = [k for k in range(len(t_s)) if (first_index + k) % step == step - 1]
+        said = [
+            (row, place, what)
+            for place, navigator in enumerate(self.navigators.values())
+            for row, what in self._run(navigator, imu, spoken)
+        ]
+        said.sort(key=lambda one: one[:2])  # in the samples' order, filters in theirs
+        names = list(self.navigators)
+        for _, place, what in said:
+            self._tell(names[place], what)
+        return [NavOutput(row, first_index + row, names[place], what) for row, place, what in said]
+
+    @staticmethod
+    def _run(
+        navigator: Any, imu: Array, spoken: list[int]
+    ) -> Iterator[tuple[int, Solution | Correction]]:
+        """What one filter says over a batch, and after which row; a solution after those of
+        `spoken`.
+        """
+        done = 0
+        for end in sorted({*(row + 1 for row in spoken), len(imu)}):
+            for row, correction in navigator.feed(imu[done:end]):
+                yield done + row, correction
+            if end - 1 in spoken:
+                yield end - 1, navigator.solution()
+            done = end
+
+    def _tell(self, name: str, what: Solution | Correction) -> None:
+        """A line for the log about a fix that was refused."""
+        if isinstance(what, Correction) and what.reason and not what.fix.withheld:
+            if not what.accepted:
+                log.info("%s: %s: fix refused: %s", self.device, name, what.reason)
 
     def fix(self, fix: Fix) -> None:
         """Hand a fix to every filter; one that comes before the first sample has nothing to

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from inertial.constants import GRAVITY, MILLI_G
 from inertial.core import native
-from inertial.elementary import applied, product
+from inertial.elementary import applied
 
 Array = NDArray[np.float64]
 
@@ -222,8 +222,8 @@ class Layout:
                 f" {wanted} unknowns ({unknowns}): place axes off one plane and one line, four"
                 " triads at corners that span a tetrahedron see everything"
             )
-        normal = product(matrix.T, matrix)
-        return native.solve_positive(normal, np.ascontiguousarray(matrix.T))
+        # by the core, not by LAPACK: every estimate is made with it
+        return native.solve_positive(native.product(matrix.T, matrix), matrix.T)
 
 
 CORNERS = np.array(

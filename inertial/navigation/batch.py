@@ -5,23 +5,24 @@ runs = run_filters(imu, fixes, ["kf", "fpe-fuzzy"])
 runs["kf"].error_ned  # (k, 3) m, computed - fix, before the correction
 """
 
+import copy
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.navigation import estimate as est
+from inertial.core import navigation as core
+from inertial.navigation import results
 from inertial.navigation.alignment import Start
 from inertial.navigation.drag import DragWatch
 from inertial.navigation.filters import FilterConfig, filter_of
-from inertial.navigation.fix import Fix, fix_row
-from inertial.navigation.leg import Leg, copy_leg
-from inertial.navigation.mechanise import NOMINAL
-from inertial.navigation.navigation import Navigator, NavigatorConfig, first_leg
-from inertial.navigation.update import FIX_COLUMNS
+from inertial.navigation.fix import Fix, core_fix
+from inertial.navigation.navigation import NavigatorConfig
+from inertial.navigation.start import Startup, first_leg
 
 Array = NDArray[np.float64]
 
@@ -34,11 +35,11 @@ class FilterRun:
 
     name: str
     fixes: list[Fix]
-    rows: Array  # (k, OUT), columns in estimate
+    rows: results.Table  # (k,), columns RESULT
     began: float  # s, time of the fix that navigation began at; infinite when it never did
     seconds: float  # CPU time of mechanisation, covariance and updates
     epochs: int  # samples in that time
-    leg: Leg | None  # the filter at the end
+    leg: Any  # the core's Leg at the end; None when it never began
 
     @property
     def t(self) -> Array:
@@ -46,73 +47,71 @@ class FilterRun:
         return np.array([fix.t for fix in self.fixes])
 
     @property
-    def status(self) -> NDArray[np.int64]:
-        """USED, REJECTED, WITHHELD, LATE, READMITTED or DOUBTED of estimate, (k,)."""
-        return self.rows[:, est.O_STATUS].astype(np.int64)
+    def status(self) -> NDArray[np.int32]:
+        """USED, REJECTED, WITHHELD, LATE, READMITTED or DOUBTED of results, (k,)."""
+        return self.rows["status"]
 
     @property
     def fed(self) -> NDArray[np.bool_]:
         """Fixes that the filter used, (k,)."""
-        return np.isin(self.status, (est.USED, est.READMITTED, est.DOUBTED))
+        return np.isin(self.status, (results.USED, results.READMITTED, results.DOUBTED))
 
     @property
     def withheld(self) -> NDArray[np.bool_]:
         """Fixes that it was not given, (k,)."""
-        return self.status == est.WITHHELD
+        return self.status == results.WITHHELD
 
     @property
     def innovation(self) -> Array:
         """Computed - measured before the correction, (k, 7): position N E h m, v_n m/s, heading
         rad; NaN: absent.
         """
-        return self.rows[:, est.O_Y : est.O_Y + 7]
+        return self.rows["y"]
 
     @property
     def innovation_sigma(self) -> Array:
         """1-sigma of it as the filter expects, (k, 7)."""
-        return self.rows[:, est.O_SIGMA : est.O_SIGMA + 7]
+        return self.rows["sigma"]
 
     @property
     def residual(self) -> Array:
         """Computed - measured after the correction, (k, 6); NaN where nothing was corrected."""
-        return self.rows[:, est.O_LEFT : est.O_LEFT + 6]
+        return self.rows["left"]
 
     @property
     def error_ned(self) -> Array:
         """Computed - measured position of the antenna before the correction, (k, 3) m."""
-        return self.rows[:, est.O_ERROR : est.O_ERROR + 3]
+        return self.rows["error_ned"]
 
     @property
     def yaw(self) -> Array:
         """Heading at the time of the fix's velocity, before the correction, (k,) rad."""
-        return self.rows[:, est.O_YAW]
+        return self.rows["yaw"]
 
     @property
     def nis(self) -> Array:
         """(k,), to be compared with `dof`."""
-        return self.rows[:, est.O_NIS]
+        return self.rows["nis"]
 
     @property
-    def dof(self) -> Array:
+    def dof(self) -> NDArray[np.int32]:
         """Rows of each fix, (k,)."""
-        return self.rows[:, est.O_DOF]
+        return self.rows["dof"]
 
     @property
-    def horizon(self) -> Array:
+    def horizon(self) -> NDArray[np.int32]:
         """Fixes looked back, (k,); 0 for filters without a horizon."""
-        return self.rows[:, est.O_N]
+        return self.rows["horizon"]
 
     @property
-    def x(self) -> Array:
-        """Nominal state after the fix (before it where it was not used), (k, NOMINAL), slices of
-        strapdown.
-        """
-        return self.rows[:, est.O_X : est.O_X + NOMINAL]
+    def x(self) -> results.Table:
+        """Nominal state after the fix (before it where it was not used), (k,), columns NOMINAL."""
+        return self.rows["x"]
 
     @property
     def P(self) -> Array:
         """Covariance of psi_n, dv_n, dN dE dh then, (k, 9, 9)."""
-        return self.rows[:, est.O_P : est.O_P + 81].reshape(-1, 9, 9)
+        return self.rows["P"]
 
 
 def run_filters(
@@ -153,97 +152,95 @@ def run_filters(
     return runs
 
 
+@dataclass(frozen=True)
+class Found:
+    """Where a filter takes over from the alignment."""
+
+    startup: Startup
+    start: Start
+    fix: Fix
+    next_fix: int  # place of the first fix after it
+
+
 class Drive:
-    """The samples as the compiled code wants them, the fixes as a table, the alignment once it is
-    known.
-    """
+    """The samples, the fixes as the core takes them, the alignment once it is known."""
 
     def __init__(self, imu: Array, fixes: Sequence[Fix], config: NavigatorConfig) -> None:
-        self.t, self.f, self.w = imu[:, 0].copy(), imu[:, 1:4].copy(), imu[:, 4:7].copy()
+        self.imu, self.t = imu, imu[:, 0].copy()
         self.config = config
-        settle = config.settle
         good = [fix for fix in fixes if not config.fix.objection(fix)]
         watch = DragWatch()
-        by_use = sorted(good, key=lambda fix: fix.due(settle))
+        by_use = sorted(good, key=lambda fix: fix.due(config.settle))
         self.fixes = [
             watch.take(fix) if fix.arrival >= self.t[0] else fix for fix in by_use
         ]  # live they need samples
-        self.due = np.array([fix.due(settle) for fix in self.fixes])
-        self.table = np.array([fix_row(fix, config.fix) for fix in self.fixes]).reshape(
-            -1, FIX_COLUMNS
-        )
-        self.gaps = (
-            np.flatnonzero(np.diff(self.t) > config.longest_gap) + 1
-        )  # first samples after one
-        self._first: tuple[Navigator, Start, Fix, int] | None = None
+        self.due = np.array([fix.due(config.settle) for fix in self.fixes])
+        self.core_fixes = [core_fix(fix, config.fix) for fix in self.fixes]
+        # first samples after one
+        self.gaps = np.flatnonzero(np.diff(self.t) > config.longest_gap) + 1
+        self._first: Found | None = None
 
     def run(
         self, name: str, chosen: FilterConfig, begin: Callable[[Start], Start] | None
     ) -> FilterRun:
-        nav = Navigator(self.config, chosen)
-        rows, used = np.empty((len(self.fixes), est.OUT)), []
-        k = j = done = epochs = 0
-        began, seconds, leg = math.inf, 0.0, None
-        while k < len(self.t):
-            found = self.align(nav, k, j)
-            if found is None:
-                break
-            start, fix, j = found
-            leg = first_leg(self.config, chosen, begin(start) if begin else start, fix)
-            level = float(np.linalg.norm(nav.align.mean_f)) if nav.align.levelled else 9.80665
-            memory = chosen.memory(nav.model.n, leg.P, level)
-            began = min(began, fix.t)
-            k = int(np.searchsorted(self.t, fix.t, side="right"))
-            behind = self.gaps[self.gaps > k]
-            end = int(behind[0]) if len(behind) else len(self.t)
-            last = int(np.searchsorted(self.due, self.t[end - 1], side="right"))
-            out = rows[done : done + max(0, last - j)]
+        """One filter over the whole drive, anew after each gap."""
+        model = chosen.model(self.config.imu)
+        settings = chosen.settings(self.config.fix, self.config.lever_arm_b)
+        rows, used = [np.empty(0, results.RESULT)], []
+        began, seconds, epochs, leg = math.inf, 0.0, 0, None
+        found = self.first()
+        while found is not None:
+            start = begin(found.start) if begin else found.start
+            leg = first_leg(self.config, chosen, start, found.fix)
+            memory = chosen.memory(leg.P, found.startup.still_f)
+            began = min(began, found.fix.t)
+            k, end, last = self.stretch(found)
             clock = time.thread_time_ns()
-            est.run(
-                leg,
-                nav.model,
-                nav.settings,
-                memory,
-                self.t,
-                self.f,
-                self.w,
-                k,
-                end,
-                self.table[j:last],
-                out,
-            )
+            fixes = self.core_fixes[found.next_fix : last]
+            rows.append(results.run(leg, model, settings, memory, self.imu, k, end, fixes))
             seconds += (time.thread_time_ns() - clock) * 1e-9
             epochs += end - k
-            used += self.fixes[j:last]
-            done, j, k = len(used), max(j, last), end
-            if k < len(self.t):
-                copy_leg(leg, nav._head)
-                nav._memory = memory
-                nav._after_gap(float(self.t[k] - self.t[k - 1]))
-        return FilterRun(name, used, rows[:done].copy(), began, seconds, epochs, leg)
+            used += self.fixes[found.next_fix : last]
+            if end == len(self.t):
+                break
+            found.startup.history = core.Live()
+            found.startup.after_gap(leg.x)
+            found = self._find(found.startup, end, max(found.next_fix, last))
+        return FilterRun(name, used, np.concatenate(rows), began, seconds, epochs, leg)
 
-    def align(self, nav: Navigator, k: int, j: int) -> tuple[Start, Fix, int] | None:
-        """Feed samples from k and fixes from j as the live path does until navigation can begin.
-
-        Returns the start, its fix and the first fix after it; the first alignment is remembered, it
-        is everybody's.
+    def stretch(self, found: Found) -> tuple[int, int, int]:
+        """First sample after a start, first one after the gap that ends it, and first fix that is
+        due after that.
         """
-        if k == 0 and self._first is not None:
-            seen, start, fix, j = self._first
-            nav.align = seen.align
-            return start, fix, j
-        caught: list[tuple[Start, Fix]] = []
-        nav.begin = lambda start, fix: caught.append((start, fix))  # type: ignore[method-assign]
-        nav._advance_head = lambda: None  # type: ignore[method-assign]
-        nav.watch = None
-        for i in range(k, len(self.t)):
-            nav.imu(float(self.t[i]), self.f[i], self.w[i])
-            while not caught and j < len(self.fixes) and self.due[j] <= self.t[i]:
-                nav._use(self.fixes[j])
-                j += 1
-            if caught:
-                start, fix = caught[0]
-                if k == 0:
-                    self._first = (nav, start, fix, j)
-                return start, fix, j
+        k = int(np.searchsorted(self.t, found.fix.t, side="right"))
+        behind = self.gaps[self.gaps > k]
+        end = int(behind[0]) if len(behind) else len(self.t)
+        last = int(np.searchsorted(self.due, self.t[end - 1], side="right"))
+        return k, end, max(last, found.next_fix)
+
+    def first(self) -> Found | None:
+        """The first start, which is everybody's; None when it is never fit for navigation."""
+        if self._first is None:
+            startup = Startup(self.config.alignment, core.Live())
+            self._first = self._find(startup, 0, 0)
+        return copy.deepcopy(self._first)
+
+    def _find(self, startup: Startup, k: int, j: int) -> Found | None:
+        """Feed samples from k and fixes from j as the live path does until navigation can begin."""
+        while k < len(self.t):
+            end = len(self.t)
+            if j < len(self.due):
+                end = min(end, int(np.searchsorted(self.t, self.due[j], side="left")) + 1)
+            end = max(end, k + 1)
+            for gap in self.gaps[(self.gaps >= k) & (self.gaps < end)]:
+                startup.feed(self.imu[k:gap])
+                startup.history = core.Live()
+                k = int(gap)
+            startup.feed(self.imu[k:end])
+            k = end
+            while j < len(self.fixes) and self.due[j] <= self.t[k - 1]:
+                fix, j = self.fixes[j], j + 1
+                start = None if fix.withheld or fix.v_n is None else startup.fix(fix)
+                if start is not None:
+                    return Found(startup, start, fix, j)
         return None

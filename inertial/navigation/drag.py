@@ -13,16 +13,17 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from inertial.navigation.earth import ned_between
+from inertial.core import navigation as core
+from inertial.earth import ned_between
+from inertial.elementary import norm
 from inertial.navigation.fix import Fix
 
 Array = NDArray[np.float64]
 
-E, B, LAG = slice(0, 3), slice(3, 6), 6
+DRAG, LAG = slice(3, 6), 6  # of the core's DragFilter
 UP = np.array([1.0, 1.0, -1.0])
 
 
@@ -72,16 +73,12 @@ class DragWatch:
     @property
     def drag(self) -> Array:
         """(3,) m/s north, east, up, by which the position walks off as far as is known."""
-        return self._x[B].copy() if self._last is not None else np.zeros(3)
+        return self._filter.x[DRAG] if self._last is not None else np.zeros(3)
 
     @property
     def statistic(self) -> float:
         """Squared drag in its own sigmas, 3 degrees of freedom."""
-        return (
-            float(self._x[B] @ np.linalg.solve(self._P[B, B], self._x[B]))
-            if self._last is not None
-            else 0.0
-        )
+        return self._filter.statistic() if self._last is not None else 0.0
 
     def take(self, fix: Fix) -> Fix:
         """The fix as the filters may have it. One that is withheld or has no velocity passes and
@@ -112,17 +109,17 @@ class DragWatch:
         """The sigma that is honest while the position drags: by as much as it may have walked
         off.
         """
-        speed = float(np.linalg.norm(self._x[B]))
+        speed = float(norm(self.drag))
         walked = speed * (fix.t - self._calm_since)
-        return replace(fix, sigma_p=np.hypot(fix.sigma_p, walked), drag=speed)
+        return replace(fix, sigma_p=np.sqrt(fix.sigma_p**2 + walked**2), drag=speed)
 
     def _begin(self, fix: Fix) -> None:
         s = self.settings
-        self._x = np.zeros(7)
-        self._x[LAG] = self._lag
         white = (s.white * fix.sigma_p) ** 2
-        self._P = np.diag(
-            [*(white + (s.wander * fix.sigma_p) ** 2), *[s.sigma_drag**2] * 3, self._sigma_lag**2]
+        offset = white + (s.wander * fix.sigma_p) ** 2
+        variances = [*offset, *[s.sigma_drag**2] * 3, self._sigma_lag**2]
+        self._filter = core.DragFilter(
+            x=[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self._lag], P=np.diag(variances)
         )
         self._walk, self._last = np.zeros(3), fix
         self._origin = (fix.latitude, fix.longitude, fix.height)
@@ -142,56 +139,12 @@ class DragWatch:
             [walk * dt + bend + np.abs(wander - before), walk * dt / s.memory**2]
         )
         walked = self._walk + 0.5 * (fix.v_n + last.v_n) * UP * dt
-        north, east, down = ned_between(*self._origin, fix.latitude, fix.longitude, fix.height)
+        north, east, down = ned_between(self._origin, (fix.latitude, fix.longitude, fix.height))
         y = np.array([north, east, -down]) - walked
         white = (s.white * fix.sigma_p) ** 2
-        if not look(self._x, self._P, dt, noise, y, fix.v_n * UP - self._v0, white, self._jump):
+        if not self._filter.look(dt, noise, y, fix.v_n * UP - self._v0, white, self._jump):
             return False  # as if it had not come: its velocity must not be integrated either
         self._last, self._walk = fix, walked
-        self._lag, self._sigma_lag = (
-            float(self._x[LAG]),
-            math.hypot(math.sqrt(self._P[LAG, LAG]), 0.01),
-        )
+        self._lag = float(self._filter.x[LAG])
+        self._sigma_lag = math.sqrt(float(self._filter.P[LAG, LAG]) + 0.01**2)
         return True
-
-
-@njit(cache=True)
-def look(
-    x: Array, P: Array, dt: float, noise: Array, y: Array, speed: Array, white: Array, gate: float
-) -> bool:
-    """Predict x (7,), P (7, 7) by dt s with noise (6,), correct by y (3,) axis by axis (E-52); in
-    place.
-
-    speed (3,) is the velocity now less the one at the origin, which the age multiplies; white (3,)
-    the variance of y. False, and nothing done, when the sum of the squared normalised innovations
-    is above the gate.
-    """
-    x0, P0 = x.copy(), P.copy()
-    for i in range(3):
-        x[i] += dt * x[3 + i]
-    for i in range(3):
-        for j in range(7):
-            P[i, j] += dt * P[3 + i, j]
-    for i in range(3):
-        for j in range(7):
-            P[j, i] += dt * P[j, 3 + i]
-    for i in range(6):
-        P[i, i] += noise[i]
-    nis = 0.0
-    Ph, K = np.empty(7), np.empty(7)
-    for i in range(3):
-        for j in range(7):
-            Ph[j] = P[j, i] + P[j, 6] * speed[i]
-        S = Ph[i] + Ph[6] * speed[i] + white[i]
-        e = y[i] - x[i] - x[6] * speed[i]
-        nis += e * e / S
-        for j in range(7):
-            K[j] = Ph[j] / S
-        for j in range(7):
-            x[j] += K[j] * e
-            for k in range(7):
-                P[j, k] -= K[j] * Ph[k]
-    if nis > gate:
-        x[:], P[:] = x0, P0
-        return False
-    return True

@@ -1,23 +1,30 @@
-"""Error model of the strapdown mechanisation: its states and the noise that drives them. leg.py
-carries it.
+"""Error model of the strapdown mechanisation: its states and the noise that drives them.
 
-Error state (15,), error = computed - true, positions in metres:
+Error state, error = computed - true, positions in metres, with its segments:
     psi_n (3, rad)  dv_n (3, m/s)  dN dE dh (m)  B (3, m/s^2)  D (3, rad/s)
 with C_true = Exp(psi) C_computed, B and D what is left of the biases after the current estimates.
-Equations E-26 to E-31 of docs/equations-ins.md (inmotion-alignment, sections 3 to 5, metres form;
-each entry is tested against finite differences of the mechanisation).
+Further states stand at the end where a filter asks for them. Equations E-26 to E-31 of
+docs/equations-ins.md; inertial/core/navigation/ carries them, and each entry is tested against
+finite differences of the mechanisation.
 """
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from inertial.core import navigation as core
 
 Array = NDArray[np.float64]
 
 STATES = 15
 PSI, DV, DP, B, D = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15)
+
+SCALE = {"scale_accel": 3, "scale_gyro": 3}
+LAG = {"lag_position": 1, "lag_velocity": 1}
+CAR = {"mount_pitch": 1, "mount_yaw": 1, "axle": 1}
 
 
 @dataclass(frozen=True)
@@ -33,9 +40,33 @@ class ImuNoise:
     shake: float = 1.0
     position: float = 1e-3  # m/sqrt(s), keeps the position covariance from closing completely
 
-    def vector(self) -> Array:
-        """(17,): diagonal of the noise density G (15), then the two Gauss-Markov rates 1/tau."""
-        a = 1.0 / self.tau
+    def density(self) -> Array:
+        """(15,): diagonal of the noise density G (E-29)."""
         psi, v, p = self.gyro**2, self.accel**2, self.position**2
-        ba, bg = 2.0 * a * self.sigma_bias_accel**2, 2.0 * a * self.sigma_bias_gyro**2
-        return np.array([psi] * 3 + [v] * 3 + [p] * 3 + [ba] * 3 + [bg] * 3 + [a, a])
+        ba = 2.0 / self.tau * self.sigma_bias_accel**2
+        bg = 2.0 / self.tau * self.sigma_bias_gyro**2
+        return np.repeat([psi, v, p, ba, bg], 3)
+
+    def decay(self) -> Array:
+        """(15,) 1/s: attitude, velocity and position do not, biases do."""
+        rate = 1.0 / self.tau
+        return np.repeat([0.0, 0.0, 0.0, rate, rate], 3)
+
+
+def make_model(noise: ImuNoise, scale: bool = False, lag: bool = False, car: bool = False) -> Any:
+    """The core's Model of a filter; options as in FilterConfig. Further states are constants."""
+    segments: dict[str, int] = {}
+    for wanted, more in ((scale, SCALE), (lag, LAG), (car, CAR)):
+        segments.update(more if wanted else {})
+    places, states = {}, STATES
+    for name, size in segments.items():
+        places[name] = states
+        states += size
+    extra = np.zeros(states - STATES)
+    return core.Model(
+        states=states,
+        density=np.concatenate([noise.density(), extra]),
+        decay=np.concatenate([noise.decay(), extra]),
+        shake=noise.shake,
+        **places,
+    )

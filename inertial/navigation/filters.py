@@ -4,22 +4,21 @@ compares them.
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.core import navigation as core
 from inertial.navigation import fuzzy
-from inertial.navigation.constraints import Rules
-from inertial.navigation.error_model import ImuNoise
-from inertial.navigation.estimate import Memory, Settings
+from inertial.navigation.error_model import ImuNoise, make_model
 from inertial.navigation.fix import FixSettings
-from inertial.navigation.leg import Model, make_model, new_leg
-from inertial.navigation.window import ARRIVAL_KF, ARRIVAL_MEAN, ARRIVAL_P0, CAPACITY, new_window
 
 Array = NDArray[np.float64]
 
-ARRIVALS = {"p0": ARRIVAL_P0, "mean": ARRIVAL_MEAN, "kf": ARRIVAL_KF}
+# values of enums of the core, inertial/core/navigation/window.hpp and filter.hpp
+ARRIVALS = {"p0": 0, "mean": 1, "kf": 2}
+WINDOWS = {"none": 0, "predictive": 1, "robust": 2}
 
 
 @dataclass(frozen=True)
@@ -42,6 +41,22 @@ class Constraints:
     sigma_mount: float = math.radians(4.0)  # rad, of both mounting angles at the start
     axle: float = 1.0  # m, the rear axle behind the IMU, at the start
     sigma_axle: float = 1.0  # m
+
+    def core(self) -> Any:
+        """The core's Rules."""
+        return core.Rules(
+            every=self.every if self.car or self.standstill else math.inf,
+            sigma_side=self.sigma_side,
+            sigma_up=self.sigma_up,
+            least_speed=self.least_speed,
+            most_turn=self.most_turn,
+            still_v=self.still_v,
+            still_w=self.still_w,
+            still_speed=self.still_speed if self.standstill else -1.0,
+            still_f_change=self.still_f_change,
+            still_w_change=self.still_w_change,
+            huber=self.huber,
+        )
 
 
 @dataclass(frozen=True)
@@ -69,8 +84,10 @@ class FilterConfig:
     constraints: Constraints = Constraints()
     gated: bool = True  # refuse fixes beyond FixSettings.gate
 
-    def model(self, noise: ImuNoise) -> Model:
-        """The states of this filter."""
+    low_weight: float = 0.2  # of a fix that a robust filter hardly believes
+
+    def model(self, noise: ImuNoise) -> Any:
+        """The states of this filter, the core's Model."""
         return make_model(noise, self.scale, self.latency, self.constraints.car)
 
     def extra_sigma(self) -> list[float]:
@@ -82,61 +99,38 @@ class FilterConfig:
             + [c.sigma_mount, c.sigma_mount, c.sigma_axle] * c.car
         )
 
-    def settings(self, fix: FixSettings, lever_arm_b: tuple[float, float, float]) -> Settings:
-        """As the compiled code takes it."""
-        gates = np.array(
-            [math.inf, *(fix.gate(dof) if self.gated else math.inf for dof in range(1, 8))]
-        )
-        c = self.constraints
-        every = c.every if c.car or c.standstill else math.inf
-        rules = Rules(
-            every,
-            c.sigma_side,
-            c.sigma_up,
-            c.least_speed,
-            c.most_turn,
-            c.still_v,
-            c.still_w,
-            c.still_speed if c.standstill else -1.0,
-            c.still_f_change,
-            c.still_w_change,
-            c.huber,
-        )
-        kind = ("none", "predictive", "robust").index(self.window)
-        return Settings(
-            gates,
-            fix.readmit_after,
-            self.fading,
-            self.huber,
-            kind,
-            self.horizon,
-            ARRIVALS[self.arrival],
-            self.kappa,
-            self.passes,
-            int(self.literal),
-            self.rules.vector(),
-            rules,
-            np.array(lever_arm_b, dtype=np.float64),
+    def settings(self, fix: FixSettings, lever_arm_b: tuple[float, float, float]) -> Any:
+        """The core's Settings."""
+        gates = [fix.gate(dof) if self.gated else math.inf for dof in range(1, 8)]
+        return core.Settings(
+            gates=[math.inf, *gates],
+            readmit=fix.readmit_after,
+            fading=self.fading,
+            huber=self.huber,
+            low_weight=self.low_weight,
+            window=WINDOWS[self.window],
+            horizon=self.horizon,
+            arrival=ARRIVALS[self.arrival],
+            kappa=self.kappa,
+            passes=self.passes,
+            literal=self.literal,
+            fuzzy=self.rules.core(),
+            rules=self.constraints.core(),
+            lever_b=lever_arm_b,
         )
 
-    def memory(self, n: int, P0: Array, still_f: float) -> Memory:
-        """Everything the filter remembers besides its leg, at the start of navigation with
-        covariance P0 (n, n).
+    def memory(self, P0: Array, still_f: float) -> Any:
+        """The core's Memory: all that the filter remembers besides its leg, at the start of
+        navigation with covariance P0 (n, n).
         """
-        window = new_window(n, CAPACITY if self.window != "none" else 0)
-        window.P0[:] = P0
-        window.Pk[:] = P0
+        memory = core.new_memory(len(P0), core.CAPACITY if self.window != "none" else 0)
+        memory.still_f = still_f
+        window = memory.window
+        window.P0 = window.kalman = P0
         if self.mean_covariance is not None:
-            window.mean[:] = np.array(self.mean_covariance)
-            window.count[2] = -1  # given: nothing is summed up
-        return Memory(
-            window,
-            new_leg(n),
-            np.zeros(2, np.int64),
-            np.array([still_f]),
-            np.zeros((3, n, n)),
-            np.zeros(n),
-        )
+            window.sum = self.mean_covariance
+            window.seen = -1  # given: nothing is summed up
+        return memory
 
 
 _CAR = Constraints(car=True, standstill=True)

@@ -3,23 +3,13 @@ it.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from inertial.navigation.update import (
-    F_GEO,
-    F_HAS_V,
-    F_HAS_YAW,
-    F_SIGMA,
-    F_T,
-    F_TIMING,
-    F_V,
-    F_WITHHELD,
-    F_YAW,
-    FIX_COLUMNS,
-)
+from inertial.core import navigation as core
 
 Array = NDArray[np.float64]
 
@@ -123,23 +113,22 @@ def typical_sigma(quality: int) -> tuple[Array, Array]:
     return np.array(position), np.array(velocity)
 
 
-def fix_row(fix: Fix, settings: FixSettings) -> Array:
-    """A row (FIX_COLUMNS,) of the compiled filters' table, see update: numbers and floored sigmas
-    (E-31).
-    """
-    row = np.zeros(FIX_COLUMNS)
-    row[F_T] = fix.t
-    row[F_GEO : F_GEO + 3] = fix.latitude, fix.longitude, fix.height
-    row[F_SIGMA : F_SIGMA + 3] = np.maximum(fix.sigma_p, settings.floor_p)
+def core_fix(fix: Fix, settings: FixSettings) -> Any:
+    """The fix as the core's filters take it, its sigmas floored (E-31)."""
+    given: dict[str, Any] = {}
     if fix.v_n is not None:
-        row[F_V : F_V + 3] = fix.v_n
-        row[F_SIGMA + 3 : F_SIGMA + 6] = np.maximum(fix.sigma_v, settings.floor_v)
-        row[F_HAS_V] = 1.0
+        given |= {"has_v": True, "v_n": fix.v_n}
+        given |= {"sigma_v": np.maximum(fix.sigma_v, settings.floor_v)}
     if fix.yaw is not None:
-        row[F_YAW], row[F_SIGMA + 6], row[F_HAS_YAW] = (
-            fix.yaw,
-            max(fix.sigma_yaw, settings.floor_yaw),
-            1.0,
-        )
-    row[F_WITHHELD], row[F_TIMING] = float(fix.withheld), settings.timing
-    return row
+        given |= {"has_yaw": True, "yaw": fix.yaw}
+        given |= {"sigma_yaw": max(fix.sigma_yaw, settings.floor_yaw)}
+    return core.Fix(
+        t=fix.t,
+        latitude=fix.latitude,
+        longitude=fix.longitude,
+        height=fix.height,
+        sigma_p=np.maximum(fix.sigma_p, settings.floor_p),
+        withheld=fix.withheld,
+        timing=settings.timing,
+        **given,
+    )

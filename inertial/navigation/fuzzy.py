@@ -9,10 +9,12 @@ import math
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from inertial.core import navigation as core
 
 Array = NDArray[np.float64]
 
@@ -42,10 +44,11 @@ class FuzzyRules:
     )
     minimum: bool = False  # combine the sets by their minimum instead of their product
 
-    def vector(self) -> Array:
-        """(16,) as the compiled code takes it."""
-        rules = [value for row in self.table for value in row]
-        return np.array([*self.force, *self.rate, *rules, float(self.minimum)])
+    def core(self) -> Any:
+        """As the core's filters take it."""
+        return core.FuzzyRules(
+            force=self.force, rate=self.rate, table=self.table, minimum=self.minimum
+        )
 
 
 def read_rules(path: Path = DEFAULT_FILE) -> FuzzyRules:
@@ -92,43 +95,24 @@ def _points(path: Path, key: str, value: object) -> tuple[float, float, float]:
     return a, b, c
 
 
-@njit(cache=True)
-def membership(value: float, points: Array, out: Array) -> None:
-    """S, M, H (3,) of a value: a partition of unity over three break points."""
-    s = min(1.0, max(0.0, (points[1] - value) / (points[1] - points[0])))
-    h = min(1.0, max(0.0, (value - points[1]) / (points[2] - points[1])))
-    out[0], out[1], out[2] = s, 1.0 - s - h, h
-
-
 RULES = read_rules()
+
+
+def membership(value: float, points: tuple[float, float, float]) -> Array:
+    """S, M, H (3,) of a value: a partition of unity over three break points."""
+    return core.membership(value, points)
 
 
 def memberships(force: float, rate: float, rules: FuzzyRules = RULES) -> list[float]:
     """Six numbers in the order of MEMBERSHIPS, for |f| in m/s^2 and |w| in rad/s."""
-    out = np.empty(6)
-    membership(force, np.array(rules.force), out[:3])
-    membership(rate, np.array(rules.rate), out[3:])
-    return out.tolist()
+    return [*membership(force, rules.force).tolist(), *membership(rate, rules.rate).tolist()]
 
 
-@njit(cache=True)
-def horizon(force: float, rate: float, rules: Array) -> float:
-    """1 + No, not yet rounded, from |f| in m/s^2 and |w| in rad/s; rules as FuzzyRules.vector
-    (E-49).
-    """
-    a, b = np.empty(3), np.empty(3)
-    membership(force, rules[0:3], a)
-    membership(rate, rules[3:6], b)
-    total = weight = 0.0
-    for i in range(3):
-        for j in range(3):
-            w = min(a[i], b[j]) if rules[15] > 0.0 else a[i] * b[j]
-            weight += w
-            total += w * rules[6 + 3 * i + j]
-    return 1.0 + total / weight
+def horizon(force: float, rate: float, rules: FuzzyRules = RULES) -> float:
+    """1 + No, not yet rounded, from |f| in m/s^2 and |w| in rad/s (E-49)."""
+    return core.crisp_horizon(force, rate, rules.core())
 
 
-@njit(cache=True)
 def fixes(crisp: float) -> int:
     """N: the horizon rounded half up, 2 to 10 fixes (E-49)."""
-    return int(min(10.0, max(2.0, math.floor(crisp + 0.5))))
+    return core.whole_horizon(crisp)

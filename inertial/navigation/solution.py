@@ -3,11 +3,12 @@
 import math
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.navigation import estimate as est
+from inertial.navigation import results
 from inertial.navigation.fix import Fix
 
 Array = NDArray[np.float64]
@@ -91,15 +92,15 @@ def nothing_compared(fix: Fix) -> Correction:
     return Correction(fix, np.empty(0), np.empty(0), 0.0, True, np.empty(0))
 
 
-def correction_of(fix: Fix, row: Array) -> Correction:
-    """The compiled filter's results (OUT,) for a fix."""
-    status, m = int(row[est.O_STATUS]), int(row[est.O_DOF])
-    accepted = status in (est.USED, est.READMITTED, est.DOUBTED)
-    weight = float(row[est.O_WEIGHT : est.O_WEIGHT + 3].min())
+def correction_of(fix: Fix, said: Any) -> Correction:
+    """The core's FixResult for a fix."""
+    status, m = said.status, said.dof
+    accepted = status in (results.USED, results.READMITTED, results.DOUBTED)
+    weight = float(said.weight.min())
     reason = ""
-    if status == est.REJECTED:
-        reason, weight = f"NIS {row[est.O_NIS]:.0f} of {m}", 0.0
-    elif status == est.WITHHELD:
+    if status == results.REJECTED:
+        reason, weight = f"NIS {said.nis:.0f} of {m}", 0.0
+    elif status == results.WITHHELD:
         reason, weight = MUTED if fix.muted else WITHHELD, 0.0
     elif weight < 1.0:
         reason = f"weighted down to {weight:.2f}"
@@ -110,21 +111,22 @@ def correction_of(fix: Fix, row: Array) -> Correction:
         )
         reason = f"{drag}; {reason}" if reason else drag
     horizon = None
-    if row[est.O_N] > 0.0:
-        fuzzy = math.isfinite(row[est.O_INPUT])
-        inputs = (float(row[est.O_INPUT]), float(row[est.O_INPUT + 1])) if fuzzy else None
-        horizon = HorizonChoice(int(row[est.O_N]), float(row[est.O_CRISP]), inputs)
+    if said.horizon > 0:
+        force, rate = said.inputs.tolist()
+        horizon = HorizonChoice(
+            said.horizon, said.crisp, (force, rate) if math.isfinite(force) else None
+        )
     return Correction(
         fix,
-        row[est.O_Y : est.O_Y + m].copy(),
-        row[est.O_SIGMA : est.O_SIGMA + m].copy(),
-        float(row[est.O_NIS]),
+        said.y[:m],
+        said.sigma[:m],
+        said.nis,
         accepted,
-        row[est.O_ERROR : est.O_ERROR + 3].copy(),
+        said.error_ned,
         reason,
-        float(row[est.O_YAW]),
+        said.yaw,
         weight,
-        row[est.O_LEFT : est.O_LEFT + 6].copy() if accepted else None,
+        said.left if accepted else None,
         horizon,
     )
 

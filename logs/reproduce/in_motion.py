@@ -9,18 +9,18 @@ filter with a high gain makes small and which is no error.
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inertial.constants import GRAVITY
 from inertial.earth import radii
-from inertial.navigation import estimate as est
+from inertial.navigation import results
 from inertial.navigation.alignment import Alignment, AlignmentSettings, Start
 from inertial.navigation.error_model import ImuNoise
 from inertial.navigation.filters import FILTERS, Constraints, FilterConfig
-from inertial.navigation.fix import Fix, FixSettings, fix_row
+from inertial.navigation.fix import Fix, FixSettings, core_fix
 from inertial.navigation.navigation import NavigatorConfig, first_leg
 from inertial.rotation import euler_matrix, rotation_vector
 from inertial.simulation.drive import Tuning
@@ -157,8 +157,8 @@ def run(
 
 def run_with_memory(
     inputs: Inputs, begin: Begin, chosen: FilterConfig, tuning: Tuning, noise: ImuNoise = HONEST
-) -> tuple[Errors, est.Memory]:
-    """As run, with the filter's memory for those who need its covariances."""
+) -> tuple[Errors, Any]:
+    """As run, with the core's Memory for those who need its covariances."""
     config = NavigatorConfig(
         lever_arm_b=inputs.lever_arm_b,
         imu=tuned(tuning, noise),
@@ -171,28 +171,18 @@ def run_with_memory(
     fix = inputs.fixes[begin.fix]
     model = chosen.model(config.imu)
     leg = first_leg(config, chosen, start, fix)
-    memory = chosen.memory(model.n, leg.P, begin.still_f)
-    rows = np.array([fix_row(f, BELIEVED) for f in inputs.fixes[begin.fix + 1 :]])
-    rows[:, 8:14] *= math.sqrt(tuning.r_scale)
-    t, f, w = (np.ascontiguousarray(inputs.imu[:, part]) for part in (0, slice(1, 4), slice(4, 7)))
-    out = np.empty((len(rows), est.OUT))
-    est.run(
-        leg,
-        model,
-        chosen.settings(BELIEVED, inputs.lever_arm_b),
-        memory,
-        t,
-        f,
-        w,
-        begin.sample,
-        len(t),
-        rows,
-        out,
-    )
+    memory = chosen.memory(leg.P, begin.still_f)
+    given = [core_fix(f, BELIEVED) for f in inputs.fixes[begin.fix + 1 :]]
+    for f in given:
+        f.sigma_p = f.sigma_p * math.sqrt(tuning.r_scale)
+        f.sigma_v = f.sigma_v * math.sqrt(tuning.r_scale)
+    settings = chosen.settings(BELIEVED, inputs.lever_arm_b)
+    imu = np.ascontiguousarray(inputs.imu)
+    out = results.run(leg, model, settings, memory, imu, begin.sample, len(imu), given)
     return _errors(inputs, begin.fix, out), memory
 
 
-def _errors(inputs: Inputs, first: int, out: Array) -> Errors:
+def _errors(inputs: Inputs, first: int, out: results.Table) -> Errors:
     said = Errors()
     began = inputs.fixes[first].t
     for row, fix, where, v_n, k in zip(
@@ -203,13 +193,13 @@ def _errors(inputs: Inputs, first: int, out: Array) -> Errors:
         range(first + 1, len(inputs.fixes)),
         strict=True,
     ):
-        if row[est.O_N] > 0.0:
-            said.horizon.append((fix.t, row[est.O_N], row[est.O_INPUT], row[est.O_INPUT + 1]))
-        x = row[est.O_X : est.O_X + 15]
+        if row["horizon"] > 0:
+            said.horizon.append((fix.t, row["horizon"], *row["inputs"]))
+        x = row["x"]
         psi = (
             None
             if inputs.C_nb is None
-            else rotation_vector(inputs.C_nb[k] @ x[6:15].reshape(3, 3).T)
+            else rotation_vector(inputs.C_nb[k] @ x["C_nb"].T)
         )
         if psi is not None:
             said.t_from_start.append(fix.t - began)
@@ -221,16 +211,16 @@ def _errors(inputs: Inputs, first: int, out: Array) -> Errors:
         said.error.append(
             np.array(
                 [
-                    (x[0] - where[0]) * (meridian + where[2]),
-                    (x[1] - where[1]) * (normal + where[2]) * math.cos(where[0]),
-                    x[2] - where[2],
-                    *(x[3:6] - v_n),
+                    (x["latitude"] - where[0]) * (meridian + where[2]),
+                    (x["longitude"] - where[1]) * (normal + where[2]) * math.cos(where[0]),
+                    x["height"] - where[2],
+                    *(x["v_n"] - v_n),
                 ]
             )
         )
         if not fix.withheld:
-            said.prediction.append(row[est.O_Y : est.O_Y + 6].copy())
-            said.residual.append(row[est.O_LEFT : est.O_LEFT + 6].copy())
+            said.prediction.append(row["y"][:6].copy())
+            said.residual.append(row["left"].copy())
         if psi is not None:
             said.attitude.append(psi)
     return said

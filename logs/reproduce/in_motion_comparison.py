@@ -93,7 +93,7 @@ def mean_covariance(seeds: tuple[int, ...] = CALIBRATION) -> Array:
         inputs = inputs_of(simulate(seed, "B"))
         kf = in_motion.plain("fpe-mean-n1", arrival="kf")
         _, memory = in_motion.run_with_memory(inputs, in_motion.align(inputs), kf, Tuning())
-        means.append(memory.window.mean / memory.window.count[2])
+        means.append(memory.window.sum / memory.window.seen)
     return np.mean(means, axis=0)
 
 

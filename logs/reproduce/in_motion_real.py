@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.earth import radii
-from inertial.navigation import estimate as est
-from inertial.navigation.fix import AUTONOMOUS, RTK_FIXED, Fix, FixSettings, fix_row
+from inertial.navigation import results
+from inertial.navigation.fix import AUTONOMOUS, RTK_FIXED, Fix, FixSettings, core_fix
 from inertial.navigation.navigation import NavigatorConfig, first_leg
 from inertial.simulation.drive import (
     OUTLIERS,
@@ -145,14 +145,11 @@ def reference(drive: Any) -> Array:
     config, chosen = NavigatorConfig(), in_motion.plain("kf")
     leg = first_leg(config, chosen, begin.start, drive.fixes[begin.fix])
     model = chosen.model(config.imu)
-    rows = np.array([fix_row(f, FixSettings()) for f in drive.fixes[begin.fix + 1 :]])
-    t, f, w = (np.ascontiguousarray(drive.imu[:, part]) for part in (0, slice(1, 4), slice(4, 7)))
-    out = np.empty((len(rows), est.OUT))
-    settings, memory = (
-        chosen.settings(FixSettings(), (0.0, 0.0, 0.0)),
-        chosen.memory(model.n, leg.P, begin.still_f),
-    )
-    est.run(leg, model, settings, memory, t, f, w, begin.sample, len(t), rows, out)
+    given = [core_fix(f, FixSettings()) for f in drive.fixes[begin.fix + 1 :]]
+    settings = chosen.settings(FixSettings(), (0.0, 0.0, 0.0))
+    memory = chosen.memory(leg.P, begin.still_f)
+    imu = np.ascontiguousarray(drive.imu)
+    out = results.run(leg, model, settings, memory, imu, begin.sample, len(imu), given)
     C_nb = np.full((len(drive.fixes), 3, 3), math.nan)
-    C_nb[begin.fix + 1 :] = out[:, est.O_X + 6 : est.O_X + 15].reshape(-1, 3, 3)
+    C_nb[begin.fix + 1 :] = out["x"]["C_nb"]
     return C_nb

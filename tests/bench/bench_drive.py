@@ -15,12 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator.warm import warm
+from inertial.core import navigation as core
 from inertial.navigation.batch import run_filters
-from inertial.navigation.error_model import ImuNoise
+from inertial.navigation.error_model import ImuNoise, make_model
 from inertial.navigation.filters import DEFAULT
-from inertial.navigation.leg import make_model, new_leg, run_leg
-from inertial.navigation.mechanise import TIME
 from inertial.navigation.navigation import NAVIGATORS
 from inertial.simulation.drive import simulate
 from logs.drive import run_drive
@@ -34,14 +32,13 @@ OUTAGES = [(float(start), 30.0) for start in (120, 200, 280, 360, 440)]
 def core_us(imu: np.ndarray) -> float:
     """us per sample of mechanisation, Phi and Q alone, in one call."""
     model, best = make_model(ImuNoise()), math.inf
-    t, f, w = imu[:, 0].copy(), imu[:, 1:4].copy(), imu[:, 4:7].copy()
     for _ in range(3):
-        leg = new_leg(model.n)
-        leg.x[:3], leg.x[6:15] = (0.7, -1.8, 1600.0), np.eye(3).ravel()
-        leg.acc[TIME] = t[0] - 0.01
+        leg = core.new_leg(model.states)
+        leg.x.latitude, leg.x.longitude, leg.x.height = 0.7, -1.8, 1600.0
+        leg.time = imu[0, 0] - 0.01
         started = time.thread_time_ns()
-        run_leg(leg, model, t, f, w, 0, len(t), math.inf, math.inf)
-        best = min(best, (time.thread_time_ns() - started) / 1000.0 / len(t))
+        leg.run(model, imu)
+        best = min(best, (time.thread_time_ns() - started) / 1000.0 / len(imu))
     return best
 
 
@@ -84,7 +81,6 @@ def main() -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else data / "car_drive"
     if not (folder / "imu.csv").is_file():
         sys.exit(f"{folder}: no imu.csv there; name the folder of the drive, or set GYROFREE_DATA")
-    warm()
     log = read_drive_log(folder)
     print(json.dumps({"bench": "drive core", "us_per_epoch": core_us(log.imu)}), flush=True)
     print(

@@ -131,8 +131,12 @@ def test_a_filter_is_led_astray_less_far(town, monkeypatch: pytest.MonkeyPatch) 
 
     def end(run) -> float:
         row = town.row_of(run.t[-1])
-        north = (run.x[-1, 0] - town.truth.latitude[row]) / METRE
-        east = (run.x[-1, 1] - town.truth.longitude[row]) / METRE * math.cos(run.x[-1, 0])
+        north = (run.x["latitude"][-1] - town.truth.latitude[row]) / METRE
+        east = (
+            (run.x["longitude"][-1] - town.truth.longitude[row])
+            / METRE
+            * math.cos(run.x["latitude"][-1])
+        )
         return math.hypot(north, east)
 
     assert end(blind) > 50.0 and end(watched) < 0.6 * end(blind)

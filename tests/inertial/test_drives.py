@@ -5,9 +5,9 @@ are as stated.
 import numpy as np
 import pytest
 
-from inertial.navigation.strapdown import SIZE, C, V, step, workspace
 from inertial.simulation.drive import CONDITIONS, DEG, Condition, Sensors, gauss_markov, simulate
 from inertial.simulation.drive_path import RATE, drive_truth
+from tests.inertial.twins.strapdown import State, step
 
 PERFECT = Condition(
     "no errors at all",
@@ -35,19 +35,18 @@ def test_the_filters_mechanisation_follows_the_truth(seed):
     local one.
     """
     truth = drive_truth(seed)
-    x = np.zeros(SIZE)
-    x[:3] = truth.latitude[0], truth.longitude[0], truth.height[0]
-    x[V], x[C] = truth.v_n[0], truth.C_nb[0].ravel()
-    work = workspace()
+    place = truth.latitude[0], truth.longitude[0], truth.height[0]
+    x = State(*place, truth.v_n[0], truth.C_nb[0])
     for k in range(1, len(truth.t)):
-        step(x, truth.f_b[k], truth.omega_ib_b[k], 1.0 / RATE, work)
-    metres = (
-        np.array([x[0] - truth.latitude[-1], (x[1] - truth.longitude[-1]) * np.cos(x[0])]) * 6.37e6
-    )
-    assert np.abs(metres).max() < 1.0  # after 300 s; 1e-5 m/s^2 of difference would give 0.45 m
-    assert abs(x[2] - truth.height[-1]) < 0.05
-    np.testing.assert_allclose(x[V], truth.v_n[-1], atol=0.01)
-    np.testing.assert_allclose(x[C].reshape(3, 3), truth.C_nb[-1], atol=1e-5)
+        x = step(x, truth.f_b[k], truth.omega_ib_b[k], 1.0 / RATE)
+    north = x.latitude - truth.latitude[-1]
+    east = (x.longitude - truth.longitude[-1]) * np.cos(x.latitude)
+    assert (
+        max(abs(north), abs(east)) * 6.37e6 < 1.0
+    )  # after 300 s; 1e-5 m/s^2 of difference would give 0.45 m
+    assert abs(x.height - truth.height[-1]) < 0.05
+    np.testing.assert_allclose(x.v_n, truth.v_n[-1], atol=0.01)
+    np.testing.assert_allclose(x.C_nb, truth.C_nb[-1], atol=1e-5)
 
 
 def test_a_drive_is_a_drive():

@@ -10,19 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from inertial.core import navigation as core
 from inertial.navigation import fuzzy
-from inertial.navigation.window import (
-    ARRIVAL_KF,
-    arrival,
-    forward,
-    kf_beside,
-    new_window,
-    push,
-    robust,
-)
+from inertial.navigation.filters import ARRIVALS
 
 Array = NDArray[np.float64]
-n = 15
+n, MOVING = 15, 9
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +26,8 @@ def epochs() -> dict[str, Array]:
     draw = np.random.default_rng(7)
     k = 12
     Phi = np.eye(n) + 0.1 * draw.normal(size=(k, n, n)) * (draw.random((k, n, n)) < 0.3)
+    Phi[:, MOVING:] = 0.0  # biases only decay
+    Phi[:, range(MOVING, n), range(MOVING, n)] = draw.uniform(0.8, 1.0, size=(k, n - MOVING))
     root = 0.05 * draw.normal(size=(k, n, n))
     H = np.zeros((k, 7, n))
     H[:, 0:3, 6:9] = np.eye(3)
@@ -54,14 +49,21 @@ def epochs() -> dict[str, Array]:
 
 
 def filled(e: dict[str, Array], count: int):
-    window = new_window(n)
-    window.P0[:], window.Pk[:] = e["P"], e["P"]
+    """The core's window with the first fixes of e in it."""
+    window = core.new_window(n, core.CAPACITY)
+    window.P0 = window.kalman = e["P"]
     for k in range(count):
-        push(window, e["Phi"][k], e["Q"][k], e["y"][k], e["H"][k], e["R"][k], 6, window.Pk)
-        place = (window.count[1] + window.count[0] - 1) % len(window.y)
-        window.c[place] = e["c"][k]
-        kf_beside(window)
+        Phi = core.Transition(upper=e["Phi"][k][:MOVING], decay=np.diag(e["Phi"][k]))
+        z = core.Measurement(y=e["y"][k][:6], H=e["H"][k][:6], R=e["R"][k][:6, :6])
+        window.push(Phi, e["Q"][k], z, window.kalman)
+        newest(window).applied = e["c"][k]
+        window.kalman_beside()
     return window
+
+
+def newest(window):
+    """The last fix of a window, and what the last pass made of it."""
+    return window.of_last(1, 0)
 
 
 def batch(e: dict[str, Array], last: int, N: int, P: Array) -> Array:
@@ -117,10 +119,11 @@ def backward(e: dict[str, Array], last: int, N: int, P: Array) -> Array:
 @pytest.mark.parametrize("N", [1, 2, 3, 5, 10])
 def test_forward_backward_and_batch_are_one_estimate(epochs: dict[str, Array], N: int) -> None:
     window = filled(epochs, 12)
-    newest = forward(window, N, epochs["P"], np.ones((11, 3)))
-    sigma = np.sqrt(np.diag(window.P[newest, 1]))
+    window.forward(N, epochs["P"])
+    end = newest(window)
+    sigma = np.sqrt(np.diag(end.P_after))
     for other in (backward(epochs, 11, N, epochs["P"]), batch(epochs, 11, N, epochs["P"])):
-        assert np.abs((window.m[newest, 1] - other) / sigma).max() < 1e-9
+        assert np.abs((end.after - other) / sigma).max() < 1e-9
 
 
 @pytest.mark.parametrize("N", [1, 2, 5, 10])
@@ -138,25 +141,23 @@ def test_with_the_kalman_covariance_it_is_the_kalman_filter(
         e["c"][k] = K @ e["y"][k][:6]
         P = P - K @ H @ P
     window = filled(e, 12)
-    assert np.allclose(window.Pk, P, atol=1e-10)
-    P_arr = np.empty((n, n))
-    held = arrival(window, N, ARRIVAL_KF, 1.0, P_arr)
-    newest = forward(window, held, P_arr, np.ones((11, 3)))
-    assert held == N
-    assert np.abs((window.m[newest, 1] - e["c"][11]) / np.sqrt(np.diag(P))).max() < 1e-9
-    assert np.allclose(window.P[newest, 1], P, atol=1e-9)
+    assert np.allclose(window.kalman, P, atol=1e-10)
+    window.forward(N, window.arrival(N, ARRIVALS["kf"], 1.0))
+    end = newest(window)
+    assert np.abs((end.after - e["c"][11]) / np.sqrt(np.diag(P))).max() < 1e-9
+    assert np.allclose(end.P_after, P, atol=1e-9)
 
 
 def test_one_fix_without_motion_is_the_published_gain(epochs: dict[str, Array]) -> None:
     e = {key: value.copy() for key, value in epochs.items()}
     e["Phi"][:], e["Q"][:] = np.eye(n), 0.0
     window = filled(e, 1)
-    newest = forward(window, 1, e["P"], np.ones((11, 3)))
+    window.forward(1, e["P"])
     H, R = e["H"][0][:6], e["R"][0][:6, :6]
     L1 = np.linalg.solve(
         np.linalg.inv(e["P"]) + H.T @ np.linalg.solve(R, H), H.T @ np.linalg.inv(R)
     )
-    assert np.allclose(window.m[newest, 1], L1 @ e["y"][0][:6], atol=1e-12)
+    assert np.allclose(newest(window).after, L1 @ e["y"][0][:6], atol=1e-12)
 
 
 def test_a_robust_horizon_doubts_the_one_gross_fix(epochs: dict[str, Array]) -> None:
@@ -164,17 +165,20 @@ def test_a_robust_horizon_doubts_the_one_gross_fix(epochs: dict[str, Array]) -> 
     e["y"] *= 0.3
     e["c"][:] = 0.0
     clean = filled(e, 10)
-    plain = forward(clean, 10, e["P"], np.ones((11, 3)))
-    truth = clean.m[plain, 1].copy()
+    clean.forward(10, e["P"])
+    truth = newest(clean).after
     e["y"][6, 0] += 40.0
-    window, scale, scratch = filled(e, 10), np.ones((11, 3)), np.empty((11, n))
-    wrong = np.abs(window.m[forward(window, 10, e["P"], scale), 1] - truth).max()
-    better = np.abs(window.m[robust(window, 10, e["P"], 2.5, 5, scale, scratch), 1] - truth).max()
+    window = filled(e, 10)
+    window.forward(10, e["P"])
+    wrong = np.abs(newest(window).after - truth).max()
+    window.robust(10, e["P"], 2.5, 5)
+    better = np.abs(newest(window).after - truth).max()
     assert better < 0.3 * wrong
+    scale = np.array([window.of_last(10, j).scale for j in range(10)])
     assert scale[6, 0] < 0.1 and scale[[0, 1, 2, 9], 0].min() > 0.5
 
 
-RULES = fuzzy.FuzzyRules().vector()
+RULES = fuzzy.FuzzyRules()
 
 
 @pytest.mark.parametrize(

@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from inertial.navigation.window import forward
-from tests.inertial.test_horizon import epochs, filled, n
+from tests.inertial.test_horizon import epochs, filled, n, newest
 
 Array = NDArray[np.float64]
 __all__ = ["epochs"]  # the fixture of the tests beside
-
-ONES = np.ones((11, 3))
 
 
 def measured(e: dict[str, Array], k: int) -> tuple[Array, Array, Array]:
@@ -25,10 +22,11 @@ def test_with_no_doubt_of_the_past_the_gain_is_l1_of_the_disturbance(epochs) -> 
     closed loop.
     """
     window = filled(epochs, 12)
-    newest = forward(window, 1, 1e-14 * np.eye(n), ONES)
+    window.forward(1, 1e-14 * np.eye(n))
+    end = newest(window)
     H, W, y = measured(epochs, 11)
     L1 = np.linalg.solve(np.linalg.inv(epochs["Q"][11]) + H.T @ W @ H, H.T @ W)
-    np.testing.assert_allclose(window.m[newest, 1], L1 @ y, atol=1e-10)
+    np.testing.assert_allclose(end.after, L1 @ y, atol=1e-10)
 
 
 @pytest.mark.parametrize("N", [2, 4])
@@ -37,7 +35,8 @@ def test_with_no_doubt_of_the_past_a_longer_horizon_starts_from_the_old_estimate
 ) -> None:  # noqa: F811
     """P -> 0: the state N fixes ago is 0 for sure, only the disturbances are free."""
     window = filled(epochs, 12)
-    newest = forward(window, N, 1e-14 * np.eye(n), ONES)
+    window.forward(N, 1e-14 * np.eye(n))
+    end = newest(window)
     x, P = np.zeros(n), np.zeros((n, n))
     for k in range(12 - N, 12):
         x, P = epochs["Phi"][k] @ x, epochs["Phi"][k] @ P @ epochs["Phi"][k].T + epochs["Q"][k]
@@ -45,14 +44,15 @@ def test_with_no_doubt_of_the_past_a_longer_horizon_starts_from_the_old_estimate
         K = P @ H.T @ np.linalg.inv(H @ P @ H.T + np.linalg.inv(W))
         x, P = x + K @ (y - H @ x), P - K @ H @ P
         x = x - (epochs["c"][k] if k < 11 else 0.0)
-    np.testing.assert_allclose(window.m[newest, 1], x, atol=1e-9)
+    np.testing.assert_allclose(end.after, x, atol=1e-9)
 
 
 @pytest.mark.parametrize("N", [5, 10])
 def test_with_no_trust_in_the_past_only_the_horizon_counts(epochs, N: int) -> None:  # noqa: F811
     """P -> infinity: the finite-memory (FIR) estimate, least squares without an arrival term."""
     window = filled(epochs, 12)
-    newest = forward(window, N, 1e8 * np.eye(n), ONES)
+    window.forward(N, 1e8 * np.eye(n))
+    end = newest(window)
     size, ks = n * (N + 1), range(12 - N, 12)
     T, d, rows, right = np.hstack([np.eye(n), np.zeros((n, n * N))]), np.zeros(n), [], []
     for j, k in enumerate(ks):
@@ -66,8 +66,8 @@ def test_with_no_trust_in_the_past_only_the_horizon_counts(epochs, N: int) -> No
         right += [np.zeros(n), white @ (y - H @ d)]
     z, _, rank, _ = np.linalg.lstsq(np.vstack(rows), np.concatenate(right), rcond=None)
     assert rank == size  # so many fixes determine all states
-    sigma = np.sqrt(np.diag(window.P[newest, 1]))
-    assert np.abs((window.m[newest, 1] - (T @ z + d)) / sigma).max() < 1e-5
+    sigma = np.sqrt(np.diag(end.P_after))
+    assert np.abs((end.after - (T @ z + d)) / sigma).max() < 1e-5
 
 
 @pytest.mark.parametrize("N", [1, 3, 10])
@@ -77,7 +77,8 @@ def test_the_published_recursion_is_the_one_without_inverses(epochs, N: int) -> 
     """
     e = dict(epochs) | {"c": np.zeros_like(epochs["c"])}
     window = filled(e, 12)
-    newest = forward(window, N, e["P"], ONES)
+    window.forward(N, e["P"])
+    end = newest(window)
     S, s, kept = np.zeros((n, n)), np.zeros(n), []
     for k in range(11, 11 - N, -1):
         H, W, y = measured(e, k)
@@ -93,5 +94,5 @@ def test_the_published_recursion_is_the_one_without_inverses(epochs, N: int) -> 
     for k, (gain, Sk, sk) in zip(range(12 - N, 12), reversed(kept), strict=True):
         carried = e["Phi"][k] @ hat
         hat = carried + gain @ (sk - Sk @ carried)
-    sigma = np.sqrt(np.diag(window.P[newest, 1]))
-    assert np.abs((window.m[newest, 1] - hat) / sigma).max() < 1e-8
+    sigma = np.sqrt(np.diag(end.P_after))
+    assert np.abs((end.after - hat) / sigma).max() < 1e-8

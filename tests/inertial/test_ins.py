@@ -1,26 +1,17 @@
 """Phi and H against finite differences of the mechanisation; the filter's algebra against numpy."""
 
-import math
+import pickle
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from support.estimator_drive import DT, exact
 
-from inertial.navigation import update
-from inertial.navigation.earth import ned_between
-from inertial.navigation.error_model import STATES, ImuNoise
-from inertial.navigation.leg import (
-    Leg,
-    close,
-    current_covariance,
-    make_model,
-    new_leg,
-    reset,
-    run_leg,
-)
-from inertial.navigation.mechanise import NOMINAL, TIME
-from inertial.navigation.strapdown import LAT, LON, C, H, V, rotation_vector, step, workspace
+from inertial.core import navigation as core
+from inertial.earth import ned_between
+from inertial.navigation.error_model import STATES, ImuNoise, make_model
+from inertial.rotation import rotation_vector
+from tests.inertial.twins.strapdown import State, step
 
 Array = NDArray[np.float64]
 
@@ -44,43 +35,50 @@ MODEL = make_model(ImuNoise(tau=1e9))
 STEPS = np.repeat([1e-4, 1e-2, 1.0, 1e-3, 1e-4], 3)
 
 
-def disturbed(x: Array, error: Array) -> Array:
+def leg_at(x: State, model=None):
+    """A leg whose nominal state is x."""
+    leg = core.new_leg((model or MODEL).states)
+    for name in ("latitude", "longitude", "height", "v_n", "C_nb", "bias_accel", "bias_gyro"):
+        setattr(leg.x, name, getattr(x, name))
+    return leg
+
+
+def state_of(x) -> State:
+    """The core's nominal state as the twin's."""
+    place = x.latitude, x.longitude, x.height
+    return State(*place, x.v_n, x.C_nb, x.bias_accel, x.bias_gyro)
+
+
+def disturbed(x: State, error: Array) -> State:
     """Nominal state whose error (computed - true) against true x is `error`."""
-    out = full(x)
-    reset(out, -error, MODEL)
-    return out
+    leg = leg_at(x)
+    leg.reset(-error, MODEL)
+    return state_of(leg.x)
 
 
-def full(x: Array) -> Array:
-    """A nominal state with the numbers that only some filters use, all zero."""
-    return np.concatenate([x[:21], np.zeros(NOMINAL - 21)])
-
-
-def error_of(x: Array, true: Array) -> Array:
+def error_of(x: State, true: State) -> Array:
     """Error state of x against the truth."""
-    north, east, _ = ned_between(true[LAT], true[LON], true[H], x[LAT], x[LON], x[H])
-    psi = rotation_vector(true[C].reshape(3, 3) @ x[C].reshape(3, 3).T)
+    north, east, _ = ned_between(true.place, x.place)
     return np.concatenate(
         [
-            psi,
-            x[V] - true[V],
-            [north, east, x[H] - true[H]],
-            true[15:18] - x[15:18],
-            true[18:21] - x[18:21],
+            rotation_vector(true.C_nb @ x.C_nb.T),
+            x.v_n - true.v_n,
+            [north, east, x.height - true.height],
+            true.bias_accel - x.bias_accel,
+            true.bias_gyro - x.bias_gyro,
         ]
     )
 
 
-def run(x: Array, imu: Array, model=None, cuts: tuple[int, ...] = ()) -> Leg:
+def run(x: State, imu: Array, model=None, cuts: tuple[int, ...] = ()):
+    """The closed leg after samples imu from x."""
     model = model or MODEL
-    leg = new_leg(model.n)
-    leg.x[:] = full(x)
-    t, f, w = imu[:, 0].copy(), imu[:, 1:4].copy(), imu[:, 4:7].copy()
-    leg.acc[TIME] = t[0] - DT
+    leg = leg_at(x, model)
+    leg.time = imu[0, 0] - DT
     k = 0
-    for stop in (*cuts, len(t)):
-        k = run_leg(leg, model, t, f, w, k, stop, math.inf, math.inf)
-    close(leg, model)
+    for stop in (*cuts, len(imu)):
+        k = leg.run(model, imu, k, stop)
+    leg.close(model)
     return leg
 
 
@@ -93,12 +91,13 @@ def test_error_and_disturbance_agree() -> None:
 def test_transition_matches_finite_differences() -> None:
     truth, imu = exact(9.0)
     start, second = truth[800], imu[800:900]
-    Phi = run(start, second).Phi
+    Phi = run(start, second).transition()
     numeric = np.empty((STATES, STATES))
     for j in range(STATES):
         e = np.zeros(STATES)
         e[j] = STEPS[j]
-        plus, minus = run(disturbed(start, e), second).x, run(disturbed(start, -e), second).x
+        plus = state_of(run(disturbed(start, e), second).x)
+        minus = state_of(run(disturbed(start, -e), second).x)
         numeric[:, j] = (error_of(plus, truth[900]) - error_of(minus, truth[900])) / (
             2.0 * STEPS[j]
         )
@@ -108,24 +107,20 @@ def test_transition_matches_finite_differences() -> None:
     assert np.abs(Phi - numeric).max() < 0.01
 
 
-def test_registers_compute_what_the_reference_step_does() -> None:
+def test_the_core_computes_what_the_twin_does() -> None:
     truth, imu = exact(20.0, ba=np.array([0.1, -0.2, 0.05]), bg=np.array([0.01, 0.002, -0.004]))
-    x, work = truth[0].copy(), workspace()
+    x = truth[0]
     for row in imu:
-        step(x, row[1:4], row[4:7], DT, work)
-    leg = run(truth[0], imu)
-    assert np.abs(ned_between(*x[:3], *leg.x[:3])).max() < 1e-8
-    assert np.abs(leg.x[3:15] - x[3:15]).max() < 1e-10
+        x = step(x, row[1:4], row[4:7], DT)
+    end = state_of(run(truth[0], imu).x)
+    assert np.abs(ned_between(x.place, end.place)).max() < 1e-8
+    assert np.abs(end.v_n - x.v_n).max() < 1e-10
+    assert np.abs(end.C_nb - x.C_nb).max() < 1e-10
 
 
 def test_cutting_the_samples_changes_no_bit() -> None:
     truth, imu = exact(7.3)
-    whole, cut = run(truth[0], imu), run(truth[0], imu, cuts=(1, 2, 57, 100, 333, 334, 729))
-    assert (
-        np.array_equal(whole.x, cut.x)
-        and np.array_equal(whole.Phi, cut.Phi)
-        and np.array_equal(whole.Q, cut.Q)
-    )
+    assert run(truth[0], imu) == run(truth[0], imu, cuts=(1, 2, 57, 100, 333, 334, 729))
 
 
 @pytest.mark.parametrize("lever", [np.array([0.8, -0.4, -1.1]), np.zeros(3)])
@@ -134,25 +129,22 @@ def test_measurement_matches_finite_differences(lever: Array, lags: tuple[float,
     truth, imu = exact(9.0)
     model = make_model(ImuNoise(tau=1e9), lag=True)
     leg = run(truth[800], imu[800:850], model)
-    x, w = leg.x.copy(), imu[850, 4:7] + np.array([0.1, -0.2, 0.3])
-    x[27:29] = lags
-    row = np.zeros(update.FIX_COLUMNS)
-    row[1:4], row[4:7], row[7] = x[:3], x[V], 0.3
-    y, H_rows, unused = np.empty(7), np.empty((7, model.n)), np.empty((7, model.n))
-    leg.x[:] = x
-    update.residual(leg, model, w, lever, row, y, H_rows)
-    numeric = np.empty((7, model.n))
+    w = imu[850, 4:7] + np.array([0.1, -0.2, 0.3])
+    x = leg.x
+    fix = core.Fix(latitude=x.latitude, longitude=x.longitude, height=x.height, v_n=x.v_n, yaw=0.3)
+    x.lag_position, x.lag_velocity = lags
+    kept = pickle.dumps(leg)
+    H_rows = leg.compared(model, w, lever, fix).H
+    numeric = np.empty((7, model.states))
     steps = np.concatenate([STEPS, [1e-3, 1e-3]])
-    for j in range(model.n):
+    for j in range(model.states):
         ends = []
         for side in (1.0, -1.0):
-            e = np.zeros(model.n)
+            e = np.zeros(model.states)
             e[j] = side * steps[j]
-            leg.x[:] = x
-            reset(leg.x, -e, model)
-            value = np.empty(7)
-            update.residual(leg, model, w, lever, row, value, unused)
-            ends.append(value)
+            moved = pickle.loads(kept)
+            moved.reset(-e, model)
+            ends.append(moved.compared(model, w, lever, fix).y)
         numeric[:, j] = (ends[0] - ends[1]) / (2.0 * steps[j])
     if (
         lags[1] > 0.0
@@ -169,49 +161,32 @@ def test_gain_covariance_and_nis_are_the_textbook_ones() -> None:
     draw = np.random.default_rng(4)
     A = draw.normal(size=(STATES, STATES))
     P = A @ A.T + np.eye(STATES)
-    H_rows, y = np.zeros((7, STATES)), np.zeros(7)
-    H_rows[:6], y[:6] = draw.normal(size=(6, STATES)), draw.normal(size=6)
-    B = draw.normal(size=(6, 6))
-    R = np.zeros((7, 7))
-    R[:6, :6] = B @ B.T + np.eye(6)
-    PHt, S, G, u, c = (
-        np.empty((STATES, 7)),
-        np.empty((7, 7)),
-        np.empty((7, 7)),
-        np.empty(7),
-        np.empty(STATES),
-    )
-    update.innovate(P, y, H_rows, R, 6, PHt, S)
-    nis = update.factor(S, y, 6, G, u)
-    Hm, Rm, ym, Sm = H_rows[:6], R[:6, :6], y[:6], S[:6, :6]
-    K = P @ Hm.T @ np.linalg.inv(Sm)
-    U = np.eye(STATES) - K @ Hm
-    joseph = U @ P @ U.T + K @ Rm @ K.T
-    after = P.copy()
-    update.absorb(after, PHt, G, u, 6, c)
-    assert np.allclose(Sm, Hm @ P @ Hm.T + Rm)
-    assert nis == pytest.approx(ym @ np.linalg.solve(Sm, ym))
-    assert (
-        np.allclose(c, K @ ym)
-        and np.allclose(after, joseph, atol=1e-9)
-        and np.allclose(after, after.T)
-    )
-    inflated = P.copy()
-    factor = update.consistent(inflated, 1e3 * y, H_rows, R, 6, PHt, S, G, u)
+    H, y, B = draw.normal(size=(6, STATES)), draw.normal(size=6), draw.normal(size=(6, 6))
+    R = B @ B.T + np.eye(6)
+    z = core.Measurement(y=y, H=H, R=R)
+    _, S = core.innovate(P, z)
+    error, after, nis = core.absorb(P, z)
+    K = P @ H.T @ np.linalg.inv(S)
+    U = np.eye(STATES) - K @ H
+    joseph = U @ P @ U.T + K @ R @ K.T
+    assert np.allclose(S, H @ P @ H.T + R)
+    assert nis == pytest.approx(y @ np.linalg.solve(S, y))
+    assert np.allclose(error, K @ y)
+    assert np.allclose(after, joseph, atol=1e-9) and np.array_equal(after, after.T)
+    z.y = 1e3 * y
+    factor, inflated = core.make_consistent(P, z)
     assert factor > 1.0 and np.allclose(inflated, factor * P)
-    assert update.factor(S, 1e3 * y, 6, G, u) <= 6.0
+    assert core.absorb(inflated, z)[2] <= 6.0
 
 
 def test_process_noise_of_standing_still_grows_as_it_should() -> None:
     truth, imu = exact(10.0, still=100.0)
     noise = ImuNoise()
     model = make_model(noise)
-    leg = new_leg(model.n)
-    leg.x[:21] = truth[0]
-    leg.P[:] = 0.0
-    t, f, w = imu[:, 0].copy(), imu[:, 1:4].copy(), imu[:, 4:7].copy()
-    run_leg(leg, model, t, f, w, 0, len(t), math.inf, math.inf)
-    P = current_covariance(leg, model)
+    leg = leg_at(truth[0], model)
+    leg.P = np.zeros((STATES, STATES))
+    leg.run(model, imu)
+    P = leg.covariance(model)
     walk = 2.0 / noise.tau * noise.sigma_bias_gyro**2 * 10.0**3 / 3.0
     assert P[2, 2] == pytest.approx(noise.gyro**2 * 10.0 + walk, rel=0.02)
     tilt = (9.8 * noise.gyro) ** 2 * 10.0**3 / 3.0  # of velocity, by tilt that walks

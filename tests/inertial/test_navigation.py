@@ -10,17 +10,18 @@ import pytest
 from numpy.typing import NDArray
 from support.estimator_drive import DT, drive, exact, fix_at
 
-from inertial.navigation.earth import ned_between
+from inertial.earth import ned_between
 from inertial.navigation.error_model import ImuNoise
 from inertial.navigation.navigation import Mode, Navigator
-from inertial.navigation.strapdown import LAT, LON, C, H, V, dcm_to_euler, rotation_vector
+from inertial.rotation import euler_angles, rotation_vector
+from tests.inertial.twins.strapdown import State
 
 Array = NDArray[np.float64]
 STILL = 12.0  # s
 
 
 @pytest.fixture(scope="module")
-def perfect() -> tuple[Array, Array]:
+def perfect() -> tuple[list[State], Array]:
     return exact(72.0, still=STILL)
 
 
@@ -34,7 +35,7 @@ def play(navigator: Navigator, imu: Array, fixes: list) -> list:
     return corrections
 
 
-def test_noiseless_gives_the_truth_also_with_late_fixes(perfect: tuple[Array, Array]) -> None:
+def test_noiseless_gives_the_truth_also_with_late_fixes(perfect: tuple[list[State], Array]) -> None:
     truth, imu = perfect
     ends = []
     for delay in (0.0, 0.35):
@@ -44,7 +45,7 @@ def test_noiseless_gives_the_truth_also_with_late_fixes(perfect: tuple[Array, Ar
         s, end = navigator.solution(), truth[-1]
         assert s.mode == Mode.NAVIGATING
         assert np.abs(s.p_ned - truth_ned(end, s.origin)).max() < 0.02
-        assert np.abs(s.v_n - end[V]).max() < 0.03
+        assert np.abs(s.v_n - end.v_n).max() < 0.03
         assert all(c.accepted for c in corrections)
         assert 0.0 < s.fix_age < 1.5
         ends.append(s)
@@ -52,23 +53,28 @@ def test_noiseless_gives_the_truth_also_with_late_fixes(perfect: tuple[Array, Ar
     assert np.abs(ends[0].p_ned - ends[1].p_ned).max() < 0.005
 
 
-def truth_ned(x: Array, origin: tuple[float, float, float]) -> Array:
-    return np.array(ned_between(*origin, x[LAT], x[LON], x[H]))
+def truth_ned(x: State, origin: tuple[float, float, float]) -> Array:
+    return np.array(ned_between(origin, (x.latitude, x.longitude, x.height)))
 
 
-def test_fixes_between_samples_are_used_at_their_instant(perfect: tuple[Array, Array]) -> None:
+def test_fixes_between_samples_are_used_at_their_instant(
+    perfect: tuple[list[State], Array],
+) -> None:
     truth, imu = perfect
     navigator = Navigator()
     play(navigator, imu[: int(60 / DT)], [f for f in drive(truth, imu).fixes if f.t < 58.0])
     half = 59.0 + 0.5 * DT
-    between = fix_at(0.5 * (truth[5900] + truth[5901]), half, np.zeros(3), np.zeros(3), 0.01, 0.05)
+    a, b = truth[5900], truth[5901]
+    place = (0.5 * (p + q) for p, q in zip(a.place, b.place, strict=True))
+    middle = State(*place, 0.5 * (a.v_n + b.v_n), a.C_nb)
+    between = fix_at(middle, half, np.zeros(3), np.zeros(3), 0.01, 0.05)
     navigator.fix(between)
     (correction,) = navigator.imu(60.01, imu[6000, 1:4], imu[6000, 4:7])
     assert np.abs(correction.error_ned).max() < 0.05  # 12 m/s times half a sample would be 0.06
 
 
 def test_an_outlier_is_refused_and_a_moved_truth_is_taken_after_ten(
-    perfect: tuple[Array, Array],
+    perfect: tuple[list[State], Array],
 ) -> None:
     truth, imu = perfect
     fixes = drive(truth, imu).fixes
@@ -84,7 +90,7 @@ def test_an_outlier_is_refused_and_a_moved_truth_is_taken_after_ten(
     assert navigator.counts["rejected"] == 10 and navigator.counts["readmitted"] == 1
 
 
-def test_sigma_and_fix_age_grow_in_an_outage(perfect: tuple[Array, Array]) -> None:
+def test_sigma_and_fix_age_grow_in_an_outage(perfect: tuple[list[State], Array]) -> None:
     truth, imu = perfect
     navigator = Navigator()
     fixes = [f for f in drive(truth, imu).fixes if f.t < 50.0]
@@ -98,7 +104,7 @@ def test_sigma_and_fix_age_grow_in_an_outage(perfect: tuple[Array, Array]) -> No
     assert abs(error[0]) < 4.0 * after.sigma[6] and abs(error[1]) < 4.0 * after.sigma[7]
 
 
-def test_no_satellites_no_number_no_use(perfect: tuple[Array, Array]) -> None:
+def test_no_satellites_no_number_no_use(perfect: tuple[list[State], Array]) -> None:
     truth, imu = perfect
     navigator = Navigator()
     fix = drive(truth, imu).fixes[0]
@@ -109,7 +115,7 @@ def test_no_satellites_no_number_no_use(perfect: tuple[Array, Array]) -> None:
 
 
 def test_a_gap_asks_for_the_heading_again(
-    perfect: tuple[Array, Array], caplog: pytest.LogCaptureFixture
+    perfect: tuple[list[State], Array], caplog: pytest.LogCaptureFixture
 ) -> None:
     truth, imu = perfect
     navigator = Navigator()
@@ -151,17 +157,15 @@ def test_nees_keeps_its_band() -> None:
         ]
         navigator = Navigator()
         play(navigator, noisy, fixes)
-        x = navigator.x
-        psi = rotation_vector(end[C].reshape(3, 3) @ x[C].reshape(3, 3).T)
-        error = np.concatenate(
-            [psi, x[V] - end[V], truth_ned(x, (end[LAT], end[LON], end[H])) * (1, 1, -1)]
-        )
+        x = navigator.nominal
+        psi = rotation_vector(end.C_nb @ x.C_nb.T)
+        error = np.concatenate([psi, x.v_n - end.v_n, truth_ned(x, end.place) * (1, 1, -1)])
         P = navigator.covariance()[:9, :9]
         nees.append(error @ np.linalg.solve(P, error))
     assert 5.2 < np.mean(nees) < 13.8  # 99.9 % of chi-square with 90 degrees of freedom, over 10
 
 
-def test_heading_starts_from_the_course(perfect: tuple[Array, Array]) -> None:
+def test_heading_starts_from_the_course(perfect: tuple[list[State], Array]) -> None:
     truth, imu = perfect
     navigator = Navigator()
     fixes, k = drive(truth, imu).fixes, 0
@@ -169,6 +173,6 @@ def test_heading_starts_from_the_course(perfect: tuple[Array, Array]) -> None:
         now = (k + 1) * DT
         play(navigator, imu[k : k + 1], [f for f in fixes if now - DT < f.arrival <= now])
         k += 1
-    yaw = dcm_to_euler(truth[k, C].reshape(3, 3))[2]
-    found = dcm_to_euler(navigator.x[C].reshape(3, 3))[2]
+    yaw = euler_angles(truth[k].C_nb)[2]
+    found = euler_angles(navigator.nominal.C_nb)[2]
     assert math.remainder(found - yaw, 2.0 * math.pi) == pytest.approx(0.0, abs=0.02)

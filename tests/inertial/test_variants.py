@@ -9,7 +9,6 @@ from support.estimator_drive import drive, exact
 from inertial.navigation.batch import run_filters
 from inertial.navigation.filters import FILTERS
 from inertial.navigation.smoother import smooth_drive
-from inertial.navigation.strapdown import V
 from inertial.simulation.drive import simulate
 
 
@@ -26,10 +25,11 @@ def test_scale_factors_are_found_and_taken_out() -> None:
     imu[:, 1] *= 1.015
     runs = run_filters(imu, drive(truth, imu).fixes, ["kf-scale", "kf-latency"])
     x = runs["kf-scale"].x[-1]
-    assert x[26] == pytest.approx(0.02, abs=0.007) and abs(x[24]) < 0.015
+    assert x["scale_gyro"][2] == pytest.approx(0.02, abs=0.007) and abs(x["scale_gyro"][0]) < 0.015
     rows = np.round(runs["kf-scale"].t / 0.01).astype(int)
     late = rows > 6000
-    error = {name: rms((run.x[:, 3:6] - truth[rows, V])[late]) for name, run in runs.items()}
+    true_v = np.array([truth[row].v_n for row in rows])
+    error = {name: rms((run.x["v_n"] - true_v)[late]) for name, run in runs.items()}
     assert error["kf-scale"] < error["kf-latency"]
 
 
@@ -46,7 +46,7 @@ def test_a_fading_filter_forgets_a_bias_that_jumped() -> None:
     )
     rows = [town.row_of(t) for t in plain.t]
     after = plain.t > 152.0
-    error = {name: rms((run.x[:, 3:6] - town.truth.v_n[rows])[after]) for name, run in runs.items()}
+    error = {name: rms((run.x["v_n"] - town.truth.v_n[rows])[after]) for name, run in runs.items()}
     assert error["kf-fading"] < 0.9 * error["kf"]
 
 
@@ -59,7 +59,7 @@ def test_the_robust_smoother_is_not_drawn_by_gross_fixes() -> None:
     rows = [town.row_of(t) for t in filtered.t]
     assert len(smoothed.t) == len(rows)
     truth = town.truth.v_n[rows]
-    assert rms((smoothed.x[:, 3:6] - truth)[20:]) < 0.6 * rms((filtered.x[:, 3:6] - truth)[20:])
+    assert rms((smoothed.x["v_n"] - truth)[20:]) < 0.6 * rms((filtered.x["v_n"] - truth)[20:])
     gross = np.isin([fix.key for fix in smoothed.fixes], town.gross)
     left = np.linalg.norm(smoothed.y[:, :2], axis=1)
     assert gross.any() and np.median(left[gross]) > 3.0 * np.median(left[~gross])

@@ -5,21 +5,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.navigation.earth import radii
+from inertial.earth import radii
 from inertial.navigation.fix import RTK_FIXED, Fix
-from inertial.navigation.strapdown import (
-    BA,
-    BG,
-    LAT,
-    LON,
-    SIZE,
-    C,
-    H,
-    V,
-    euler_to_dcm,
-    inverse_step,
-)
+from inertial.rotation import euler_matrix
 from logs.score import Drive
+from tests.inertial.twins.strapdown import State, inverse_step, moved
 
 Array = NDArray[np.float64]
 DT = 0.01
@@ -36,37 +26,27 @@ def motion(t: float, still: float) -> tuple[Array, Array]:
     v = speed * np.array(
         [math.cos(climb) * math.cos(yaw), math.cos(climb) * math.sin(yaw), -math.sin(climb)]
     )
-    return v, euler_to_dcm(0.02 + 0.05 * math.sin(0.4 * s), climb + 0.01, yaw)
+    return v, euler_matrix(0.02 + 0.05 * math.sin(0.4 * s), climb + 0.01, yaw)
 
 
 def exact(
     duration: float, still: float = 0.0, ba: Array = np.zeros(3), bg: Array = np.zeros(3)
-) -> tuple[Array, Array]:
-    """States (n + 1, 21) every DT and the samples (n, 7: t, f, w) between them, with biases in the
-    samples.
-    """
+) -> tuple[list[State], Array]:
+    """States every DT, and the samples (n, 7: t, f, w) between them, with biases in the samples."""
     n = round(duration / DT)
-    x = np.zeros((n + 1, SIZE))
     imu = np.zeros((n, 7))
-    v, C_nb = motion(0.0, still)
-    x[0, LAT], x[0, LON], x[0, H] = math.radians(37.759), math.radians(45.978), 1468.0
-    x[0, V], x[0, C], x[0, BA], x[0, BG] = v, C_nb.ravel(), ba, bg
+    place = math.radians(37.759), math.radians(45.978), 1468.0
+    x = [State(*place, *motion(0.0, still), ba, bg)]
     for k in range(n):
-        a, b = x[k], x[k + 1]
         v, C_nb = motion((k + 1) * DT, still)
-        f, w = inverse_step(a, v, C_nb, DT)
+        f, w = inverse_step(x[k], v, C_nb, DT)
         imu[k] = (k + 1) * DT, *f, *w
-        b[V], b[C], b[BA], b[BG] = v, C_nb.ravel(), ba, bg
-        R_N, R_E = radii(a[LAT])
-        vm = 0.5 * (a[V] + v)
-        b[H] = a[H] - vm[2] * DT
-        b[LAT] = a[LAT] + vm[0] * DT / (R_N + a[H])
-        b[LON] = a[LON] + vm[1] * DT / ((R_E + a[H]) * math.cos(0.5 * (a[LAT] + b[LAT])))
+        x.append(State(*moved(x[k], v, DT), v, C_nb, ba, bg))
     return x, imu
 
 
 def fix_at(
-    x: Array,
+    x: State,
     t: float,
     noise_p: Array,
     noise_v: Array,
@@ -74,23 +54,23 @@ def fix_at(
     sigma_v: float,
     delay: float = 0.0,
 ) -> Fix:
-    """A fix of state x (21,), antenna at the IMU, with noise (m N E U, m/s)."""
-    R_N, R_E = radii(x[LAT])
+    """A fix of state x, antenna at the IMU, with noise (m N E U, m/s)."""
+    R_N, R_E = radii(x.latitude)
     return Fix(
         t=t,
         arrival=t + delay,
-        latitude=x[LAT] + noise_p[0] / (R_N + x[H]),
-        longitude=x[LON] + noise_p[1] / ((R_E + x[H]) * math.cos(x[LAT])),
-        height=x[H] + noise_p[2],
+        latitude=x.latitude + noise_p[0] / (R_N + x.height),
+        longitude=x.longitude + noise_p[1] / ((R_E + x.height) * math.cos(x.latitude)),
+        height=x.height + noise_p[2],
         quality=RTK_FIXED,
         sigma_p=np.full(3, sigma_p),
-        v_n=x[V] + noise_v,
+        v_n=x.v_n + noise_v,
         sigma_v=np.full(3, sigma_v),
         key=round(t / DT),
     )
 
 
-def drive(x: Array, imu: Array, step: int = 100, phase: int = 3, delay: float = 0.0) -> Drive:
+def drive(x: list[State], imu: Array, step: int = 100, phase: int = 3, delay: float = 0.0) -> Drive:
     """A drive with a perfect fix every `step` samples, `delay` s late."""
     zero = np.zeros(3)
     fixes = [

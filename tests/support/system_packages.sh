@@ -6,7 +6,7 @@ missing=""
 need() { command -v "$1" >/dev/null 2>&1 || missing="$missing $2"; }
 
 need chromium "chromium fonts-dejavu-core"
-need gcc "gcc libc6-dev"
+need g++ "g++ libc6-dev"
 need git git
 need arm-none-eabi-gcc gcc-arm-none-eabi
 need qemu-system-arm qemu-system-arm

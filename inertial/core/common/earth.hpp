@@ -16,6 +16,8 @@ constexpr double GRAVITY_EQUATOR = 9.7803253359;       // m/s^2
 constexpr double GRAVITY_FORMULA = 0.00193185265241;   // k of Somigliana's formula
 constexpr double GRAVITY_RATIO = 0.00344978650684;     // omega^2 a^2 b / GM
 
+constexpr double STANDARD_GRAVITY = 9.80665;          // m/s^2, what data sheets mean by g
+
 // Latitude and longitude, rad; ellipsoidal height, m.
 struct Place {
   double latitude = 0.0;

@@ -1,12 +1,10 @@
 // The navigation filters for Python: structs by their fields, runs over numpy arrays.
 #include <stdexcept>
 
-#include <nanobind/stl/tuple.h>
-
 #include "common/bind_fields.hpp"
 #include "navigation/drag.hpp"
-#include "navigation/earth.hpp"
 #include "navigation/live.hpp"
+#include "navigation/smoother.hpp"
 
 namespace gyrofree {
 
@@ -51,31 +49,6 @@ StateVector state_vector(nb::handle given) {
   StateVector out;
   detail::set_matrix(out, given, "error state");
   return out;
-}
-
-nb::tuple tuple_of(const Vector3& v) { return nb::make_tuple(v(0), v(1), v(2)); }
-
-void bind_earth(nb::module_& m) {
-  m.def("radii", [](double L) { const auto r = radii(L); return nb::make_tuple(r.meridian, r.normal); });
-  m.def("gravity", &gravity);
-  m.def("earth_rate", [](double L) { return tuple_of(earth_rate_n(L)); });
-  m.def("transport_rate", [](double L, double h, double v_N, double v_E) {
-    return tuple_of(transport_rate_n(L, h, {v_N, v_E, 0.0}));
-  });
-  m.def("ned_between", [](std::tuple<double, double, double> a, std::tuple<double, double, double> b) {
-    return tuple_of(ned_between({std::get<0>(a), std::get<1>(a), std::get<2>(a)},
-                                {std::get<0>(b), std::get<1>(b), std::get<2>(b)}));
-  });
-  nb::dict constants;
-  constants["SEMI_MAJOR"] = SEMI_MAJOR;
-  constants["ECCENTRICITY2"] = ECCENTRICITY2;
-  constants["FLATTENING"] = FLATTENING;
-  constants["EARTH_RATE"] = EARTH_RATE;
-  constants["GRAVITY_EQUATOR"] = GRAVITY_EQUATOR;
-  constants["SOMIGLIANA"] = SOMIGLIANA;
-  constants["GRAVITY_M"] = GRAVITY_M;
-  constants["STANDARD_GRAVITY"] = STANDARD_GRAVITY;
-  m.attr("constants") = constants;
 }
 
 void bind_structs(nb::module_& m) {
@@ -186,6 +159,12 @@ void bind_runs(nb::module_& m) {
                      fixes_of(fixes)));
   }, "samples start..stop-1 of imu (n, 7) and the fixes among them; a row per fix");
   m.attr("RESULT_COLUMNS") = columns_of<FixResult>();
+  m.def("smooth", [](const Leg& leg, const Model& model, const Settings& settings, const Memory& memory,
+                     const ImuIn& imu, std::size_t start, std::size_t stop, nb::sequence fixes) {
+    return table(smooth(leg, model, settings, memory, samples_of(imu), start, std::min(stop, imu.shape(0)),
+                        fixes_of(fixes)));
+  }, "filter samples start..stop-1 and the fixes among them, then smooth; a row per fix");
+  m.attr("SMOOTHED_COLUMNS") = columns_of<Smoothed>();
   bind_fields<Live>(m, "Live", "a filter on samples that come one by one")
       .def("feed", [](Live& live, const ImuIn& imu) { live.feed(samples_of(imu)); })
       .def("begin", &Live::begin)
@@ -212,7 +191,6 @@ void bind_runs(nb::module_& m) {
 void bind_navigation(nb::module_& parent) {
   auto m = parent.def_submodule("navigation", "strapdown, error model, filters");
   m.attr("__name__") = "navigation";
-  bind_earth(m);
   bind_structs(m);
   bind_leg(m);
   bind_update(m);

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "common/elementary.hpp"
-#include "navigation/earth.hpp"
+#include "navigation/local_earth.hpp"
 
 namespace gyrofree::navigation {
 namespace {
@@ -169,10 +169,10 @@ Vector<2> motion(const Leg& leg, bool literal, double still_f) {
     f += leg.ticks[k].f_b;
     omega += leg.ticks[k].omega_b;
   }
-  if (T <= 0.0) return {STANDARD_GRAVITY, 0.0};
+  if (T <= 0.0) return {earth::STANDARD_GRAVITY, 0.0};
   const double size = norm_of(f / T);
   if (literal) return {size, norm_of(omega / T)};
-  return {STANDARD_GRAVITY + std::fabs(size - still_f), norm_of(omega / T - leg.x.bias_gyro)};
+  return {earth::STANDARD_GRAVITY + std::fabs(size - still_f), norm_of(omega / T - leg.x.bias_gyro)};
 }
 
 FixResult take_at(Leg& leg, const Model& model, const Settings& settings, Memory& memory, Samples samples,

@@ -2,7 +2,7 @@
 
 #include "common/elementary.hpp"
 #include "common/rotation.hpp"
-#include "navigation/earth.hpp"
+#include "navigation/local_earth.hpp"
 
 namespace gyrofree::navigation {
 namespace {
@@ -133,7 +133,7 @@ Covariance covariance_now(Leg leg, const Model& model) {
 }
 
 void reset(Nominal& x, const StateVector& error, const Model& model) {
-  const auto [meridian, normal] = radii(x.latitude);
+  const auto [meridian, normal] = earth::radii(x.latitude);
   x.longitude -= error(DP + EAST) / ((normal + x.height) * elementary::cos(x.latitude));
   x.latitude -= error(DP + NORTH) / (meridian + x.height);
   x.height -= error(DP + HEIGHT);

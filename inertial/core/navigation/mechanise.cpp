@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "common/rotation.hpp"
-#include "navigation/earth.hpp"
+#include "navigation/local_earth.hpp"
 #include "navigation/leg.hpp"
 
 namespace gyrofree::navigation {
@@ -28,7 +28,7 @@ Here earth_here(const LocalEarth& e, const Nominal& x) {
   here.inverse_e = e.inverse_e - e.inverse_e * e.inverse_e * (dh + e.e_by_latitude * dL);
   here.gravity = e.gravity + e.gravity_by_height * dh + e.gravity_by_latitude * dL;
   const double east = x.v_n[EAST] * here.inverse_e;
-  here.omega_ie_n << EARTH_RATE * cosine, 0.0, -EARTH_RATE * sine;
+  here.omega_ie_n << earth::RATE * cosine, 0.0, -earth::RATE * sine;
   here.omega_en_n << east, -x.v_n[NORTH] * here.inverse_n, -east * tangent;
   return here;
 }
@@ -60,10 +60,10 @@ void move(Nominal& x, const LocalEarth& e, const Here& here, const Vector3& v_af
 }
 
 // One sample, or a part of it, of length dt (E-25).
-void step(Nominal& x, OpenTick& tick, const LocalEarth& earth, const Sample& sample, double dt) {
+void step(Nominal& x, OpenTick& tick, const LocalEarth& around, const Sample& sample, double dt) {
   const Vector3 f_b = sample.f_b - x.bias_accel - x.scale_accel.cwiseProduct(sample.f_b);
   const Vector3 omega_b = sample.omega_b - x.bias_gyro - x.scale_gyro.cwiseProduct(sample.omega_b);
-  const Here here = earth_here(earth, x);
+  const Here here = earth_here(around, x);
   const Matrix3 before = x.C_nb;
   const Matrix3 turned = before * turn_matrix(omega_b * dt);
   const Matrix3 after = turned_against((here.omega_ie_n + here.omega_en_n) * dt, turned);
@@ -77,7 +77,7 @@ void step(Nominal& x, OpenTick& tick, const LocalEarth& earth, const Sample& sam
   tick.C_nb += mean * dt;
   tick.f_b += sample.f_b * dt;
   tick.omega_b += sample.omega_b * dt;
-  move(x, earth, here, x.v_n + rate_of_v * dt, dt);
+  move(x, around, here, x.v_n + rate_of_v * dt, dt);
   x.C_nb = after;
 }
 

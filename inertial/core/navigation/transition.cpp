@@ -1,6 +1,6 @@
 // Phi over an interval: the integrals of a flat Earth exactly, the terms of the round, turning Earth
 // to first order (E-27, E-28).
-#include "navigation/earth.hpp"
+#include "navigation/local_earth.hpp"
 #include "navigation/leg.hpp"
 
 namespace gyrofree::navigation {
@@ -27,8 +27,8 @@ struct Terms {
         inverse_e(e.inverse_e),
         tangent(e.tangent),
         cosine2(e.cosine * e.cosine),
-        ie_n(EARTH_RATE * e.cosine),
-        ie_d(EARTH_RATE * e.sine),
+        ie_n(earth::RATE * e.cosine),
+        ie_d(earth::RATE * e.sine),
         en_n(x.v_n[EAST] * e.inverse_e),
         en_e(-x.v_n[NORTH] * e.inverse_n),
         en_d(-x.v_n[EAST] * e.tangent * e.inverse_e),

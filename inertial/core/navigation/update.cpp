@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "common/elementary.hpp"
-#include "navigation/earth.hpp"
+#include "navigation/local_earth.hpp"
 
 namespace gyrofree::navigation {
 namespace {
@@ -48,7 +48,7 @@ Motion motion_before(const Leg& leg, double lag) {
 
 // Antenna against fix, measured with our own radii: the same metres as the error state (E-30).
 void position_rows(Measurement& z, const Nominal& x, const Vector3& arm_n, const Fix& fix) {
-  const Vector3 ned = ned_between(place_of(x), {fix.latitude, fix.longitude, fix.height});
+  const Vector3 ned = earth::ned_between(place_of(x), {fix.latitude, fix.longitude, fix.height});
   z.y.segment<3>(POSITION_ROW) = height_up(arm_n - ned);
   z.H.block<3, 3>(POSITION_ROW, DP).setIdentity();
   z.H.block<3, 3>(POSITION_ROW, PSI) = skew(arm_n);
@@ -97,7 +97,7 @@ Measurement compared(const Leg& leg, const Model& model, const Vector3& rate_b, 
   const Nominal& x = leg.x;
   const Matrix3 C = x.C_nb;
   const Vector3 omega_eb_b = rate_b - x.bias_gyro - x.scale_gyro.cwiseProduct(rate_b) -
-                             C.transpose() * earth_rate_n(x.latitude);
+                             C.transpose() * earth::earth_rate(x.latitude);
   Measurement z(MOST_ROWS, model.states);
   position_rows(z, x, C * lever_b, fix);
   velocity_rows(z, x, C * cross(omega_eb_b, lever_b), lever_b, fix);

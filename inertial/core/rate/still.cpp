@@ -21,8 +21,8 @@ void Watch::unlearn() {
 }
 
 void Watch::take(const Sensor& s, const double* a, double dt) {
-  const Eigen::Index k = count % DEPTH, now = count % (2 * DEPTH);
-  const Eigen::Index before = (count + 2 * DEPTH - 1) % (2 * DEPTH);
+  const Eigen::Index k = count % DEPTH, now = count % TOTALS;
+  const Eigen::Index before = (count + TOTALS - 1) % TOTALS;
   ring_dt(k) = dt;
   for (int i = 0; i < s.n; ++i) ring_a(i, k) = a[i];
   ring_y.col(k) = s.measure(a);

@@ -14,7 +14,8 @@ struct StillLimits {
   int window, short_window, steady_span, brief_span, guard, hold;
 };
 
-constexpr int DEPTH = 128;  // samples remembered
+constexpr int DEPTH = 128;           // samples remembered
+constexpr long TOTALS = 2L * DEPTH;  // running sums remembered
 
 struct Verdict {
   bool still;
@@ -39,7 +40,7 @@ class Watch {
   Measurement y(long sample) const { return ring_y.col(sample % DEPTH); }
   double dt(long sample) const { return ring_dt(sample % DEPTH); }
   // Sum of all y up to a sample of the last 256, but for a constant.
-  Measurement total(long sample) const { return ring_total.col((sample + 2 * DEPTH) % (2 * DEPTH)); }
+  Measurement total(long sample) const { return ring_total.col((sample + TOTALS) % TOTALS); }
   Measurement mean_of(int window) const;
 
  private:
@@ -57,7 +58,7 @@ class Watch {
 
   Matrix<MOST_AXES, DEPTH> ring_a = Matrix<MOST_AXES, DEPTH>::Zero();
   Matrix<MEASURED, DEPTH> ring_y = Matrix<MEASURED, DEPTH>::Zero();
-  Matrix<MEASURED, 2 * DEPTH> ring_total = Matrix<MEASURED, 2 * DEPTH>::Zero();
+  Matrix<MEASURED, TOTALS> ring_total = Matrix<MEASURED, TOTALS>::Zero();
   Vector<DEPTH> ring_dt = Vector<DEPTH>::Zero();
   // Of the readings in the window: one of them, and sum and sum of squares of what they differ by.
   Vector<MOST_AXES> offset = Vector<MOST_AXES>::Zero();

@@ -18,10 +18,9 @@ def sets_svg(points: tuple[float, float, float], value: float, unit: str) -> str
     span = points[2] - points[0]
     low, high = points[0] - 0.25 * span, points[2] + 0.25 * span
     xs = np.array([low, *points, high])
-    out = np.empty(3)
     lines = ["", "", ""]
     for x in xs:
-        membership(float(x), np.array(points), out)
+        out = membership(float(x), points)
         for k in range(3):
             y = HEIGHT - 18 - out[k] * (HEIGHT - 26)
             lines[k] += f"{(x - low) / (high - low) * WIDTH:.1f},{y:.1f} "

@@ -1,0 +1,100 @@
+"""From the first sample to the first fix that a filter can start from: alignment and its samples.
+
+Live navigation and the run over a whole drive step the same object, so that they start alike.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.constants import GRAVITY
+from inertial.core import navigation as core
+from inertial.elementary import dot, norm
+from inertial.navigation.alignment import Alignment, AlignmentSettings, Start
+from inertial.navigation.error_model import DP
+from inertial.navigation.filters import FilterConfig
+from inertial.navigation.fix import Fix
+from inertial.navigation.settings import NavigatorConfig
+
+Array = NDArray[np.float64]
+
+HEIGHT_UP = np.array([1.0, 1.0, -1.0])  # the error state counts height up
+
+
+class Startup:
+    """Alignment, fed with every sample and asked at every fix. `history` keeps the samples,
+    because a fix is about a moment that has passed.
+    """
+
+    def __init__(self, settings: AlignmentSettings, history: Any) -> None:
+        """`history` is the core's Live of the filter that is to start."""
+        self.align = Alignment(settings)
+        self.history = history
+
+    @property
+    def still_f(self) -> float:
+        """|mean f| at standstill, m/s^2; standard gravity where there was none."""
+        return float(norm(self.align.mean_f)) if self.align.levelled else GRAVITY
+
+    def feed(self, imu: Array) -> None:
+        """Take samples imu (n, 7: t s, f_b m/s^2, omega_ib_b rad/s) without a gap in them."""
+        for row in imu:
+            self.align.imu(float(row[0]), row[1:4], row[4:7])
+        self.history.feed(imu)
+
+    def fix(self, fix: Fix) -> Start | None:
+        """Take a fix with a velocity; the start, when the alignment knows enough at its time."""
+        self.align.fix(fix.t, fix.v_n, fix.sigma_v)
+        if not self.history.reaches(fix.t):
+            return None
+        a = self.align
+        then = self.history.turned_back(a.C, a.gyro_bias, fix.t)
+        return a.start(then, fix.v_n)
+
+    def after_gap(self, nominal: Any | None) -> None:
+        """Begin again after samples were missing; nominal is the core's state of the filter that
+        navigated until then, None where none did.
+        """
+        if nominal is not None:
+            self.align.C = nominal.C_nb
+            self.align.gyro_bias = nominal.bias_gyro
+            # roughly: what turned during the gap is in sigma_tilt of the next start
+            self.align.levelled = True
+
+
+def first_leg(config: NavigatorConfig, chosen: FilterConfig, start: Start, fix: Fix) -> Any:
+    """The filter's Leg at the fix that ended the alignment: attitude from there, position and
+    velocity of the fix.
+    """
+    model = chosen.model(config.imu)
+    leg = core.new_leg(model.states)
+    x = leg.x
+    x.latitude, x.longitude, x.height = fix.latitude, fix.longitude, fix.height
+    x.v_n, x.C_nb = fix.v_n, start.C_nb
+    x.bias_gyro, x.bias_accel = start.bias_gyro, start.bias_accel
+    if chosen.constraints.car:
+        x.axle = chosen.constraints.axle
+    antenna = np.zeros(model.states)
+    antenna[DP] = dot(start.C_nb, np.array(config.lever_arm_b)) * HEIGHT_UP
+    leg.reset(antenna, model)
+    leg.P = first_covariance(config, chosen, start, fix)
+    leg.time = fix.t
+    return leg
+
+
+def first_covariance(
+    config: NavigatorConfig, chosen: FilterConfig, start: Start, fix: Fix
+) -> Array:
+    """(n, n) at the start: what is told, the fix, and what the alignment knows of itself."""
+    c = config
+    sigma_p = np.minimum(c.sigma_p, np.maximum(3.0 * fix.sigma_p, 0.1))
+    sigma_v = np.maximum(c.sigma_v, fix.sigma_v)
+    attitude = [c.sigma_tilt, c.sigma_tilt, c.sigma_yaw]
+    biases = [c.sigma_bias_accel] * 3 + [c.sigma_bias_gyro] * 3
+    sigma = np.concatenate([attitude, sigma_v, sigma_p, biases, chosen.extra_sigma()])
+    P = np.diag(np.square(sigma))
+    if start.P is not None:
+        places = np.r_[0:3, 9:15]
+        P[np.ix_(places, places)] = start.P
+    return P
