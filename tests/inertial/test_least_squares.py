@@ -5,13 +5,13 @@ bad data.
 import numpy as np
 import pytest
 
-from inertial.rotation import multiply, to_matrix
 from inertial.core import native
 from inertial.layouts.catalogue import CUBE, LAYOUTS
 from inertial.layouts.layout import GeometryError, Layout
 from inertial.rate.estimators import ESTIMATORS, LeastSquaresRate
 from inertial.rate.observed import sensor
 from inertial.rate.products_model import squares
+from inertial.rotation import multiply, to_matrix
 from inertial.simulation.table import IDEAL, TableTest
 
 
