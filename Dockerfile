@@ -38,7 +38,7 @@ RUN groupadd --gid 10001 gyrofree \
 COPY --from=packages /opt/gyrofree /opt/gyrofree
 COPY --chmod=0644 deploy/gyrofree.toml /etc/gyrofree/gyrofree.toml
 ENV PATH=/opt/gyrofree/venv/bin:$PATH PYTHONUNBUFFERED=1 PYTHONDONTWRITEBYTECODE=1 \
-    NUMBA_CACHE_DIR=/tmp/numba HOME=/tmp MPLCONFIGDIR=/tmp
+    HOME=/tmp MPLCONFIGDIR=/tmp
 WORKDIR /etc/gyrofree
 USER 10001:10001
 ENTRYPOINT ["gyrofree"]

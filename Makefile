@@ -26,7 +26,6 @@ demo: setup $(if $(filter emulated,$(BOARD)),.make/board firmware)
 # Packages come while the core compiles; neither needs the other.
 setup: .make/tools
 	@$(MAKE) --no-print-directory --output-sync -j2 .make/runtime .make/core
-	@$(MAKE) --no-print-directory .make/warm
 
 .make/venv:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed; this is $$($(PYTHON) --version). Name another: make PYTHON=python3.12"; exit 1; }
@@ -50,11 +49,6 @@ CORE := $(wildcard inertial/core/*.c* inertial/core/CMakeLists.txt inertial/core
 	@echo "Compiling the core ..."
 	CXX="$$(cat .make/compiler)" $(PIP) install --quiet --no-deps --no-build-isolation \
 		--config-settings=cmake.define.Python_INCLUDE_DIR="$$(cat .make/headers)" --editable .
-	@touch $@
-
-.make/warm: .make/runtime .make/core $(wildcard inertial/*.py inertial/*/*.py estimator/*.py)
-	@echo "Compiling the filters once, for the cache ..."
-	@$(BIN)/python -m estimator.warm
 	@touch $@
 
 # A wheel in dist/ that needs no compiler where it is installed.

@@ -14,7 +14,6 @@ from estimator.output import Output
 from estimator.pipeline import Pipeline
 from estimator.saved_state import SavedState, version
 from estimator.settings import EstimatorSettings
-from estimator.warm import warm
 from estimator.worker import Worker
 from messages.bus import orders
 from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client
@@ -32,7 +31,6 @@ END_S = 3.0  # for what is queued when the service is to end
 def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) -> None:
     """Estimate until `stop` is set; sets it itself and raises when the worker fails."""
     pipeline = Pipeline(settings)
-    warm()
     spool = _open_spool(settings)
     try:
         session = open_client(bus, stop)

@@ -125,7 +125,6 @@ class CalibrationDesk:
         return message
 
     # --- the orders
-    # -----------------------------------------------------------------------------------------------
 
     def _start(self, command: pb.EstimatorCommand, layout: Layout) -> str:
         if command.device not in self._headers:

@@ -125,7 +125,6 @@ class WiringDesk:
         return _message(message, session)
 
     # --- the orders
-    # -----------------------------------------------------------------------------------------------
 
     def _source(self, device: str) -> str:
         """The converter's counts where there are any: the gateway's own wiring may be wrong."""

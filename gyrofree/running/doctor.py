@@ -53,7 +53,6 @@ def examine(settings: Settings) -> list[Finding]:
         ),
         _folder("journal folder", Path(settings.gateway.journal)),
         _folder("recordings folder", Path(settings.recorder.root)),
-        _compile_cache(),
     ]
 
 
@@ -144,18 +143,6 @@ def _folder(check: str, folder: Path) -> Finding:
     if free < LEAST_FREE:
         return Finding(check, "warn", text, "make room: 1 GiB at least")
     return Finding(check, "ok", text)
-
-
-def _compile_cache() -> Finding:
-    folder = Path(os.environ.get("NUMBA_CACHE_DIR", Path(__file__).parents[2] / "inertial"))
-    if not any(folder.rglob("*.nbi")):
-        return Finding(
-            "compile cache",
-            "warn",
-            "empty: the first start compiles for some seconds",
-            "make setup",
-        )
-    return Finding("compile cache", "ok", str(folder))
 
 
 def health(service: str, settings: Settings) -> Finding:

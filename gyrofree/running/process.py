@@ -50,7 +50,7 @@ def start_logging(verbose: bool = False) -> None:
     logging.basicConfig(
         level=logging.DEBUG if verbose else logging.INFO, format=form, stream=sys.stderr, force=True
     )
-    for noisy in ("websockets", "uvicorn.access", "httpx", "numba", "asyncio", "httpcore"):
+    for noisy in ("websockets", "uvicorn.access", "httpx", "asyncio", "httpcore"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
 
 

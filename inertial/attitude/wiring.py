@@ -7,13 +7,24 @@ Deterministic: the same samples give the same map.
 """
 
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inertial.attitude.axes import LEAST_SHIFT, Assignment, Unclear, assign, movement
-from inertial.attitude.axis_map import ABSENT, AXES, SI, AxisMap, Figures
+from inertial.attitude.axis_map import AXES, AxisMap
+from inertial.attitude.wiring_found import (
+    WINDOW_S,
+    BoardColumns,
+    Tipped,
+    Turn,
+    compared,
+    lies_level,
+    map_of,
+    remarks,
+    seen_end,
+    with_third,
+)
 
 Array = NDArray[np.float64]
 
@@ -26,40 +37,17 @@ SAY = {
     RIGHT_DOWN: "tip its right side down by a quarter turn, and let it rest there",
     TURNED_RIGHT: "turn it to the right by a quarter, flat on the table, and let it rest",
 }
-WINDOW_S = 0.5  # s, of the rest test
 FIRST_S = 2.0  # s of rest before the first movement
 UNUSED_S = 4.0  # s that an input is restless while five others rest: nothing is attached to it
 REST_S = 1.0  # s of rest that end a movement
 LONGEST_S = 20.0  # s, of a movement
 NEAR_LEVEL = 2.5  # m/s^2, a quarter of g: how exactly "level again" is wanted
-SENSITIVITY = 0.15  # of the turned angle: gyroscope against accelerometer
-NOT_LEVEL = np.radians(20.0)  # of the first rest, as the map that was found sees it
 ON_TABLE = 0.35  # part of the limits below that holds where the board lies, not in a hand
 FORCE_REST, RATE_REST, VOLT_REST = (
     0.4,
     0.15,
     0.02,
 )  # m/s^2, rad/s, V: standard deviations of a board at rest
-
-
-@dataclass(frozen=True)
-class BoardColumns:
-    """The columns a board sends: their names, resolution, and how much they may move at rest."""
-
-    source: str
-    names: tuple[str, ...]
-    quantum: Array  # (columns,) readings are judged in multiples of this
-    rest: Array  # (columns,) largest standard deviation at rest
-    figures: Figures = SI
-
-
-@dataclass(frozen=True)
-class Turn:
-    """A movement that counts: about which axis of b, and its angle by both sensors, rad."""
-
-    about: str
-    by_force: float  # NaN about the vertical
-    by_rate: float
 
 
 class GuidedWiring:
@@ -271,39 +259,19 @@ class GuidedWiring:
         self._back(message + "; both turns once more")
 
     def _found(self, a: Assignment) -> None:
-        used, f = self._used, self.board.figures
-
-        def sign(inverted: bool) -> int:
-            return -1 if inverted else 1
-
-        # y and z of the article's frame are the opposite of b's; its two rates are those about +y_b
-        # and +x_b
-        order = ((a.accel_x, 1), (a.accel_y, -1), (a.accel_z, -1), (a.gyro_yz, 1), (a.gyro_xz, 1))
-        column = [used[one.channel] for one, _ in order] + [ABSENT]
-        signs = [sign(one.invert) * article for one, article in order] + [1]
-        rest = self._level if self.board.source == "adc" else np.zeros(len(self._level))
-        zero = [f.zero_force] * 3 + [float(rest[c]) for c in column[3:5]] + [0.0]
-        scale = [1.0 / f.force] * 3 + [1.0 / f.rate] * 3
-        self.map = AxisMap(
-            self.board.source,
-            self.board.names,
-            tuple(column),
-            tuple(signs),
-            tuple(zero),
-            tuple(scale),
-        )
-        felt = self.map.apply(self._level[None])[0][0]
-        if -felt[2] < np.cos(NOT_LEVEL) * np.linalg.norm(felt):
+        used = self._used
+        self.map = map_of(a, self.board, self._level, used)
+        if not lies_level(self.map, self._level):
             self.map, self._level = None, None
             self._restart("the board was not level at first")
             return
-        left = [c for c in used if c not in column]
+        left = [c for c in used if c not in self.map.column]
         self._offered = any(
             np.ptp(self._rows(pose)[:, c]) > 0.0 for c in left for pose in (NOSE_UP, RIGHT_DOWN)
         )
-        self._check("y", NOSE_UP, 1)
-        self._check("x", RIGHT_DOWN, 0)
-        self._next(self._remarks())
+        self._check("y", NOSE_UP)
+        self._check("x", RIGHT_DOWN)
+        self._next(remarks(self.turns, self.map))
         if not self._offered:
             self.state = FOUND
 
@@ -311,65 +279,15 @@ class GuidedWiring:
         """The turn on the table: which of the inputs left over is the gyroscope about the
         vertical.
         """
-        m, used = self.map, self._used
-        seen = movement(rows, self._period)
-        force, known = list(m.column[:3]), m.column[4]
-        weight = np.abs(self._taken[NOSE_UP][-1] - self._taken[NOSE_UP][0])[force].max()
-        if np.abs(seen.shift[force]).max() > LEAST_SHIFT * weight:
-            raise Unclear("it tilted: keep it flat on the table while it turns")
-        left = [c for c in used if c not in m.column]
-        best = max(left, key=lambda c: abs(seen.swing[c]))
-        usual = abs(movement(self._rows(NOSE_UP), self._period).swing[known])
-        if abs(seen.swing[best]) < 0.3 * usual:
-            raise Unclear(
-                "no further input turned with it: turn by a quarter, or save without a third"
-                " gyroscope"
-            )
-        rest = float(self._level[best]) if self.board.source == "adc" else 0.0
-        self.map = AxisMap(
-            m.source,
-            m.inputs,
-            (*m.column[:5], best),
-            (*m.sign[:5], 1 if seen.swing[best] > 0.0 else -1),
-            (*m.zero[:5], rest),
-            m.scale,
-        )
+        tipped = Tipped(self._taken[NOSE_UP], self._rows(NOSE_UP), self._period)
+        self.map = with_third(self.map, self.board, rows, tipped, self._level, self._used)
         self._taken[TURNED_RIGHT] = np.vstack([rows[0], *rows, seen_end(rows)])
-        self._check("z", TURNED_RIGHT, 2)
-        self._next(self._remarks())
+        self._check("z", TURNED_RIGHT)
+        self._next(remarks(self.turns, self.map))
         self.state = FOUND
 
-    def _check(self, about: str, pose: int, axis: int) -> None:
+    def _check(self, about: str, pose: int) -> None:
         """The same angle by both sensors."""
         rows = self._rows(pose) * self.board.quantum
-        f_b, omega_b = self.map.apply(rows)
-        m = round(WINDOW_S / self._period)
-        before, after = f_b[:m].mean(axis=0), f_b[-m:].mean(axis=0)
-        level = omega_b[:m, axis].mean()
-        c = float(before @ after / (np.linalg.norm(before) * np.linalg.norm(after)))
-        by_force = float(np.arccos(np.clip(c, -1.0, 1.0))) if axis < 2 else float("nan")
-        by_rate = float((omega_b[:, axis] - level).sum() * self._period)
-        self.turns = [t for t in self.turns if t.about != about] + [Turn(about, by_force, by_rate)]
-
-    def _remarks(self) -> str:
-        said = []
-        for turn in self.turns:
-            if (
-                turn.by_force == turn.by_force
-                and abs(turn.by_rate - turn.by_force) > SENSITIVITY * turn.by_force
-            ):
-                said.append(
-                    f"about {turn.about} the gyroscope saw {np.degrees(turn.by_rate):.0f}°, the"
-                    f" accelerometer {np.degrees(turn.by_force):.0f}°: check the sensitivities"
-                )
-        if self.map.mirrored:
-            said.append(
-                "the axes come out left-handed: one is really inverted, or a turn went the other"
-                " way; start again if you are not sure"
-            )
-        return "; ".join(said) or "found"
-
-
-def seen_end(rows: Array) -> Array:
-    """Mean of the rest at the end of a movement."""
-    return rows[-max(4, len(rows) // 20) :].mean(axis=0)
+        turn = compared(self.map, about, rows, self._period)
+        self.turns = [t for t in self.turns if t.about != about] + [turn]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.calibration.fit import Fit
+from inertial.elementary import norm
 from inertial.layouts.layout import Layout
 from inertial.toml_file import read_versioned, write_whole
 
@@ -82,13 +83,10 @@ def make_card(
     data: Sequence[tuple[str, str]] = (),
 ) -> Card:
     """Card of a fit. Its id is the device, the day and eight digits of what it holds."""
-    n = fit.axes
     p = fit.parameters
     holds = hashlib.sha256(
         b"".join(np.round(x, 9).tobytes() for x in (p.b, p.c, p.r)) + date.encode()
     )
-    narrowed = fit.narrowed < 0.5
-    first = 4 * n + 3 * fit.place
     return Card(
         id=f"{device}-{date[:10].replace('-', '')}-{holds.hexdigest()[:8]}",
         date=date,
@@ -100,24 +98,23 @@ def make_card(
         scale=fit.scale,
         direction_b=fit.direction,
         position_b=p.r[fit.place],
-        covariance=np.array([fit.axis_covariance(i) for i in range(n)]),
+        covariance=np.array([fit.axis_covariance(i) for i in range(fit.axes)]),
         residual=fit.residual,
-        observed=np.array(
-            [
-                np.r_[
-                    narrowed[i],
-                    narrowed[n + 3 * i : n + 3 * i + 3],
-                    narrowed[first[i] : first[i] + 3],
-                ]
-                for i in range(n)
-            ]
-        ),
+        observed=_observed(fit),
         noise=fit.noise,
         poses=poses,
         steps=steps,
         chi2=fit.chi2,
         data=tuple(data),
     )
+
+
+def _observed(fit: Fit) -> NDArray[np.bool_]:
+    """(N, 7): which of bias, direction times scale and position of an axis the data narrowed."""
+    n, narrowed = fit.axes, fit.narrowed < 0.5
+    bias, along = narrowed[:n, None], narrowed[n : 4 * n].reshape(n, 3)
+    place = narrowed[4 * n :].reshape(-1, 3)[fit.place]
+    return np.hstack([bias, along, place])
 
 
 def sigmas(card: Card) -> dict[str, Array]:
@@ -216,7 +213,7 @@ def _card(table: dict[str, Any]) -> Card:
         names=tuple(str(axis["name"]) for axis in axes),
         bias=values["bias_mps2"],
         scale=values["scale"],
-        direction_b=values["direction_b"] / np.linalg.norm(values["direction_b"], axis=1)[:, None],
+        direction_b=values["direction_b"] / norm(values["direction_b"])[:, None],
         position_b=values["position_b_m"],
         covariance=column("covariance").reshape(n, 7, 7),
         residual=column("residual_mps2"),

@@ -18,6 +18,8 @@ from inertial.calibration.fit import CalibrationError, Fit, fit
 from inertial.calibration.model import Poses, Steps
 from inertial.calibration.poses import SAME, describe, next_pose
 from inertial.calibration.steps import TURNING, blocks
+from inertial.core import native
+from inertial.elementary import applied, dot, norm, product
 from inertial.layouts.layout import Layout
 
 Array = NDArray[np.float64]
@@ -62,7 +64,10 @@ class GuidedCalibration:
         self.progress = 0.0
         self.fit: Fit | None = None
         self._noise2 = float(np.mean(np.square(layout.noise)))
-        self._inverse = np.linalg.pinv(layout.theta_b)
+        theta_b = layout.theta_b
+        self._inverse = native.solve_positive(
+            product(theta_b.T, theta_b), np.ascontiguousarray(theta_b.T)
+        )
         self._window: deque[Array] = deque()
         self._taking: list[Array] = []
         self._poses: list[tuple[Array, int, float]] = []
@@ -207,7 +212,7 @@ class GuidedCalibration:
     def _begin(self, mean: Array) -> None:
         up = self._up(mean)
         known = [taken for taken, _, _ in self.poses]
-        if any(float(up @ one) > SAME for one in known):
+        if any(dot(up, one) > SAME for one in known):
             if not self._spoilt and known and self.state == WAITING:
                 self.message = "this pose is taken already"
             return
@@ -275,5 +280,5 @@ class GuidedCalibration:
         return Poses(np.array(mean), np.array(samples), np.array(scatter))
 
     def _up(self, mean: Array) -> Array:
-        f = self._inverse @ mean
-        return f / max(float(np.linalg.norm(f)), 1e-9)
+        f = applied(self._inverse, mean)
+        return f / max(float(norm(f)), 1e-9)

@@ -20,3 +20,6 @@ VERSION: str = native.VERSION
 
 navigation = native.navigation
 """Strapdown, error model, filters (inertial/navigation)."""
+
+attitude = native.attitude
+"""Tilt filters of six-axis boards (inertial/attitude)."""

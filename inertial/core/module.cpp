@@ -10,6 +10,8 @@ NB_MODULE(GYROFREE_MODULE, m) {
   gyrofree::bind_rate(m);
   gyrofree::bind_rotation(m);
   gyrofree::bind_places(m);
+  gyrofree::bind_attitude(m);
+  gyrofree::bind_alignment(m);
   gyrofree::bind_health(m);
   gyrofree::bind_navigation(m);
 }

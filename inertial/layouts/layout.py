@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from inertial.constants import GRAVITY, MILLI_G
 from inertial.core import native
+from inertial.elementary import applied
 
 Array = NDArray[np.float64]
 
@@ -202,7 +203,7 @@ class Layout:
 
     def quadratic(self, omega_b: Array) -> Array:
         """q(omega), (N,), m/s^2: what the rate omega_b (3,) adds to every axis (E-2)."""
-        return self.Q @ products(omega_b)
+        return applied(self.Q, products(omega_b))
 
     def _scaled(self, matrix: Array) -> Array:
         length = np.ones(matrix.shape[1])

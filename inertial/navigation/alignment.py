@@ -11,8 +11,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.core import native
+from inertial.elementary import atan2, norm
 from inertial.navigation.alignment_motion import MotionSettings, MotionWindow
-from inertial.navigation.strapdown import dcm_to_euler, euler_to_dcm, exp
+from inertial.rotation import euler_angles, euler_matrix, roll_pitch
 
 Array = NDArray[np.float64]
 
@@ -58,11 +60,6 @@ class Start:
     how: str  # for people
 
 
-def level(f_b: Array) -> tuple[float, float]:
-    """Roll and pitch, rad, from the mean specific force (3,) at standstill (E-35)."""
-    return math.atan2(-f_b[1], -f_b[2]), math.atan2(f_b[0], math.hypot(f_b[1], f_b[2]))
-
-
 class Alignment:
     """Takes samples and speeds until C_nb but for its heading, and the gyro bias, are known; then
     keeps them by gyro.
@@ -94,7 +91,7 @@ class Alignment:
             self._interrupt(f"{t - self._t:.1f} s without samples")
             self._window.clear()
         if self._t is not None and self.levelled:
-            self.C = self.C @ exp((w - self.gyro_bias) * (t - self._t))
+            self.C = native.rotation.turned(self.C, (w - self.gyro_bias) * (t - self._t))
         self._t = t
         if self.settings.in_motion and not self.levelled:
             self._window.imu(t, f, w)
@@ -113,7 +110,7 @@ class Alignment:
         """Velocity (3,) m/s of the fix at time t, with its sigma: for standstill, course and the
         start under way.
         """
-        speed = math.hypot(v_n[0], v_n[1])
+        speed = float(norm(v_n[:2]))
         self.speed(speed)
         if not self.settings.in_motion or self.levelled:
             return
@@ -191,10 +188,10 @@ class Alignment:
         """C_nb (3, 3) with the heading of the course v_n (3,); C_then is C at that time. None: too
         slow (E-36).
         """
-        if not self.levelled or math.hypot(v_n[0], v_n[1]) < self.settings.course_speed:
+        if not self.levelled or norm(v_n[:2]) < self.settings.course_speed:
             return None
-        roll, pitch, _ = dcm_to_euler(C_then)
-        return euler_to_dcm(roll, pitch, math.atan2(v_n[1], v_n[0]))
+        roll, pitch, _ = euler_angles(C_then)
+        return euler_matrix(roll, pitch, atan2(v_n[1], v_n[0]))
 
     def _judge(self, length: float) -> None:
         f = np.array([sample[0] for sample in self._block])
@@ -212,7 +209,7 @@ class Alignment:
         if self.still_s >= s.standstill:
             self.mean_f = self._sum_f / self._count
             self.gyro_bias = self._sum_w / self._count
-            self.C = euler_to_dcm(*level(self.mean_f), dcm_to_euler(self.C)[2])
+            self.C = euler_matrix(*roll_pitch(self.mean_f), euler_angles(self.C)[2])
             self.levelled = True
             self._disturbed = ""
             self._window.clear()
@@ -226,7 +223,7 @@ class Alignment:
             return f"the board shakes by {f.std(axis=0).max():.2f} m/s^2"
         if w.std(axis=0).max() >= s.still_w:
             return f"the board shakes by {math.degrees(w.std(axis=0).max()):.1f} deg/s"
-        size = float(np.linalg.norm(f.mean(axis=0)))
+        size = float(norm(f.mean(axis=0)))
         if abs(size - 9.81) > s.bias_f:
             return f"the board feels {size:.2f} m/s^2, which is not 1 g"
         if np.abs(w.mean(axis=0)).max() > s.bias_w:

@@ -12,17 +12,17 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from inertial.constants import GRAVITY
-from inertial.navigation.strapdown import euler_to_dcm, exp, rotation, rotation_vector
+from inertial.core import native
+from inertial.elementary import applied, atan2, dot, norm, product
+from inertial.rotation import euler_matrix, rotation_vector, turn_matrix
 
 Array = NDArray[np.float64]
 
 UNKNOWNS = 12  # psi_n at the first fix, v_n at the first fix, accelerometer bias, gyro bias
 PSI, V0, BA, BG = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
-BIAS = slice(6, 12)
 STEP = np.concatenate([np.full(3, 1e-5), np.full(3, 1e-3), np.full(3, 1e-3), np.full(3, 1e-5)])
 
 
@@ -78,36 +78,6 @@ class MotionStart:
     def sigma_yaw(self) -> float:
         """rad."""
         return math.sqrt(self.P[2, 2])
-
-
-@njit(cache=True)
-def integrate(t: Array, f: Array, w: Array, start: Array, bias: Array, C: Array, u: Array) -> None:
-    """C_0k (m, 3, 3) and u (m, 3) := attitude and specific-force integral in the body at start[0],
-    at start[1:] (E-80).
-
-    bias (6,): of the accelerometer, of the gyro. Sample i acts from t[i - 1] to t[i]; the times lie
-    inside the samples.
-    """
-    R, after, turn, s = np.eye(3), np.empty((3, 3)), np.empty((3, 3)), np.zeros(3)
-    now, k = start[0], 1
-    for i in range(len(t)):
-        while k < len(start) and now < t[i]:
-            dt = min(t[i], start[k]) - now
-            rotation(
-                (w[i, 0] - bias[3]) * dt, (w[i, 1] - bias[4]) * dt, (w[i, 2] - bias[5]) * dt, turn
-            )
-            for r in range(3):
-                for c in range(3):
-                    after[r, c] = R[r, 0] * turn[0, c] + R[r, 1] * turn[1, c] + R[r, 2] * turn[2, c]
-                for c in range(3):
-                    s[r] += 0.5 * (R[r, c] + after[r, c]) * (f[i, c] - bias[c]) * dt
-            R[:, :] = after
-            now += dt
-            if now < start[k] - 1e-9:
-                break
-            C[k - 1], u[k - 1] = R, s
-            now = start[k]
-            k += 1
 
 
 class MotionWindow:
@@ -170,16 +140,19 @@ class MotionWindow:
         C0, theta = problem.first_guess()
         for _ in range(6):
             r, J = problem.residuals(C0, theta), problem.jacobian(C0, theta)
-            step = -np.linalg.lstsq(J, r, rcond=None)[0]
-            C0 = exp(step[PSI]) @ C0
+            step = _normal(J, product(J.T, -r[:, None]))
+            if step is None:
+                return None
+            step = step[:, 0]
+            C0 = product(turn_matrix(step[PSI]), C0)
             theta = theta + np.concatenate([np.zeros(3), step[3:]])
-            if np.linalg.norm(step[PSI]) < 1e-6:
+            if norm(step[PSI]) < 1e-6:
                 break
         r, J = problem.residuals(C0, theta), problem.jacobian(C0, theta)
-        if not np.isfinite(r).all():
+        P = _normal(J, np.eye(UNKNOWNS))
+        if P is None or not np.isfinite(r).all():
             return None
-        chi2 = float(r @ r) / max(1, len(r) - UNKNOWNS)
-        return self._at_newest(problem, C0, theta, np.linalg.inv(J.T @ J), chi2)
+        return self._at_newest(problem, C0, theta, P, float(dot(r, r)) / max(1, len(r) - UNKNOWNS))
 
     def _at_newest(
         self, problem: "_Problem", C0: Array, theta: Array, P: Array, chi2: float
@@ -193,11 +166,19 @@ class MotionWindow:
         for j in range(3):
             d = theta.copy()
             d[9 + j] += STEP[9]
-            phi = rotation_vector(problem.motion(d)[0][-1] @ C_0k[-1].T)
-            carry[0:3, 9 + j] = C0 @ phi / STEP[9]
-        P9 = carry @ P @ carry.T * max(1.0, chi2)
+            phi = rotation_vector(product(problem.motion(d)[0][-1], C_0k[-1].T))
+            carry[0:3, 9 + j] = applied(C0, phi) / STEP[9]
+        P9 = product(product(carry, P), carry.T) * max(1.0, chi2)
         P9[2, 2] += self.settings.sigma_mount**2 if math.isfinite(self.settings.sigma_slip) else 0.0
-        return MotionStart(C0 @ C_0k[-1], theta[BA].copy(), theta[BG].copy(), P9, chi2)
+        return MotionStart(product(C0, C_0k[-1]), theta[BA].copy(), theta[BG].copy(), P9, chi2)
+
+
+def _normal(J: Array, right: Array) -> Array | None:
+    """X with J^T J X = right (UNKNOWNS, m); None where J (n, UNKNOWNS) does not tell."""
+    try:
+        return native.solve_positive(product(J.T, J), np.ascontiguousarray(right))
+    except ValueError:
+        return None
 
 
 class _Problem:
@@ -222,9 +203,9 @@ class _Problem:
 
     def motion(self, theta: Array) -> tuple[Array, Array]:
         """C_0k (m, 3, 3) and u (m, 3), first row the window's start."""
-        m = len(self._times) - 1
-        C, u = np.empty((m, 3, 3)), np.empty((m, 3))
-        integrate(self._t, self._f, self._w, self._times, theta[BIAS], C, u)
+        C, u = native.alignment.carried(
+            self._t, self._f, self._w, self._times, theta[BA], theta[BG]
+        )
         return np.concatenate([np.eye(3)[None], C]), np.concatenate([np.zeros((1, 3)), u])
 
     def first_guess(self) -> tuple[Array, Array]:
@@ -233,17 +214,14 @@ class _Problem:
         theta[V0] = self._v[0]
         C, u = self.motion(theta)
         felt = (self._v[-1] - self._v[0]) - self._down * self._passed[-1]  # what u must be in n
-        course = math.atan2(self._v[0, 1], self._v[0, 0])
-        level = euler_to_dcm(0.0, 0.0, course).T @ felt
-        a, b = level / np.linalg.norm(level), u[-1] / np.linalg.norm(u[-1])
-        axis, cosine = np.cross(b, a), float(a @ b)
-        if np.linalg.norm(axis) < 1e-9:
+        level = euler_matrix(0.0, 0.0, float(atan2(self._v[0, 1], self._v[0, 0])))
+        a, b = _unit(applied(level.T, felt)), _unit(u[-1])
+        axis, cosine = np.cross(b, a), dot(a, b)
+        if norm(axis) < 1e-9:
             tilt = np.eye(3) if cosine > 0 else np.diag([1.0, -1.0, -1.0])
         else:
-            tilt = exp(
-                axis / np.linalg.norm(axis) * math.atan2(float(np.linalg.norm(axis)), cosine)
-            )
-        return euler_to_dcm(0.0, 0.0, course) @ tilt, theta
+            tilt = turn_matrix(_unit(axis) * atan2(norm(axis), cosine))
+        return product(level, tilt), theta
 
     def residuals(self, C0: Array, theta: Array) -> Array:
         """Velocities, courses and what is known of the biases, each over its sigma (E-81 to
@@ -251,27 +229,33 @@ class _Problem:
         """
         s = self._s
         C, u = self.motion(theta)
-        v = theta[V0] + self._passed[:, None] * self._down + u @ C0.T
+        v = theta[V0] + self._passed[:, None] * self._down + applied(C0, u)
         rows = [
             ((v - self._v) / self._sigma_v).ravel(),
             theta[BA] / s.sigma_accel,
             theta[BG] / s.sigma_gyro,
         ]
         if math.isfinite(s.sigma_slip):
-            speed = np.linalg.norm(self._v[:, :2], axis=1)
-            x_n = np.einsum("ij,kj->ki", C0, C[:, :, 0])
-            angle = np.arctan2(x_n[:, 1], x_n[:, 0]) - np.arctan2(self._v[:, 1], self._v[:, 0])
-            sigma = np.hypot(s.sigma_slip, self._sigma_v[:, 0] / np.maximum(speed, 1e-3))
+            speed = norm(self._v[:, :2])
+            x_n = applied(C0, C[:, :, 0])
+            angle = atan2(x_n[:, 1], x_n[:, 0]) - atan2(self._v[:, 1], self._v[:, 0])
+            slip = self._sigma_v[:, 0] / np.maximum(speed, 1e-3)
+            sigma = np.sqrt(s.sigma_slip**2 + slip * slip)
             rows.append((np.mod(angle + math.pi, 2.0 * math.pi) - math.pi) / sigma)
         return np.concatenate(rows)
 
     def jacobian(self, C0: Array, theta: Array) -> Array:
-        """By central differences: twelve unknowns, a few thousand samples, compiled."""
+        """By central differences: twelve unknowns; the core integrates the samples."""
         columns = []
         for j in range(UNKNOWNS):
             d = np.zeros(UNKNOWNS)
             d[j] = STEP[j]
-            plus = self.residuals(exp(d[PSI]) @ C0, theta + np.concatenate([np.zeros(3), d[3:]]))
-            minus = self.residuals(exp(-d[PSI]) @ C0, theta - np.concatenate([np.zeros(3), d[3:]]))
+            plus, minus = product(turn_matrix([d[PSI], -d[PSI]]), C0)
+            d[PSI] = 0.0
+            plus, minus = self.residuals(plus, theta + d), self.residuals(minus, theta - d)
             columns.append((plus - minus) / (2.0 * STEP[j]))
         return np.column_stack(columns)
+
+
+def _unit(v: Array) -> Array:
+    return v / norm(v)

@@ -22,7 +22,7 @@ tests/inertial/test_products.py.
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.attitude.rotation import from_rotation_vector, skew, to_dcm
+from inertial.rotation import from_rotation_vector, skew, to_matrix
 
 Array = NDArray[np.float64]
 
@@ -69,7 +69,7 @@ def transition(x: Array, alpha_m: Array, SQ: Array, dt: float, turning: bool) ->
         y[0:3] += dt * (alpha_m - x[3:6] - SQ[0:3] @ squares(x[0:3]))
     middle = 0.5 * (x[0:3] + y[0:3])
     y[21] += dt * middle[2]
-    y[12:15] = to_dcm(from_rotation_vector(-dt * middle)) @ x[12:15]
+    y[12:15] = to_matrix(from_rotation_vector(-dt * middle)) @ x[12:15]
     return y
 
 
@@ -81,7 +81,7 @@ def transition_jacobian(x: Array, y: Array, SQ: Array, dt: float, turning: bool)
     middle = 0.5 * (x[0:3] + y[0:3])
     # u between the samples: the turn's effect is then right to second order
     turned = dt * skew(0.5 * (x[12:15] + y[12:15]))
-    F[12:15, 12:15] = to_dcm(from_rotation_vector(-dt * middle))
+    F[12:15, 12:15] = to_matrix(from_rotation_vector(-dt * middle))
     F[12:15, 0:3] = turned
     F[21, 2] = dt
     if turning:

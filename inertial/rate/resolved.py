@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.attitude.rotation import from_rotation_vector, level, multiply, to_dcm
+from inertial.rotation import from_rotation_vector, level, multiply, to_matrix
 from inertial.rate.batch import Phase
 from inertial.rate.products_model import TURNED, squares
 
@@ -103,7 +103,7 @@ def _back(
                 multiply(q[k + 1], from_rotation_vector(-dt * middle)),
             )
         spread[k] = _then(P, t_s[-1] - t_s[k], (t_s[-1] - t_s[0]) / max(n - 1, 1), core)
-    up_b = to_dcm(q[0]).T @ np.array([0.0, 0.0, -1.0])
+    up_b = to_matrix(q[0]).T @ np.array([0.0, 0.0, -1.0])
     turn = multiply(level(up_b), q[0] * np.array([1.0, -1.0, -1.0, -1.0]))
     q = np.array([multiply(turn, one) for one in q])
     return Resolved(omega, spread, angle - angle[0], q, -float(angle[0]), turn)

@@ -196,11 +196,7 @@ def _errors(inputs: Inputs, first: int, out: results.Table) -> Errors:
         if row["horizon"] > 0:
             said.horizon.append((fix.t, row["horizon"], *row["inputs"]))
         x = row["x"]
-        psi = (
-            None
-            if inputs.C_nb is None
-            else rotation_vector(inputs.C_nb[k] @ x["C_nb"].T)
-        )
+        psi = None if inputs.C_nb is None else rotation_vector(inputs.C_nb[k] @ x["C_nb"].T)
         if psi is not None:
             said.t_from_start.append(fix.t - began)
             said.attitude_from_start.append(psi)

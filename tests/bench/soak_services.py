@@ -170,12 +170,10 @@ def estimator(folder: Path, hours: float, done: Any) -> None:
     from estimator.pipeline import Pipeline
     from estimator.saved_state import SavedState
     from estimator.settings import EstimatorSettings
-    from estimator.warm import warm
     from estimator.worker import Worker
     from messages.history.mending_state import Arrival
     from messages.history.spool import Spool
 
-    warm()
     settings = EstimatorSettings(journal=folder)
     spool = Spool(folder, max_bytes=KEPT_BYTES)
     publishers, saved = Publishers(None, "p", spool), SavedState(folder, settings, "soak")

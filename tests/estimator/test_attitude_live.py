@@ -11,7 +11,7 @@ from estimator.devices.attitude import AttitudeBoard
 from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from inertial.attitude.filters import ATTITUDES
-from inertial.attitude.rotation import to_dcm
+from inertial.rotation import to_matrix
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ATTITUDE, IMU
 
@@ -44,7 +44,7 @@ def test_imu_batches_become_attitudes_of_every_filter():
     assert len(said) == 100 * len(NAMES)  # 100 Hz in, 50 Hz out
     for output in said[-len(NAMES) :]:
         message = output.message
-        up = to_dcm(np.array(message.q_nb))[2]
+        up = to_matrix(np.array(message.q_nb))[2]
         np.testing.assert_allclose(up, [0.0, np.sin(0.3), np.cos(0.3)], atol=1e-3)
         assert not message.heading_known
         assert message.header.device == "board"
@@ -89,7 +89,7 @@ def test_a_short_gap_is_bridged_and_a_long_one_starts_anew(caplog):
         1, 120, 0.01, f[:1], turning[:1]
     )  # ten lost: 0.1 rad in all, but for the accelerometer's pull
     assert board.filters["tilt-vector"] is before
-    tilt = {o.estimator: np.arccos(to_dcm(o.state.q_nb)[2, 2]) for o in said}
+    tilt = {o.estimator: np.arccos(to_matrix(o.state.q_nb)[2, 2]) for o in said}
     assert 0.19 < tilt["tilt-vector"] < 0.21
     board.feed(1, 200, 0.01, f[:1], turning[:1])
     assert board.filters["tilt-vector"] is not before

@@ -13,7 +13,7 @@ from gateway.ports.reader import Chunk
 from gateway.settings import DeviceSettings, GatewaySettings
 from gateway.virtual.virtual_board import SIMULATED, BoardAdc, VirtualBoard
 from gyrofree.running.simulate_hand import CHANNELS, Guide, motion, wiring_of
-from inertial.attitude.rotation import to_dcm
+from inertial.rotation import to_matrix
 from inertial.simulation.hand import RATE_HZ, Hand
 from messages.bus.session import BusSettings
 from messages.contract import gyrofree_pb2 as pb
@@ -81,7 +81,7 @@ class Bench:
         angles = [
             np.arccos(
                 np.clip(
-                    to_dcm(np.array(o.message.q_nb))[2] @ self.truth[o.message.for_index][2],
+                    to_matrix(np.array(o.message.q_nb))[2] @ self.truth[o.message.for_index][2],
                     -1.0,
                     1.0,
                 )

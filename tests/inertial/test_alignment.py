@@ -7,11 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from inertial.attitude.rotation import to_dcm
 from inertial.navigation.alignment import Alignment, AlignmentSettings
 from inertial.navigation.alignment_motion import MotionSettings, MotionWindow
 from inertial.navigation.navigation import NAVIGATORS, Mode, NavigatorConfig
-from inertial.navigation.strapdown import dcm_to_euler, rotation_vector
+from inertial.rotation import euler_angles, rotation_vector, to_matrix
 from inertial.simulation.drive import DEG, simulate
 from logs.score import CAR_LEVER_ARM_B, COURSE_SPEED, Drive, read_drive
 
@@ -162,10 +161,10 @@ def test_navigation_begins_in_motion_and_stays_consistent():
             navigator.fix(fixes.pop(0))
         navigator.imu(row[0], row[1:4], row[4:7])
         if navigator.mode == Mode.NAVIGATING and row[0] > 245.0:
-            yaw = dcm_to_euler(to_dcm(navigator.solution().q_nb))[2]
+            yaw = euler_angles(to_matrix(navigator.solution().q_nb))[2]
             heading.append(
                 math.remainder(
-                    yaw - dcm_to_euler(drive.truth.C_nb[drive.row_of(row[0])])[2], math.tau
+                    yaw - euler_angles(drive.truth.C_nb[drive.row_of(row[0])])[2], math.tau
                 )
             )
     assert "in motion" in navigator.solution().alignment

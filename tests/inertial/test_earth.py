@@ -69,5 +69,8 @@ def test_core_and_numpy_twin_give_the_same_bits() -> None:
         assert np.array(single).tobytes() == whole.tobytes(), name
     there = (L + 1e-4 * NORTH, LON[::-1], H[::-1])
     whole = np.stack(ned_between((L, LON, H), there), axis=-1)
-    single = [native.earth.ned_between(*o, *p) for o, p in zip(zip(L, LON, H), zip(*there))]
+    single = [
+        native.earth.ned_between(*o, *p)
+        for o, p in zip(zip(L, LON, H, strict=True), zip(*there, strict=True), strict=True)
+    ]
     assert np.array(single).tobytes() == whole.tobytes()

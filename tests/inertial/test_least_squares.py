@@ -5,13 +5,13 @@ bad data.
 import numpy as np
 import pytest
 
-from inertial.attitude.rotation import multiply, to_dcm
 from inertial.core import native
 from inertial.layouts.catalogue import CUBE, LAYOUTS
 from inertial.layouts.layout import GeometryError, Layout
 from inertial.rate.estimators import ESTIMATORS, LeastSquaresRate
 from inertial.rate.observed import sensor
 from inertial.rate.products_model import squares
+from inertial.rotation import multiply, to_matrix
 from inertial.simulation.table import IDEAL, TableTest
 
 
@@ -118,7 +118,7 @@ def derivative(y, u, s):
     omega, q = y[:3], y[3:7]
     x = u - np.vstack([s.SQ_alpha, s.SQ_force]) @ squares(omega)
     turned = 0.5 * multiply(q, np.concatenate([[0.0], omega]))
-    force = to_dcm(q / np.linalg.norm(q)) @ x[3:] + np.array([0.0, 0.0, 9.80665])
+    force = to_matrix(q / np.linalg.norm(q)) @ x[3:] + np.array([0.0, 0.0, 9.80665])
     return np.concatenate([x[:3], turned, [omega[2]], force, y[8:11]])
 
 

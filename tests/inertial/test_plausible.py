@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inertial.attitude.rotation import from_rotation_vector, multiply, to_dcm
 from inertial.plausible import doubt_of_gravity, doubt_of_rate, doubt_of_time
+from inertial.rotation import from_rotation_vector, multiply, to_matrix
 
 G = 9.80665
 
@@ -26,7 +26,7 @@ def tumbled(seed: int, seconds: float = 30.0, noise: float = 0.05, bias: float =
     omega[:300] = 0.0
     q, f = np.array([1.0, 0.0, 0.0, 0.0]), np.empty((len(t), 3))
     for k, w in enumerate(omega):
-        f[k] = to_dcm(q).T @ np.array([0.0, 0.0, -G])
+        f[k] = to_matrix(q).T @ np.array([0.0, 0.0, -G])
         q = multiply(q, from_rotation_vector(w * 0.01))
     f += draw.normal(0.0, noise, f.shape) + draw.normal(0.0, 0.2, 3)
     return t, f, omega + draw.normal(0.0, 0.01, omega.shape) + draw.normal(0.0, bias, 3)

@@ -7,8 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from inertial.attitude.rotation import to_dcm
 from inertial.constants import GRAVITY
+from inertial.rotation import to_matrix
 from inertial.simulation.profiles import PROFILES
 from inertial.simulation.table import BLOCK, COUNTS, IDEAL, SensorModel, TableTest
 
@@ -43,7 +43,7 @@ def test_readings_are_the_second_difference_of_sensor_positions():
         profile="published", sensor=IDEAL, rate_hz=2000.0, centre_b=(0.01, -0.02, 0.03)
     )
     block = table.block(11)  # from 5.5 s, in the ramp
-    C_nb = np.array([to_dcm(q) for q in block.q_nb])
+    C_nb = np.array([to_matrix(q) for q in block.q_nb])
     h = table.period_s
     R_n = np.einsum("tij,kj->tki", C_nb, table.layout.r_b + [0.01, -0.02, 0.03])
     felt_n = (R_n[2:] - 2 * R_n[1:-1] + R_n[:-2]) / h**2 - [0.0, 0.0, GRAVITY]
@@ -54,7 +54,7 @@ def test_readings_are_the_second_difference_of_sensor_positions():
 
 def test_truth_rate_turns_the_truth_attitude():
     block = TableTest(profile="wobble", rate_hz=2000.0).block(16)
-    C = np.array([to_dcm(q) for q in block.q_nb])
+    C = np.array([to_matrix(q) for q in block.q_nb])
     turn = np.einsum("tji,tjk->tik", C[:-2], C[2:]) / (2.0 / 2000.0)
     np.testing.assert_allclose(turn[:, 1, 0], block.omega_b[1:-1, 2], atol=1e-4)
 

@@ -12,7 +12,7 @@ from estimator.choice import UnknownEstimator
 from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from inertial.attitude.axis_map import AXES, MapError, read_map
-from inertial.attitude.rotation import to_dcm
+from inertial.rotation import to_matrix
 from inertial.simulation.hand import GUIDED, AnalogueWiring, guided, misread
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ADC, ATTITUDE, IMU, WIRING
@@ -87,9 +87,9 @@ def tilt_errors(outputs, truth, first=0):
     out = []
     for o in outputs:
         if o.topic is ATTITUDE:
-            up = to_dcm(np.array(o.message.q_nb))[2]
+            up = to_matrix(np.array(o.message.q_nb))[2]
             out.append(
-                np.arccos(np.clip(up @ to_dcm(truth[o.message.for_index - first])[2], -1.0, 1.0))
+                np.arccos(np.clip(up @ to_matrix(truth[o.message.for_index - first])[2], -1.0, 1.0))
             )
     return np.array(out)
 

@@ -6,7 +6,7 @@ equations; nothing is left out because it is zero.
 
 import numpy as np
 
-from inertial.attitude.rotation import from_rotation_vector, to_dcm
+from inertial.rotation import from_rotation_vector, to_matrix
 from inertial.rate import products_model as model
 
 SPREAD = 3.0  # of the sigma points
@@ -30,7 +30,7 @@ def predict(x, P, alpha_m, s, dt, turning, fixed=False):
         new = y.copy()
         new[model.OMEGA] = omega + dt * N @ alpha
         middle = 0.5 * (omega + new[model.OMEGA])
-        C = to_dcm(from_rotation_vector(-dt * middle))
+        C = to_matrix(from_rotation_vector(-dt * middle))
         new[model.U], new[model.TURNED] = C @ x[model.U], x[model.TURNED] + dt * middle[2]
         F = model.transition_jacobian(x, new, SQ(s), dt, turning)
         across = np.eye(3) - N

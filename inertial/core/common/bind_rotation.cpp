@@ -69,6 +69,9 @@ void bind_rotation(nb::module_& m) {
   r.def("multiply",
         [](const VectorIn& p, const VectorIn& q) { return to_numpy_vector(numbers(quaternion(p) * quaternion(q))); },
         nb::arg("p"), nb::arg("q"));
+  r.def("turned",
+        [](const MatrixIn& C, const VectorIn& v) { return to_numpy(product(matrix(C), turn_matrix(vector(v)))); },
+        nb::arg("C_nb"), nb::arg("v_b"), "C_nb after a turn of b by the rotation vector v_b, rad");
   r.def("level",
         [](const VectorIn& f) {
           const auto q = level(vector(f));

@@ -59,6 +59,8 @@ void bind_elementary(nb::module_& m);
 void bind_rate(nb::module_& m);
 void bind_rotation(nb::module_& m);
 void bind_places(nb::module_& m);
+void bind_attitude(nb::module_& m);
+void bind_alignment(nb::module_& m);
 void bind_health(nb::module_& m);
 void bind_navigation(nb::module_& m);
 

@@ -18,6 +18,11 @@ struct Quaternion {
   double x = 0.0;
   double y = 0.0;
   double z = 0.0;
+
+  template <class Self, class Visitor>
+  static void visit(Self& s, Visitor& v) {
+    v("w", s.w), v("x", s.x), v("y", s.y), v("z", s.z);
+  }
 };
 
 // Hamilton product p q: first q, then p.
