@@ -43,25 +43,32 @@ setup: .make/tools
 	$(INSTALL) -r requirements/runtime.txt
 	@touch $@
 
-# The package itself, editable, with its compiled core.
+# The package itself, editable, with the build of its core that this machine runs.
 CORE := $(wildcard inertial/core/*.c* inertial/core/CMakeLists.txt inertial/core/*/*.?pp)
 .make/core: pyproject.toml $(CORE) .make/tools
 	@echo "Compiling the core ..."
 	CXX="$$(cat .make/compiler)" $(PIP) install --quiet --no-deps --no-build-isolation \
-		--config-settings=cmake.define.Python_INCLUDE_DIR="$$(cat .make/headers)" --editable .
+		--config-settings=cmake.define.Python_INCLUDE_DIR="$$(cat .make/headers)" --config-settings=cmake.define.BUILDS=here --editable .
+	@touch $@
+
+# Both builds of the core: what the tests compare.
+.make/both-cores: .make/core
+	@echo "Compiling the core a second time, for any processor ..."
+	CXX="$$(cat .make/compiler)" $(PIP) install --quiet --no-deps --no-build-isolation \
+		--config-settings=cmake.define.Python_INCLUDE_DIR="$$(cat .make/headers)" --config-settings=cmake.define.BUILDS=both --editable .
 	@touch $@
 
 # A wheel in dist/ that needs no compiler where it is installed.
 wheel: .make/tools
 	CXX="$$(cat .make/compiler)" $(PIP) wheel --quiet --no-deps --no-build-isolation \
-		--config-settings=cmake.define.Python_INCLUDE_DIR="$$(cat .make/headers)" --wheel-dir dist .
+		--config-settings=cmake.define.Python_INCLUDE_DIR="$$(cat .make/headers)" --config-settings=cmake.define.BUILDS=both --wheel-dir dist .
 	@ls dist/*.whl
 
 .make/board: requirements/board.txt .make/runtime
 	$(INSTALL) -r requirements/board.txt
 	@touch $@
 
-dev: .make/dev
+dev: .make/dev .make/both-cores
 .make/dev: requirements/dev.txt .make/runtime
 	$(INSTALL) -r requirements/dev.txt
 	@touch $@

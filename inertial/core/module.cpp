@@ -1,11 +1,9 @@
 // The hot loops of inertial/, as one Python module. Each subject binds itself.
-#include "common/processor.hpp"
 #include "common/python.hpp"
 
 NB_MODULE(GYROFREE_MODULE, m) {
   m.doc() = "Hot loops of the estimators: the same bits on every processor.";
   m.attr("VERSION") = GYROFREE_VERSION;
-  m.def("runs_v3", &gyrofree::runs_v3, "True where this processor runs the x86-64-v3 build of the core.");
   gyrofree::bind_elementary(m);
   gyrofree::bind_rate(m);
   gyrofree::bind_rotation(m);

@@ -165,7 +165,7 @@ def test_the_first_state_is_that_of_the_motion():
 
 
 def test_both_builds_of_the_monitor_give_the_same_bits():
-    builds = [core._core_plain, getattr(core, "_core_v3", core._core_plain)]
+    builds = list(core.builds().values())
     layout, draw = CUBE(0.05), np.random.default_rng(8)
     c, used = constants(layout, draw), np.ones(12, bool)
     x, P = believe(draw)
