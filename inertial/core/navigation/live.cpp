@@ -7,7 +7,6 @@
 namespace gyrofree::navigation {
 namespace {
 
-constexpr double SAME_TIME_S = 1e-9;
 constexpr std::size_t BEFORE_ANCHOR = 2;      // samples that the first one after the anchor looks at
 constexpr std::size_t DROPPED_AT_ONCE = 512;  // so that dropping costs nothing per sample
 
