@@ -59,7 +59,7 @@ struct LowPass {
     }
     samples += 1.0;
     sum += x;
-    const Vector<N> mean = sum / samples;
+    Vector<N> mean = sum / samples;
     if (samples * period >= tau) {
       settled = true;
       now = (1.0 - c.b0) * mean;

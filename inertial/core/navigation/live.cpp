@@ -59,7 +59,7 @@ bool Live::too_late(double t) const { return t < anchor.time - SAME_TIME_S; }
 FixResult Live::take(const Fix& fix) {
   Leg trial = anchor;
   std::size_t k = anchor_next;
-  const FixResult out = take_at(trial, model, settings, memory, history, k, history.size(), fix);
+  FixResult out = take_at(trial, model, settings, memory, history, k, history.size(), fix);
   if (!was_used(out.status)) return out;
   anchor = head = trial;
   anchor_next = k;
