@@ -99,7 +99,7 @@ class Engine:
                 self._handle,
                 ctypes.byref(hook),
                 HOOK_BLOCK,
-                ctypes.c_void_p(cy.on_block.address),
+                cy.on_block,
                 ctypes.cast(self.state, ctypes.c_void_p),
                 ctypes.c_uint64(1),
                 ctypes.c_uint64(0),

@@ -28,5 +28,7 @@ Index, in the order in which the data pass:
     navigation    strapdown, alignment, GNSS updates, constraints
     simulation    tables, drives and hands that move an array, with its errors
     core          the hot loops in C++20, bound by nanobind
+    timing        period, numbers and holes of a row of time stamps
+    plausible     are the numbers what their units say?
     toml_file     files with a version, read strictly and written whole
 """

@@ -4,7 +4,7 @@ tachometer.
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +17,15 @@ from inertial.layouts.catalogue import find
 from inertial.layouts.layout import GeometryError, Layout
 from inertial.plausible import doubt_of_gravity
 from inertial.rate import resolved
+from inertial.rate.batch import RateColumns
 from inertial.rate.beliefs import make
 from inertial.rate.estimators import ESTIMATORS, ProductsRate
 from inertial.rate.names import LEADER
-from inertial.rate.sight import ALL_BLIND
+from inertial.rate.sight import BLIND
 from inertial.rate.tachometer import SUFFIX
-from logs.cube_axes import examine
+from logs.cube_axes import axes_of
 from logs.cube_log import CubeLog, read_log
+from logs.cube_parts import Monitored, Part, cut, monitored
 from logs.cube_run import EstimatorRun, reference
 from logs.cube_score import bound_of, notes_of, score
 from logs.quantities import refuse, said_of
@@ -32,9 +34,6 @@ from logs.sheet import LogError
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
-WARM_SAMPLES = (
-    560  # run on a throw-away estimator, into the first turn, so that no compiler is timed
-)
 SHOW_GAPS = 20
 TACHO_SIGMA = (
     0.03  # rad/s; a log says neither how well its tachometer measured nor when its pulses came
@@ -80,7 +79,7 @@ def run_cube(
     )
     if tacho_aid and data.tacho is None:
         raise LogError(f"--tacho-aid: {log} has no column tacho_rad_s")
-    tracks, notes = run_log(data, shape, used, estimators, progress, tacho_aid, resolve)
+    tracks, watched, notes = run_log(data, shape, used, estimators, progress, tacho_aid, resolve)
     truth = reference(data)
     aided = [name for name in tracks if name.endswith(SUFFIX)]
     if truth.name == "tachometer":
@@ -116,7 +115,7 @@ def run_cube(
             "missing_samples": sum(gap.missing for gap in data.gaps),
             "list": [asdict(gap) for gap in data.gaps[:SHOW_GAPS]],
         },
-        "axes": examine(data, shape),
+        "axes": axes_of(data, shape, watched),
         "notes": [
             *doubtful,
             *said_of(log, data.timing, data.cut_off),
@@ -152,9 +151,9 @@ def run_log(
     progress: Progress = nothing,
     tacho_aid: bool = False,
     resolve: bool = False,
-) -> tuple[dict[str, EstimatorRun], list[str]]:
-    """Tracks of the estimators that can use this layout, and why the others cannot. Raises
-    LogError, CardError.
+) -> tuple[dict[str, EstimatorRun], Monitored, list[str]]:
+    """Tracks of the estimators that can use this layout, what the axis monitor says, and why others
+    cannot. Raises LogError, CardError.
     """
     f_axis = data.f_axis * np.array(shape.gain)
     if card is not None:
@@ -163,7 +162,9 @@ def run_log(
     for name in chosen:
         if name not in ESTIMATORS:
             raise LogError(f"no estimator {name!r}; want some of {', '.join(ESTIMATORS)}")
-    tracks, notes = {}, []
+    watched = monitored(data, shape, f_axis)
+    tracks: dict[str, EstimatorRun] = {}
+    notes = [f"{text}: not used" for text in watched.named(data.names)]
     for k, name in enumerate(chosen):
         try:
             with np.errstate(
@@ -174,6 +175,7 @@ def run_log(
                     data,
                     shape,
                     f_axis,
+                    watched.parts,
                     lambda part, k=k, name=name: progress(
                         0.05 + 0.9 * (k + part) / len(chosen), name
                     ),
@@ -188,7 +190,7 @@ def run_log(
             notes.append(
                 f"{name}: its rate grew beyond all numbers on layout {shape.name}: no result"
             )
-    return tracks, notes
+    return tracks, watched, notes
 
 
 def run_estimator(
@@ -196,58 +198,75 @@ def run_estimator(
     data: CubeLog,
     shape: Layout,
     f_axis: Array,
+    parts: Sequence[Part],
     progress: Callable[[float], None] = lambda part: None,
     card: Card | None = None,
     tacho_aid: bool = False,
     resolve: bool = False,
 ) -> EstimatorRun:
-    """Every sample of a log through one estimator; missing samples are announced to it as on the
-    live path.
+    """Every sample of a log through one estimator, in the parts that the axis monitor cut; missing
+    samples are announced to it as on the live path.
 
     With tacho_aid the name of the track ends in SUFFIX, once the estimator has used the tachometer;
     with resolve in resolved.SUFFIX, where the log began while turning and a sign was decided.
+    Raises GeometryError when the axes that are believed cannot see the motion.
     """
-    warm = make(ESTIMATORS[name], shape)
-    for k in range(min(WARM_SAMPLES, len(data.t_s))):
-        warm.step(k, k * data.period_s, f_axis[k])
     estimator, n = make(ESTIMATORS[name], shape, card), len(data.t_s)
-    reports, aided = _reports(data) if tacho_aid else {}, False
-    omega, P, q, angle = np.zeros((n, 3)), np.zeros((n, 3, 3)), np.zeros((n, 4)), np.zeros(n)
-    alpha, force, still, p_n = (
-        np.zeros((n, 3)),
-        np.zeros((n, 3)),
-        np.zeros(n, dtype=bool),
-        np.zeros((n, 3)),
-    )
-    missing = np.diff(data.index, prepend=data.index[0] - 1) - 1
-    busy, blind, why = 0, 0, ""
-    for k in range(n):
-        started = time.thread_time_ns()
-        if missing[k]:
-            estimator.skip(int(missing[k]))
-        s = estimator.step(int(data.index[k]), float(data.t_s[k]), f_axis[k])
-        if k in reports:
-            estimator.tacho(float(data.t_s[k]), reports[k], TACHO_SIGMA)
-        busy += time.thread_time_ns() - started
-        aided = aided or bool(s.aid)
-        if tuple(s.sight) == ALL_BLIND:
-            blind, why = blind + 1, s.sight_reason
-        omega[k], P[k], q[k], angle[k], still[k] = s.omega_b, s.P, s.q_nb, s.angle_z, s.still
-        alpha[k], force[k], p_n[k] = s.alpha_b, s.f_b, s.p_n
-        if k % 200 == 0:
-            progress(k / n)
-    called = name + SUFFIX if aided else name
+    reports = _reports(data) if tacho_aid else {}
+    said: list[RateColumns] = []
+    busy, mask = 0, 0
+    for part in cut(parts, list(reports)):
+        began = time.thread_time_ns()
+        if part.missing:
+            estimator.skip(part.missing)
+        if part.mask != mask:
+            estimator.exclude(part.mask)
+            mask = part.mask
+        rows = slice(part.begin, part.end)
+        said.append(estimator.feed(data.t_s[rows], f_axis[rows]))
+        if (last := part.end - 1) in reports:
+            estimator.tacho(float(data.t_s[last]), reports[last], TACHO_SIGMA)
+        busy += time.thread_time_ns() - began
+        progress(part.end / n)
+    run = _joined(name, said, busy / n / 1000.0)
     if resolve and issubclass(ESTIMATORS[name], ProductsRate):
-        fresh = make(ESTIMATORS[name], shape, card)
-        whole = int(np.argmax(missing[1:] > 0)) + 1 if (missing[1:] > 0).any() else n
-        if past := resolved.resolve(fresh.core, data.t_s[:whole], f_axis[:whole]):
-            called += resolved.SUFFIX
-            past.into(omega, P, angle, q)
-            blind = 0
-    said = why if 2 * blind > n else ""
+        return _resolved(run, make(ESTIMATORS[name], shape, card), data, f_axis)
+    return run
+
+
+def _joined(name: str, said: Sequence[RateColumns], us_per_sample: float) -> EstimatorRun:
+    """The columns of all parts as one run."""
+
+    def column(field: str) -> Array:
+        return np.concatenate([getattr(columns, field) for columns in said])
+
+    blind = (column("sight") == BLIND).all(axis=1)
+    why = ""
+    if 2 * np.count_nonzero(blind) > len(blind):
+        last = said[-1]
+        k = len(last) - 1 - int(np.argmax((last.sight == BLIND).all(axis=1)[::-1]))
+        why = last.sight_reason(k) or "not known"
     return EstimatorRun(
-        called, omega, P, q, angle, alpha, force, still, p_n, busy / n / 1000.0, said
+        name + SUFFIX if column("aided").any() else name,
+        *(column(field) for field in ("omega_b", "P", "q_nb", "angle_z", "alpha_b", "f_b")),
+        column("still"),
+        column("p_n"),
+        us_per_sample,
+        why,
     )
+
+
+def _resolved(run: EstimatorRun, fresh: ProductsRate, data: CubeLog, f_axis: Array) -> EstimatorRun:
+    """The run with its beginning corrected, where the log began while turning and a sign was
+    decided later.
+    """
+    hole = np.diff(data.index) > 1
+    whole = int(np.argmax(hole)) + 1 if hole.any() else len(data.t_s)
+    past = resolved.resolve(fresh.core, data.t_s[:whole], f_axis[:whole])
+    if not past:
+        return run
+    past.into(run.omega_b, run.P, run.angle_z, run.q_nb)
+    return replace(run, name=run.name + resolved.SUFFIX, blind="")
 
 
 def _reports(data: CubeLog) -> dict[int, float]:

@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.layouts.layout import Layout
+from inertial.rate.axis_fault import AxisState
 from logs.cube_log import CubeLog
+from logs.cube_parts import Monitored
 
 STUCK_S = 1.0  # s of exactly the same reading ; at rest, coarse counts may repeat for long
 SATURATED = (-4096, 4095)  # counts, ADXL345 in full resolution, +-16 g
@@ -14,6 +16,16 @@ NOISELESS = 1e-3  # m/s^2; no accelerometer is quieter
 MOVING = (
     0.5  # m/s^2, standard deviation of the other axes over a stretch that tells turning from rest
 )
+
+
+def axes_of(data: CubeLog, shape: Layout, watched: Monitored) -> dict[str, dict[str, Any]]:
+    """As `examine`, with the axis monitor's word where it says that an axis is not good."""
+    found = examine(data, shape)
+    for name, fault in zip(data.names, watched.faults, strict=True):
+        if fault.state not in (AxisState.GOOD, AxisState.SUSPECT):
+            found[name]["state"] = fault.state.name.lower()
+            found[name]["text"] = fault.text
+    return found
 
 
 def examine(data: CubeLog, shape: Layout) -> dict[str, dict[str, Any]]:

@@ -13,4 +13,5 @@ if("$ENV{CXX}" STREQUAL "zig" OR NOT (CMAKE_CXX_COMPILER OR DEFINED ENV{CXX} OR 
   # Named by target, so that it compiles for any processor of the kind, not for the one it runs on.
   cmake_host_system_information(RESULT PROCESSOR QUERY OS_PLATFORM)
   set(CMAKE_CXX_COMPILER "${ZIG}" c++ -target ${PROCESSOR}-linux-gnu)
+  set(CMAKE_C_COMPILER "${ZIG}" cc -target ${PROCESSOR}-linux-gnu)
 endif()

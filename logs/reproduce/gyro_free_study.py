@@ -92,7 +92,7 @@ def recorded(path: Path, progress: Progress = lambda done, what: None) -> Study:
 
 
 def _run(log: CubeLog, layout: Layout, progress: Progress) -> Study:
-    tracks, _ = run_log(
+    tracks, _, _ = run_log(
         log, layout, None, [PAPERS_WAY, OURS], lambda done, what: progress(0.7 * done, what)
     )
     x = log.f_axis @ layout.S.T

@@ -134,7 +134,9 @@ def test_a_log_sent_in_pieces_becomes_a_session(door):
     header = "t_s," + ",".join(f"a{t}{k}_counts" for t in (1, 2, 3, 4) for k in (1, 2, 3))
     rows = [
         f"{n / 100:.2f},"
-        + ",".join(str((n * 7 + k) % 5 + (256 if k % 3 == 2 else 0)) for k in range(12))
+        + ",".join(
+            str((n * 7 + k) % 5 + up) for k, up in enumerate([0, 0, 256] * 2 + [0, 0, -256] * 2)
+        )
         for n in range(200)
     ]
     data = "\n".join([header, *rows, ""]).encode()

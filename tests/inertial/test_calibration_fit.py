@@ -180,7 +180,7 @@ def test_card_survives_its_file_and_refuses_strangers(devices, tmp_path):
     with pytest.raises(CardError, match="is for layout cube"):
         again.layout(find_layout("edges-12", 0.05))
     path.write_text(path.read_text().replace("version = 1", "version = 9"))
-    with pytest.raises(CardError, match="card version 9, this program reads 1"):
+    with pytest.raises(CardError, match="file version 9, this program reads 1"):
         read_card(path)
     path.write_text("version = 1\nid = 'x'\n")
     with pytest.raises(CardError, match="not a whole calibration file"):

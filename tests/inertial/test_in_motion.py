@@ -161,4 +161,4 @@ def test_what_cannot_be_run_is_refused(tmp_path):
 def test_the_wrong_tuning_reaches_the_filter():
     loud, quiet = in_motion.tuned(Tuning(q_scale=4.0)), in_motion.tuned(Tuning(constant_bias=True))
     assert loud.accel == pytest.approx(2.0 * in_motion.HONEST.accel)
-    assert quiet.vector()[9:15].max() < 1e-20
+    assert quiet.density()[9:15].max() < 1e-20

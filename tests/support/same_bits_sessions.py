@@ -8,6 +8,7 @@ from google.protobuf.message import Message
 
 from estimator.choice import rate_estimators
 from gyrofree.running.importer import rows_of
+from logs.board_log import read_board_log
 from gyrofree.running.simulate_csv import write
 from inertial.attitude.filters import ATTITUDES
 from inertial.navigation.navigation import NAVIGATORS
@@ -27,7 +28,7 @@ Item = tuple[Topic, Message]
 def table(folder: Path) -> Session:
     """The published test on a turning table, with its tachometer, through every rate estimator."""
     write(folder / "table.csv", "published", 3)
-    rows = rows_of(folder / "table.csv", None, "gyrofree", "cube")
+    rows = rows_of(read_board_log(folder / "table.csv"), "gyrofree", "cube")
     items = [(parse(key).topic.name, payload) for _, key, payload in rows]
     return Session({"rate": list(rate_estimators()), "tacho_aid": True}, items)
 

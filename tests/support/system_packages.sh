@@ -10,6 +10,8 @@ need g++ "g++ libc6-dev"
 need git git
 need arm-none-eabi-gcc gcc-arm-none-eabi
 need qemu-system-arm qemu-system-arm
+need aarch64-linux-gnu-g++ g++-aarch64-linux-gnu
+need qemu-aarch64 qemu-user
 need clang-tidy clang-tidy
 need cppcheck cppcheck
 

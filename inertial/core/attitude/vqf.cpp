@@ -83,7 +83,7 @@ void Vqf::watch_force(const Vector3& f_b) {
 Vector3 Vqf::incline(const Vector3& f_b) {
   const Vector3 f_e = rotate(q_eg, f_g.step(rotate(q_gb, f_b), smooth, SETTINGS.tau_accel, period));
   const double size = norm_of(f_e);
-  const Vector3 up_e = size > 0.0 ? Vector3(f_e / size) : f_e;
+  Vector3 up_e = size > 0.0 ? Vector3(f_e / size) : f_e;
   const double w = std::sqrt((up_e.z() + 1.0) / 2.0);
   Quaternion turn{0.0, 1.0, 0.0, 0.0};  // upside down: any horizontal axis will do
   if (w > 1e-6) turn = {w, 0.5 * up_e.y() / w, -0.5 * up_e.x() / w, 0.0};

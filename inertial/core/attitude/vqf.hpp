@@ -52,14 +52,14 @@ struct LowPass {
 
   Vector<N> step(const Vector<N>& x, const Butterworth& c, double tau, double period) {
     if (settled) {
-      const Vector<N> y = c.b0 * x + now;
+      Vector<N> y = c.b0 * x + now;
       now = c.b1 * x - c.a1 * y + next;
       next = c.b2 * x - c.a2 * y;
       return y;
     }
     samples += 1.0;
     sum += x;
-    const Vector<N> mean = sum / samples;
+    Vector<N> mean = sum / samples;
     if (samples * period >= tau) {
       settled = true;
       now = (1.0 - c.b0) * mean;

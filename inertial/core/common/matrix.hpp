@@ -76,6 +76,12 @@ inline Matrix3 skew(const Vector3& v) {
   return s;
 }
 
+inline Vector3 cross(const Vector3& a, const Vector3& b) {
+  return {a.y() * b.z() - a.z() * b.y(), a.z() * b.x() - a.x() * b.z(), a.x() * b.y() - a.y() * b.x()};
+}
+
+inline double square(double x) { return x * x; }
+
 // Makes a square matrix symmetric by the mean of its halves.
 template <typename A>
 void symmetrise(Eigen::MatrixBase<A>& a) {

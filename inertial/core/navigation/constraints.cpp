@@ -9,7 +9,6 @@ constexpr int FORWARD = 0, SIDE = 1, BELOW = 2;  // of the body
 constexpr int SIDEWAYS = 0, VERTICAL = 1, WHEEL_ROWS = 2;
 constexpr int ZERO_V = 0, ZERO_W = 3, STILL_ROWS = 6;
 
-constexpr int SECOND = 10;             // ticks
 constexpr int LEAST_TICKS = 8;         // of them, to judge a standstill
 constexpr double LEAST_TICK_S = 0.05;  // shorter ones are too noisy
 constexpr double STILL_BIAS = 3.0;     // times still_w_change: more is a turn
@@ -90,7 +89,7 @@ bool standing(const Leg& leg, const Rules& rules) {
   if (std::sqrt(v[NORTH] * v[NORTH] + v[EAST] * v[EAST]) > rules.still_speed) return false;
   Spread f, omega;
   int count = 0;
-  for (int k = TICKS - SECOND; k < TICKS; ++k) {
+  for (int k = TICKS - TICKS_A_SECOND; k < TICKS; ++k) {
     const Tick& tick = leg.ticks[k];
     if (tick.length < LEAST_TICK_S) continue;
     ++count;

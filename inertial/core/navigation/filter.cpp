@@ -10,8 +10,6 @@ namespace gyrofree::navigation {
 namespace {
 
 constexpr double NOTHING = std::numeric_limits<double>::quiet_NaN();
-constexpr double SAME_TIME_S = 1e-9;
-constexpr int SECOND = 10;  // ticks
 
 // A course is the heading of the moment that the receiver's velocity is of.
 double yaw_of_course(const Nominal& x, const Vector3& rate_b) {
@@ -164,7 +162,7 @@ FixResult take(Leg& leg, const Model& model, const Settings& s, Memory& memory, 
 Vector<2> motion(const Leg& leg, bool literal, double still_f) {
   Vector3 f = Vector3::Zero(), omega = Vector3::Zero();
   double T = 0.0;
-  for (int k = TICKS - (literal ? 1 : SECOND); k < TICKS; ++k) {
+  for (int k = TICKS - (literal ? 1 : TICKS_A_SECOND); k < TICKS; ++k) {
     T += leg.ticks[k].length;
     f += leg.ticks[k].f_b;
     omega += leg.ticks[k].omega_b;

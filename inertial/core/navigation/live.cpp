@@ -7,7 +7,6 @@
 namespace gyrofree::navigation {
 namespace {
 
-constexpr double SAME_TIME_S = 1e-9;
 constexpr std::size_t BEFORE_ANCHOR = 2;      // samples that the first one after the anchor looks at
 constexpr std::size_t DROPPED_AT_ONCE = 512;  // so that dropping costs nothing per sample
 
@@ -60,7 +59,7 @@ bool Live::too_late(double t) const { return t < anchor.time - SAME_TIME_S; }
 FixResult Live::take(const Fix& fix) {
   Leg trial = anchor;
   std::size_t k = anchor_next;
-  const FixResult out = take_at(trial, model, settings, memory, history, k, history.size(), fix);
+  FixResult out = take_at(trial, model, settings, memory, history, k, history.size(), fix);
   if (!was_used(out.status)) return out;
   anchor = head = trial;
   anchor_next = k;

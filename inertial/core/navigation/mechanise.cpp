@@ -33,10 +33,6 @@ Here earth_here(const LocalEarth& e, const Nominal& x) {
   return here;
 }
 
-Vector3 cross(const Vector3& a, const Vector3& b) {
-  return {a.y() * b.z() - a.z() * b.y(), a.z() * b.x() - a.x() * b.z(), a.x() * b.y() - a.y() * b.x()};
-}
-
 // Exp(-u) C to second order, for the turn of n: 1e-6 rad a sample.
 Matrix3 turned_against(const Vector3& u, const Matrix3& C) {
   const double half_square = 0.5 * square_of(u);

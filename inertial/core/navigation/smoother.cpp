@@ -5,8 +5,6 @@
 namespace gyrofree::navigation {
 namespace {
 
-constexpr double SAME_TIME_S = 1e-9;
-
 using Kept = Eigen::MatrixXd;  // on the heap: an hour has ten thousand events
 
 struct Event {

@@ -198,6 +198,8 @@ struct Shake {
 };
 
 constexpr int TICKS = 16;  // remembered: 1.6 s
+constexpr int TICKS_A_SECOND = 10;
+constexpr double SAME_TIME_S = 1e-9;  // nearer than this two times are one
 
 // Everything that changes between two fixes. A plain value: `trial = leg` sets one aside.
 struct Leg {

@@ -10,15 +10,12 @@ namespace {
 
 constexpr double TWO_PI = 6.28318530717958623200;
 constexpr double MOST_LAG_S = 2.0;        // ticks older than this tell nothing of a receiver's lag
-constexpr double SAME_TIME_S = 1e-9;
 constexpr double MOST_DOUBLING = 0x1p60;  // then the fix itself must be wrong
 
 double wrapped(double angle) { return angle - TWO_PI * std::floor(angle / TWO_PI + 0.5); }
 
-Vector3 cross(const Vector3& a, const Vector3& b) { return skew(a) * b; }
-
 // Heights count up: the third component changes its sign.
-Vector3 height_up(Vector3 v) {
+Vector3 upward(Vector3 v) {
   v[HEIGHT] = -v[HEIGHT];
   return v;
 }
@@ -49,7 +46,7 @@ Motion motion_before(const Leg& leg, double lag) {
 // Antenna against fix, measured with our own radii: the same metres as the error state (E-30).
 void position_rows(Measurement& z, const Nominal& x, const Vector3& arm_n, const Fix& fix) {
   const Vector3 ned = earth::ned_between(place_of(x), {fix.latitude, fix.longitude, fix.height});
-  z.y.segment<3>(POSITION_ROW) = height_up(arm_n - ned);
+  z.y.segment<3>(POSITION_ROW) = upward(arm_n - ned);
   z.H.block<3, 3>(POSITION_ROW, DP).setIdentity();
   z.H.block<3, 3>(POSITION_ROW, PSI) = skew(arm_n);
   z.H.block<1, 3>(POSITION_ROW + HEIGHT, PSI) *= -1.0;
@@ -66,7 +63,7 @@ void velocity_rows(Measurement& z, const Nominal& x, const Vector3& swing_n, con
 
 // The receiver speaks of a moment before its time (E-38).
 void late_rows(Measurement& z, const Leg& leg, const Model& model) {
-  const Vector3 way = height_up(motion_before(leg, 0.5 * leg.x.lag_position).v_n);
+  const Vector3 way = upward(motion_before(leg, 0.5 * leg.x.lag_position).v_n);
   z.y.segment<3>(POSITION_ROW) -= way * leg.x.lag_position;
   z.H.block<3, 1>(POSITION_ROW, model.lag_position) = -way;
   const Motion then = motion_before(leg, leg.x.lag_velocity);
@@ -115,7 +112,7 @@ Measurement chosen(const Measurement& all, const Fix& fix) {
   z.R.diagonal().segment<3>(POSITION_ROW) = fix.sigma_p.cwiseProduct(fix.sigma_p);
   if (fix.has_v) {
     z.R.diagonal().segment<3>(VELOCITY_ROW) = fix.sigma_v.cwiseProduct(fix.sigma_v);
-    const Vector3 way = height_up(fix.v_n) * fix.timing;  // what its own timing costs (E-31)
+    const Vector3 way = upward(fix.v_n) * fix.timing;  // what its own timing costs (E-31)
     z.R.block<3, 3>(POSITION_ROW, POSITION_ROW) += way * way.transpose();
   }
   if (fix.has_yaw) {

@@ -4,8 +4,6 @@
 namespace gyrofree::rate {
 namespace {
 
-double square(double x) { return x * x; }
-
 // Specific force that the axes feel: u, and the centre's own way about the pivot while it turns.
 Vector3 felt(const StateVector& x, bool turning) {
   const Vector3 omega = x.segment<3>(OMEGA), r = x.segment<3>(PIVOT);

@@ -4,8 +4,7 @@ namespace gyrofree::rate {
 namespace {
 
 constexpr double UNSEEN_RATE = 0.05;  // rad/s, sigma at rest: a turn begins before the detector sees it
-constexpr double FASTEST = 300.0;     // rad/s; no accelerometer of this kind measures a faster turn
-constexpr double BLIND_SIGMA = 0.05;  // rad/s
+constexpr double FASTEST_MEASURED = 300.0;     // rad/s; no accelerometer of this kind measures a faster turn
 
 Quaternion quaternion_of(const IntegralVector& y) { return {y(I_Q_NB), y(I_Q_NB + 1), y(I_Q_NB + 2), y(I_Q_NB + 3)}; }
 
@@ -114,7 +113,7 @@ void LeastSquares::advance(const Sensor& s, const LeastSquaresLimits& c, double 
     moving_s_ += watch_.dt(sample);
   }
   // feedback of a drifting rate diverges
-  if (!(square_of(y_.segment<3>(I_OMEGA)) < FASTEST * FASTEST)) restart();
+  if (!(square_of(y_.segment<3>(I_OMEGA)) < FASTEST_MEASURED * FASTEST_MEASURED)) restart();
   P_ = covariance(s);
 }
 

@@ -2,12 +2,6 @@
 #include "rate/start.hpp"
 
 namespace gyrofree::rate {
-namespace {
-
-Vector3 cross(const Vector3& a, const Vector3& b) { return skew(a) * b; }
-
-}  // namespace
-
 Quaternion level(const Vector3& up) {
   const Vector3 ahead = std::fabs(up.x()) < 0.999 ? Vector3(1.0, 0.0, 0.0) : Vector3(0.0, 0.0, 1.0);
   Vector3 north = ahead - dot(ahead, up) * up;

@@ -3,8 +3,7 @@
 namespace gyrofree::rate {
 namespace {
 
-constexpr double BLIND_SIGMA = 0.05;  // rad/s
-constexpr double SURE = 9.0;          // of omega^2 over the variance of its sign
+constexpr double SIGN_SURE = 9.0;          // of omega^2 over the variance of its sign
 
 // omega and the angle become the mean over both signs by their probability, P the covariance about it
 // (E-46).
@@ -54,10 +53,10 @@ void judge(const Known& known, const Sensor& s, double dt, std::uint8_t (&sight)
   const Vector3 seen = information(known.omega_b, s);
   const double limit = dt / (BLIND_SIGMA * BLIND_SIGMA);
   const bool any = seen.x() > limit || seen.y() > limit || seen.z() > limit;
-  const bool lost = known.two_signs || (square_of(known.omega_b) < SURE * known.sign_variance && any);
+  const bool lost = known.two_signs || (square_of(known.omega_b) < SIGN_SURE * known.sign_variance && any);
   for (int k = 0; k < 3; ++k) {
     sight[k] = VALID;
-    if (lost && known.omega_b(k) * known.omega_b(k) > SURE * known.variances(k)) {
+    if (lost && known.omega_b(k) * known.omega_b(k) > SIGN_SURE * known.variances(k)) {
       sight[k] = AMBIGUOUS;
     } else if (!(seen(k) > limit) && known.variances(k) > BLIND_SIGMA * BLIND_SIGMA) {
       sight[k] = BLIND;

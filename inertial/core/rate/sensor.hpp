@@ -7,6 +7,8 @@
 
 namespace gyrofree::rate {
 
+constexpr double BLIND_SIGMA = 0.05;  // rad/s; a component less certain than that is not known
+
 constexpr int MOST_AXES = 32;
 constexpr int PRODUCTS = 6;  // w_i w_j, in the order xx xy xz yy yz zz
 constexpr double GRAVITY = 9.80665;  // m/s^2, standard

@@ -4,7 +4,7 @@
 namespace gyrofree::rate {
 namespace {
 
-constexpr double SURE = 16.0;          // of |omega|^2 over its variance: the sign is certain
+constexpr double RATE_SURE = 16.0;          // of |omega|^2 over its variance: the sign is certain
 constexpr double LATELY = 1.0 / 16.0;  // weight of one sample in the mean omega' that the pivot is told by
 
 // Earth's rate in b, rad/s; zero unless asked for.
@@ -58,7 +58,7 @@ void judge_sign(Filter& f, const Sensor& s, double dt, bool turning) {
   const Vector3 omega = f.omega();
   if (!turning) {
     f.sign_variance = largest_variance(P);
-  } else if (f.speed_squared() > SURE * f.sign_variance) {
+  } else if (f.speed_squared() > RATE_SURE * f.sign_variance) {
     f.sign_variance = dot(omega, P * omega) / f.speed_squared();
   } else {
     f.sign_variance += dt * dt * largest_variance(s.R_alpha);

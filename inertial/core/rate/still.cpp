@@ -5,7 +5,6 @@ namespace {
 
 constexpr int LENGTHS[] = {4, 8, 16, 32, 64, 128};  // samples over which omega' is summed
 
-double square(double x) { return x * x; }
 
 }  // namespace
 
