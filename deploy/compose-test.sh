@@ -76,8 +76,10 @@ PY
 
 base_image() {
     podman image exists "$BASE" && return
-    say "making the stand-in base image with mmdebstrap"
+    say "making the stand-in base image with mmdebstrap, without manuals as slim images are"
     mmdebstrap --quiet --variant=minbase --include=python3,python3-venv,ca-certificates,libstdc++6 \
+        --dpkgopt='path-exclude=/usr/share/doc/*' --dpkgopt='path-exclude=/usr/share/man/*' \
+        --dpkgopt='path-exclude=/usr/share/locale/*' --dpkgopt='path-exclude=/usr/share/info/*' \
         bookworm "$STATE/rootfs.tar"
     podman import --quiet "$STATE/rootfs.tar" "$BASE" >/dev/null
     rm -f "$STATE/rootfs.tar"

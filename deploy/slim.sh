@@ -9,13 +9,22 @@ packages=$(echo "$PWD"/lib/python3*/site-packages)
 rm -rf "$packages"/pip "$packages"/pip-* "$packages"/setuptools* "$packages"/pkg_resources "$packages"/_distutils_hack \
   "$packages"/distutils-precedence.pth bin/pip*
 # makers of documentation, asked for by numpydoc, which allantools names and does not import
-rm -rf "$packages"/sphinx "$packages"/sphinxcontrib "$packages"/babel "$packages"/alabaster "$packages"/numpydoc
-# Arrow's servers, clouds and headers: tables are written to files
+rm -rf "$packages"/sphinx "$packages"/sphinxcontrib "$packages"/babel "$packages"/alabaster "$packages"/numpydoc \
+  "$packages"/docutils "$packages"/snowballstemmer
+# Arrow's servers, clouds, headers and second copies of a library: tables are written to files
 rm -rf "$packages"/pyarrow/libarrow_flight* "$packages"/pyarrow/_flight* "$packages"/pyarrow/libarrow_s3* \
-  "$packages"/pyarrow/include "$packages"/pyarrow/src
+  "$packages"/pyarrow/include "$packages"/pyarrow/src \
+  "$packages"/pyarrow/libarrow_python*.so "$packages"/pyarrow/*.so.*.*.*
+# the source that viser's page was built from; the page itself is client/build
+rm -rf "$packages"/viser/client/src
 # tests of packages
 find "$packages" -type d -name tests -prune -exec rm -rf {} +
-# names for debuggers: a hundred megabytes
-find "$packages" -name '*.so*' -type f -exec strip --strip-unneeded {} +
+# names for debuggers: a hundred megabytes. Libraries in *.libs were patched when their wheels were made, which
+# strip takes for damage and then makes damage of.
+find "$packages" \( -name '*.so' -o -name '*.so.[0-9]*' \) -type f -not -path '*.libs/*' -exec strip --strip-unneeded {} +
 find "$packages" \( -name '*.pyi' -o -name '*.pyx' -o -name '*.pxd' \) -delete
 bin/python -m compileall -q -j 2 "$packages" || true # some hold templates that are no Python
+
+# what is left must still load
+bin/python -B -c 'import gateway.service, estimator.service, dashboard.service, dashboard.scene.service, logs
+import allantools, matplotlib.pyplot, pyarrow.csv, pyarrow.parquet, reportlab.platypus, scipy.io, scipy.stats, scipy.signal'

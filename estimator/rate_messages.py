@@ -18,47 +18,46 @@ def rate_batch(batch: pb.AccelBatch, card: str, said: RateOutput) -> pb.RateBatc
     sequence. card: id of the calibration file in use, empty for none.
     """
     columns = said.columns
+    nis_dof, sight = columns.nis_dof.tolist(), columns.sight.ravel().tolist()
     message = pb.RateBatch(
         header=sample_header(batch.header, said.row * batch.period_s),
         estimator=said.estimator,
         for_sequence=batch.header.sequence,
         for_index=said.index,
+        omega_ib_b_radps=columns.omega_b.ravel().tolist(),
+        omega_covariance=columns.P.ravel().tolist(),
+        alpha_b_radps2=columns.alpha_b.ravel().tolist(),
+        f_b_mps2=columns.f_b.ravel().tolist(),
+        q_nb=columns.q_nb.ravel().tolist(),
+        angle_z_rad=columns.angle_z.tolist(),
+        nis=columns.nis.tolist(),
+        nis_dof=nis_dof,
+        still=columns.still.tolist(),
+        p_n_m=columns.p_n.ravel().tolist(),
+        v_n_mps=columns.v_n.ravel().tolist(),
+        bias=columns.bias.ravel().tolist(),
         innovation_unit=columns.innovation_unit,
-        sight_reason=_sight_reason(columns),
+        sight=sight,
+        sight_reason=_sight_reason(columns) if any(sight) else "",
         calibration=card,
         excluded_mask=columns.excluded,
-        aid=TACHOMETER if columns.aided.any() else "",
+        aid=TACHOMETER if any(columns.aided.tolist()) else "",
         period_s=said.step * batch.period_s,
         index_step=said.step,
     )
-    for field, column in (
-        (message.omega_ib_b_radps, columns.omega_b),
-        (message.omega_covariance, columns.P),
-        (message.alpha_b_radps2, columns.alpha_b),
-        (message.f_b_mps2, columns.f_b),
-        (message.q_nb, columns.q_nb),
-        (message.angle_z_rad, columns.angle_z),
-        (message.nis, columns.nis),
-        (message.nis_dof, columns.nis_dof),
-        (message.still, columns.still),
-        (message.p_n_m, columns.p_n),
-        (message.v_n_mps, columns.v_n),
-        (message.bias, columns.bias),
-        (message.sight, columns.sight),
-    ):
-        field.extend(column.ravel().tolist())
-    if columns.nis_dof.any():
+    if any(nis_dof):
         message.innovation.extend(columns.innovation.ravel().tolist())
         message.innovation_sigma.extend(columns.innovation_sigma.ravel().tolist())
-    if columns.bound_sigma.any():
-        message.bound_sigma_radps.extend(columns.bound_sigma.ravel().tolist())
+    bound_sigma = columns.bound_sigma.ravel().tolist()
+    if any(bound_sigma):
+        message.bound_sigma_radps.extend(bound_sigma)
     return message
 
 
 def _sight_reason(columns: RateColumns) -> str:
-    """Why the last sample that has a component which is not valid has it; empty: all are."""
+    """Why the last sample that has a component which is not valid has it; there is one."""
     unseen = np.flatnonzero(columns.sight.any(axis=1))
-    return columns.sight_reason(int(unseen[-1])) if len(unseen) else ""
+    return columns.sight_reason(int(unseen[-1]))
 
 
 class BoardMessages:

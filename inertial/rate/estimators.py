@@ -174,7 +174,9 @@ class ProductsRate(_Stepping):
         return self._columns(rows, aided)
 
     def _columns(self, rows: Rows, aided: NDArray[np.bool_] | None = None) -> RateColumns:
-        rows["P"][rows["phase"] == Phase.STILL] += self._unseen
+        still = rows["phase"] == int(Phase.STILL)  # numpy takes long over an enumeration's member
+        if still.any():
+            rows["P"][still] += self._unseen
         return columns(
             rows,
             products=self.core.sensor.m,

@@ -71,14 +71,12 @@ class History:
 
     def add(self, block: Array, dt: float, x: Array, P: Array, well: bool) -> None:
         """One block; (x, P) before it."""
-        for column, value in (
-            (self.blocks, block),
-            (self.dt, dt),
-            (self.states, (x, P)),
-            (self.well, well),
-        ):
-            column.append(value)
-            if len(column) > KEPT:
+        self.blocks.append(block)
+        self.dt.append(dt)
+        self.states.append((x, P))
+        self.well.append(well)
+        if len(self.well) > KEPT:
+            for column in (self.blocks, self.dt, self.states, self.well):
                 column.pop(0)
 
     def clear(self) -> None:
