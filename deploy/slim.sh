@@ -1,6 +1,6 @@
 #!/bin/sh
-# slim.sh VENV: take out of an environment what no service of an image uses. What stays is byte-compiled, since
-# the image is read-only. Each line says why it may go.
+# slim.sh VENV: take out of an environment what no service of an image uses. What services
+# load is byte-compiled, since the image is read-only. Each line says why it may go.
 set -eu
 cd "$1"
 packages=$(echo "$PWD"/lib/python3*/site-packages)
@@ -23,8 +23,9 @@ find "$packages" -type d -name tests -prune -exec rm -rf {} +
 # strip takes for damage and then makes damage of.
 find "$packages" \( -name '*.so' -o -name '*.so.[0-9]*' \) -type f -not -path '*.libs/*' -exec strip --strip-unneeded {} +
 find "$packages" \( -name '*.pyi' -o -name '*.pyx' -o -name '*.pxd' \) -delete
-bin/python -m compileall -q -j 2 "$packages" || true # some hold templates that are no Python
 
-# what is left must still load
-bin/python -B -c 'import gateway.service, estimator.service, dashboard.service, dashboard.scene.service, logs
+# What is left must still load, and what is loaded here is byte-compiled by that. All of it would be 80 MB.
+bin/python -c 'import gateway.service, estimator.service, dashboard.service, dashboard.scene.service, logs
 import allantools, matplotlib.pyplot, pyarrow.csv, pyarrow.parquet, reportlab.platypus, scipy.io, scipy.stats, scipy.signal'
+cd "$packages"
+"$OLDPWD"/bin/python -m compileall -q firmware_protocol messages gateway inertial estimator logs sessions dashboard gyrofree
