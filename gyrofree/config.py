@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from dashboard.settings import DashboardSettings
 from estimator.settings import EstimatorSettings
 from gateway.settings import GatewaySettings
+from inertial.toml_file import text_of
 from messages.bus.session import BusSettings
 from sessions.recording.settings import RecorderSettings
 
@@ -40,7 +41,7 @@ class Settings(BaseModel):
 def load(path: Path) -> Settings:
     """Settings of a file; raises ConfigError with one line per fault."""
     try:
-        text = path.read_text()
+        text = text_of(path)
     except OSError as error:
         raise ConfigError(
             f"{path}: {error.strerror}; name another file with --config FILE"

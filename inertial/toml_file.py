@@ -2,6 +2,7 @@
 wrong with it.
 """
 
+import codecs
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,26 @@ from typing import Any, TypeVar
 import tomli_w
 
 T = TypeVar("T")
+
+MARKS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
+
+
+def text_of(path: Path) -> str:
+    """The text of a file that an editor of any country wrote: UTF-8 with or without a byte-order
+    mark, UTF-16, else Windows-1252. Raises OSError.
+    """
+    data = Path(path).read_bytes()
+    for mark, encoding in MARKS:
+        if data.startswith(mark):
+            return data[len(mark) :].decode(encoding, errors="replace")
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace")
 
 
 def write_whole(table: dict[str, Any], path: Path) -> None:
@@ -38,8 +59,8 @@ def read_versioned(
     `remedy` is what to do about another version.
     """
     try:
-        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
+        table = tomllib.loads(text_of(path))
+    except tomllib.TOMLDecodeError as fault:
         raise error(f"{path}: no {kind}: {fault}") from None
     if table.get("version") != version:
         found = f"{kind.split()[-1]} version {table.get('version')!r}"

@@ -21,6 +21,7 @@ import numpy as np
 import tomli_w
 
 from inertial.layouts.layout import SENSORS, GeometryError, Layout, Sensor
+from inertial.toml_file import text_of
 
 HERE = Path(__file__).resolve().parent
 MOST_AXES = 64
@@ -80,12 +81,12 @@ def _read_built_in(name: str) -> tuple[Layout, bool]:
 def load(path: Path) -> Layout:
     """Layout of a file; raises GeometryError."""
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
+        values = tomllib.loads(text_of(path))
     except OSError as error:
         raise GeometryError(
             f"{path}: {error.strerror}; want a layout file, docs/layouts.md describes it"
         ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except tomllib.TOMLDecodeError as error:
         raise GeometryError(f"{path}: not TOML: {error}") from None
     return parse(values, str(path))
 

@@ -90,6 +90,7 @@ class Alignment:
         if self._t is not None and t - self._t > self.settings.longest_gap:
             self._interrupt(f"{t - self._t:.1f} s without samples")
             self._window.clear()
+            self._t = None  # how it turned meanwhile nobody saw: one rate must not stand for it
         if self._t is not None and self.levelled:
             self.C = native.rotation.turned(self.C, (w - self.gyro_bias) * (t - self._t))
         self._t = t
@@ -100,6 +101,16 @@ class Alignment:
         self._block.append((f, w))
         if t - self._block_start >= self.settings.block:
             self._judge(t - self._block_start)
+
+    def resume(self, C_nb: Array, gyro_bias: Array) -> None:
+        """Go on from an attitude and a gyro bias that a filter knew before samples went missing.
+
+        The time since then is not this attitude's to turn by.
+        """
+        self.C, self.gyro_bias, self.levelled = C_nb, gyro_bias, True
+        self._interrupt("samples were missing")
+        self._window.clear()
+        self._t = None
 
     def speed(self, speed: float) -> None:
         """Speed by GNSS, m/s: a smooth motorway must not pass for a standstill."""

@@ -57,10 +57,8 @@ class Startup:
         navigated until then, None where none did.
         """
         if nominal is not None:
-            self.align.C = nominal.C_nb
-            self.align.gyro_bias = nominal.bias_gyro
             # roughly: what turned during the gap is in sigma_tilt of the next start
-            self.align.levelled = True
+            self.align.resume(nominal.C_nb, nominal.bias_gyro)
 
 
 def first_leg(config: NavigatorConfig, chosen: FilterConfig, start: Start, fix: Fix) -> Any:

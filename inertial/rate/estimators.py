@@ -18,7 +18,7 @@ from inertial.rate import bound, least_squares, products_ekf, tachometer
 from inertial.rate.batch import Phase, RateColumns, RateState, columns
 from inertial.rate.observed import sensor
 from inertial.rate.rows import Rows
-from inertial.rate.samples import Samples
+from inertial.rate.samples import BRIDGED, Samples
 
 Array = NDArray[np.float64]
 
@@ -117,7 +117,8 @@ class LeastSquaresRate(_Stepping):
         """See RateEstimator.skip; the next step integrates over the gap with omega' linear across
         it.
         """
-        self._core.gap()
+        if n > BRIDGED:
+            self._core.gap()
 
     def tacho(self, t_s: float, rate: float, sigma: float, signed: bool = True) -> None:
         """See RateEstimator.tacho: no aid."""
@@ -189,7 +190,8 @@ class ProductsRate(_Stepping):
 
     def skip(self, n: int) -> None:
         """See RateEstimator.skip; the next step predicts across the gap."""
-        self.core.gap()
+        if n > BRIDGED:
+            self.core.gap()
 
     def exclude(self, mask: int) -> None:
         """See RateEstimator.exclude."""

@@ -19,6 +19,7 @@ from inertial.rate import axis_samples, parity
 from inertial.rate.axis_fault import AxisState, Fault
 from inertial.rate.health_config import STANDSTILL, Config, Counts, Newest
 from inertial.rate.hypotheses import Finding, History, Known, explain, start
+from inertial.rate.samples import BRIDGED
 
 Array = NDArray[np.float64]
 
@@ -117,6 +118,8 @@ class HealthMonitor:
     def skip(self, samples: int) -> None:
         """Samples are missing before the next one."""
         self._gap_s += samples * self.period_s
+        if samples <= BRIDGED:
+            return
         self._forget_samples()
         if self._x is not None:
             self._P[parity.MOTION, parity.MOTION] += np.diag(

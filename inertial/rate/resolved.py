@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.rotation import from_rotation_vector, level, multiply, to_matrix
 from inertial.rate.batch import Phase
 from inertial.rate.products_model import TURNED, squares
+from inertial.rotation import from_rotation_vector, level, multiply, to_matrix
 
 if TYPE_CHECKING:
     from inertial.rate.products_ekf import ProductsFilter

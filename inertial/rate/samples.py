@@ -12,6 +12,11 @@ from inertial.rate.field import checked
 
 Array = NDArray[np.float64]
 
+BRIDGED = 3
+"""Samples in a row that may be missing without anything being forgotten: the next step is longer,
+and that is all. Over more of them a body may have begun to turn.
+"""
+
 
 def finite(values: Array) -> bool:
     """Are all numbers finite? The sum of their squares says so at a third of the cost, unless it

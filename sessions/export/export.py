@@ -10,6 +10,7 @@ Big recordings stream: only mat holds all in memory.
 """
 
 import csv
+import logging
 import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -26,7 +27,7 @@ from scipy.io import savemat
 
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
-from messages.contract.topics import GNSS, LOG, NAV, RATE, Topic, parse
+from messages.contract.topics import GNSS, LOG, NAV, RATE, Topic, TopicError, parse
 from sessions.export.columns import Column
 from sessions.export.table import (
     Block,
@@ -44,6 +45,9 @@ from sessions.recording.samples import decode
 
 RATE_ESTIMATE: Topic = replace(RATE, type=pb.RateEstimate)  # one sample of a batch
 ROW_GROUP = 20_000  # rows of Parquet written at once
+
+
+log_of = logging.getLogger(__name__)
 
 
 class ExportError(ValueError):
@@ -171,11 +175,16 @@ def to_mcap(
     target = out / "cut.mcap"
     count = 0
     start = None
+    foreign: set[str] = set()
     with target.open("wb") as stream:
         log = McapLog(stream.fileno(), 128 * 1024)
         for row in read(path, Damage()):
             start = row.log_ns if start is None else start
-            topic = parse(row.key).topic
+            try:
+                topic = parse(row.key).topic
+            except TopicError:  # of another program: not ours to cut, and counted by `verify`
+                foreign.add(row.key)
+                continue
             if (
                 selection.takes(topic)
                 and selection.start_s <= (row.log_ns - start) / 1e9 <= selection.end_s
@@ -192,13 +201,15 @@ def to_mcap(
     if not count:
         target.unlink()
         raise ExportError(f"{path}: no message of the wanted topics and time")
+    if foreign:
+        log_of.warning("%s: left out, not of this program: %s", path, ", ".join(sorted(foreign)))
     progress(1.0, "cut")
     return [target]
 
 
 def _single(topic: Topic, row: Recorded) -> Iterator[tuple[Topic, int, int, bytes]]:
-    """Type, receive and publish time and bytes of a message in the copy: rate estimates one by one, each at its
-    own time before the last of its batch, because other viewers draw numbers that stand alone.
+    """Type, receive and publish time and bytes of a message in the copy: rate estimates one by one,
+    each at its own time before the last of its batch, because other viewers draw numbers that stand alone.
     """
     if topic is not RATE:
         yield topic, row.log_ns, row.publish_ns, row.payload

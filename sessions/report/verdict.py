@@ -16,6 +16,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
+from inertial.toml_file import text_of
 from sessions.report.metrics import Metric
 
 DEFAULT = Path(__file__).parent / "acceptance.toml"
@@ -73,10 +74,10 @@ def load_spec(path: Path | None) -> Spec:
     """The file, or the one that comes with gyrofree; raises SpecError."""
     path = path or DEFAULT
     try:
-        return Spec.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+        return Spec.model_validate(tomllib.loads(text_of(path)))
     except OSError as error:
         raise SpecError(f"{path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except tomllib.TOMLDecodeError as error:
         raise SpecError(f"{path}: not TOML: {error}") from None
     except ValidationError as error:
         first = error.errors()[0]

@@ -34,11 +34,11 @@ def estimate(log: Record, name: str = "products-ekf"):
         for part in np.split(np.arange(*rows.indices(len(log.t_s))), cuts):
             if part[0] and log.index[part[0]] != log.index[part[0] - 1] + 1:
                 estimator.skip(int(log.index[part[0]] - log.index[part[0] - 1] - 1))
-            for s in estimator.feed(log.t_s[part], log.readings[part], range(len(part))):
-                omega.append(np.array(s.omega_b))
-                P.append(np.array(s.P))
-                valid.append(np.array(s.sight) == sight.VALID)
-    return np.array(omega), np.array(P), np.array(valid)
+            said = estimator.feed(log.t_s[part], log.readings[part])
+            omega.append(said.omega_b.copy())
+            P.append(said.P.copy())
+            valid.append(said.sight == sight.VALID)
+    return np.concatenate(omega), np.concatenate(P), np.concatenate(valid)
 
 
 def figures(condition: str, profile: str, seeds: int) -> dict:

@@ -200,3 +200,20 @@ def test_a_real_drive_cut_so_that_it_begins_in_motion(data_dir, begin):
     assert "in motion" in navigator.solution().alignment
     assert np.sqrt(np.mean(np.square(position))) < 0.12
     assert np.degrees(np.sqrt(np.mean(np.square(heading)))) < 3.0
+
+
+@pytest.mark.parametrize("name", ["kf", "huber-nhc"])
+def test_a_hole_in_the_samples_does_not_turn_the_attitude(name):
+    """What is kept across a hole is the attitude, not the time since it was found."""
+    drive = simulate(3, "B", 160.0)
+    navigator = NAVIGATORS[name](NavigatorConfig())
+    fixes = list(drive.fixes)
+    errors = []
+    for row in drive.imu[(drive.imu[:, 0] < 100.0) | (drive.imu[:, 0] >= 100.4)]:
+        while fixes and fixes[0].arrival <= row[0]:
+            navigator.fix(fixes.pop(0))
+        navigator.imu(float(row[0]), row[1:4].copy(), row[4:7].copy())
+        if row[0] > 110.0 and navigator.mode == Mode.NAVIGATING:
+            up = to_matrix(navigator.solution().q_nb) @ drive.truth.C_nb[drive.row_of(row[0])].T
+            errors.append(np.hypot(up[0, 2], up[1, 2]))
+    assert len(errors) > 3000 and np.degrees(np.max(errors)) < 6.0

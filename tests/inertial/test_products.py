@@ -425,3 +425,26 @@ for field in ("omega_b", "P", "q_nb", "p_n", "v_n", "nis", "bias", "bound_sigma"
     digest.update(getattr(rows, field).tobytes())
 print(digest.hexdigest())
 """
+
+
+def test_a_lost_sample_costs_no_more_than_a_sample():
+    """Every tenth sample missing: the rate is as good as with all of them."""
+    table = TableTest(seed=4)
+    blocks = [table.block(k) for k in range(3)]
+    t_s, readings, omega = (
+        np.concatenate([getattr(b, name) for b in blocks])
+        for name in ("t_s", "readings", "omega_b")
+    )
+    whole, lossy = (ProductsRate(CUBE(0.05)) for _ in range(2))
+    full = whole.feed(t_s, readings).omega_b - omega
+    kept = np.arange(len(t_s)) % 10 != 3
+    errors = []
+    for first in range(0, len(t_s), 10):
+        rows = np.arange(first, min(first + 10, len(t_s)))
+        for part in (rows[:3], rows[4:]):
+            if part[0] % 10 == 4:
+                lossy.skip(1)
+            errors.append(lossy.feed(t_s[part], readings[part]).omega_b - omega[part])
+    lost = np.concatenate(errors)
+    assert len(lost) == kept.sum()
+    assert np.sqrt(np.mean(lost**2)) < 1.15 * np.sqrt(np.mean(full**2))
