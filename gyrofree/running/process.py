@@ -4,6 +4,7 @@ Logs go to stderr, data to stdout. Exit codes: 0 ended as asked, 1 could not go 
 why), 2 wrong command line or configuration, 3 a port or device name is taken.
 """
 
+import atexit
 import errno
 import gc
 import logging
@@ -74,7 +75,16 @@ def stop_on_signals() -> threading.Event:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: None)
     signal.set_wakeup_fd(tell, warn_on_full_buffer=False)
+    atexit.register(_end_in_peace)
     return stop
+
+
+def _end_in_peace() -> None:
+    """A second signal must not kill a process that is ending: the interpreter would give signals
+    their default back before it is gone.
+    """
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, signal.SIG_IGN)
 
 
 def fail(text: str, code: int = EXIT_FAILED) -> typer.Exit:
