@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import inertial
+import inertial.core
 from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from estimator.worker import Worker
@@ -75,10 +76,10 @@ class SavedState:
 
 
 def version() -> str:
-    """Of everything a saved state depends on: the package's sources, so that a changed one begins
-    anew.
+    """Of everything a saved state depends on: the package's sources and the core, so that a changed
+    one begins anew.
     """
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(inertial.core.VERSION.encode())
     rooms = (Path(__file__).parent, Path(inertial.__file__).parent)
     for path in sorted(p for room in rooms for p in room.rglob("*.py")):
         digest.update(path.read_bytes())

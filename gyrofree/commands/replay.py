@@ -98,6 +98,20 @@ def show_list(settings: Settings, as_json: bool) -> None:
     show_table(table)
 
 
+def other_core(path: Path) -> str:
+    """A sentence when a recording was made by another version of the estimators' core."""
+    from inertial import core
+    from sessions.recording.manifest import SessionError, read_manifest
+
+    try:
+        made_by = read_manifest(path.parent).versions.get("core", "unknown")
+    except (SessionError, OSError):
+        return ""
+    if made_by == core.VERSION:
+        return ""
+    return f"Recorded by core {made_by}, run again by core {core.VERSION}: the last bits may differ"
+
+
 def compare_estimates(settings: Settings, path: Path, as_json: bool) -> int:
     """Run the estimators over the recorded samples; exit code 0 when every estimate is the recorded
     one.
@@ -109,6 +123,7 @@ def compare_estimates(settings: Settings, path: Path, as_json: bool) -> int:
         f"running the estimators over {path.stat().st_size / 1e6:.1f} MB of recording"
     ):
         result = reproduce(path, Pipeline(settings.estimator))
+    other = other_core(path)
     if as_json:
         print(json.dumps(result.as_dict(), indent=2))
     else:
@@ -119,6 +134,8 @@ def compare_estimates(settings: Settings, path: Path, as_json: bool) -> int:
                 *(str(row[name]) for name in ("equal", "different", "missing", "first_difference")),
             )
         show_table(table)
+        if other:
+            print(other)
         if not result.identical:
             reason = "an estimator began before the recording, or an input is missing"
             print(f"Estimates differ where {reason}: docs/recordings.md")

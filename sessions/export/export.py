@@ -209,7 +209,8 @@ def to_mcap(
 
 def _single(topic: Topic, row: Recorded) -> Iterator[tuple[Topic, int, int, bytes]]:
     """Type, receive and publish time and bytes of a message in the copy: rate estimates one by one,
-    each at its own time before the last of its batch, because other viewers draw numbers that stand alone.
+    each at its own time before the last of its batch, because other viewers draw numbers that stand
+    alone.
     """
     if topic is not RATE:
         yield topic, row.log_ns, row.publish_ns, row.payload

@@ -17,6 +17,7 @@ import time
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from inertial import core
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import Address, TopicError, parse
 from sessions.recording.certificate import Witness, certify
@@ -31,8 +32,8 @@ MANIFEST_EVERY_S = 5.0  # counts in session.json of an open session are at most 
 
 
 def versions() -> dict[str, str]:
-    """Versions of what made a recording."""
-    found = {"python": platform.python_version()}
+    """Versions of what made a recording; `core` is the digest of the estimators' hot loops."""
+    found = {"python": platform.python_version(), "core": core.VERSION}
     for name in ("gyrofree", "eclipse-zenoh", "mcap", "protobuf"):
         with contextlib.suppress(PackageNotFoundError):
             found[name] = version(name)

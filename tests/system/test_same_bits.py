@@ -26,8 +26,6 @@ LIBRARIES = {
     "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX512F",
 }
 NAMES = ["table", "arm", "drive", "tilt"]
-# still to be taken from BLAS and the C library: rate estimators and parts of the navigators
-NOT_YET = pytest.mark.xfail(reason="some formulas are still computed by BLAS or the C library")
 
 
 def said_by(folder: Path, environment: dict[str, str]) -> dict[str, list[Published]]:
@@ -89,9 +87,7 @@ def test_the_core_and_numpy_publish_the_same_bytes_on_a_lesser_processor(with_le
     assert differences(here[name], there[name]) == {}
 
 
-@pytest.mark.parametrize(
-    "name", [n if n == "tilt" else pytest.param(n, marks=NOT_YET) for n in NAMES]
-)
+@pytest.mark.parametrize("name", NAMES)
 def test_other_kernels_of_the_libraries_change_no_byte(with_lesser, name):
     here, there = with_lesser("libraries", LIBRARIES)
     assert differences(here[name], there[name]) == {}
