@@ -6,8 +6,8 @@ equations; nothing is left out because it is zero.
 
 import numpy as np
 
-from inertial.rotation import from_rotation_vector, to_matrix
 from inertial.rate import products_model as model
+from inertial.rotation import from_rotation_vector, to_matrix
 
 SPREAD = 3.0  # of the sigma points
 ROUNDS, ENOUGH = 14, 0.2  # of the fit of a start while turning

@@ -8,12 +8,12 @@ from google.protobuf.message import Message
 
 from estimator.choice import rate_estimators
 from gyrofree.running.importer import rows_of
-from logs.board_log import read_board_log
 from gyrofree.running.simulate_csv import write
 from inertial.attitude.filters import ATTITUDES
 from inertial.navigation.navigation import NAVIGATORS
 from inertial.simulation.drive import simulate
 from inertial.simulation.hand import AnalogueWiring, guided
+from logs.board_log import read_board_log
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ADC, GNSS, IMU, Topic, parse
 from support import gyro_free_rig
