@@ -249,13 +249,14 @@ class View:
                 self._chooser.value = self._device_name
 
     def _show_replay_asked_for(self) -> None:
-        """Turn to the device of a replay that began about when this page was opened, unless another
-        was chosen.
+        """Turn to the device of a replay that began about when this page was opened and still goes
+        on, unless another was chosen.
         """
-        if self._device_chosen or abs(self._store.replay.began - self._opened_at) > ASKED_FOR_S:
+        replay = self._store.replay
+        if self._device_chosen or abs(replay.began - self._opened_at) > ASKED_FOR_S:
             return
-        name = self._store.replay.device(self._store.devices)
-        if name is not None:
+        name = replay.device(self._store.devices)
+        if name is not None and replay.state(name, time.monotonic()) != "ended":
             self._device_name, self._device_chosen = name, True
             self._chooser.value = name
 

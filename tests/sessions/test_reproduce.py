@@ -77,8 +77,8 @@ def estimating(bus):
 
 
 def batches_of(path, device: str) -> dict[tuple[str, int], bytes]:
-    """Recorded rate estimates by estimator and first sample, device name and sequence of publication
-    taken out.
+    """Recorded rate estimates by estimator and first sample, without device name and
+    sequence of publication.
     """
     found = {}
     for row in read(path):

@@ -126,7 +126,7 @@ class StartFit:
         self.know, self.alpha = np.linalg.inv(P), y[:, :3].mean(axis=0)
 
     def about(self, start):
-        """Normal equations about a first state: N, g, misfit; the last state and d last / d first."""
+        """Normal equations about a first state: N, g, misfit; the last state, its derivative."""
         s, t, n = self.s, self.t, len(self.y)
         u, away = start[model.U], start - self.prior
         N, g, misfit = self.know.copy(), -self.know @ away, away @ self.know @ away
