@@ -5,15 +5,12 @@ import csv
 from collections.abc import Sequence
 from pathlib import Path
 
+from inertial.toml_file import MARKS
+
 FIRST_LOOK = 1 << 16  # bytes in which the header must stand
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar"}
 COMMENTS = ("#", "%", "//")
 MISSING = ["", "NA", "N/A", "na", "nan", "NaN", "NAN", "null", "-"]
-MARKS = (
-    (codecs.BOM_UTF8, "utf-8"),
-    (codecs.BOM_UTF16_LE, "utf-16-le"),
-    (codecs.BOM_UTF16_BE, "utf-16-be"),
-)
 
 
 class LogError(ValueError):
