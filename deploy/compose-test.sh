@@ -127,6 +127,12 @@ finish() {
     exit $code
 }
 
+# "inside" is for this script's own use: by hand it would unmount the machine's cgroups and change its addresses.
+own_namespace() {
+    [ "$(readlink "/proc/self/ns/$1")" != "$(readlink "/proc/1/ns/$1")" ] \
+        || die "inside: this is the machine's own $1 namespace; run deploy/compose-test.sh without arguments"
+}
+
 prove() {
     trap finish EXIT
     ip link set lo up
@@ -169,6 +175,7 @@ if [ "${1:-}" != inside ]; then
     # Podman sees a version 2 cgroup tree beside version 1 and takes the wrong one: hide it from this process only.
     exec unshare --mount -- "$0" inside
 fi
+own_namespace mnt
 if [ "${2:-}" != run ]; then
     ! mountpoint -q /sys/fs/cgroup/unified || umount /sys/fs/cgroup/unified
     configure
@@ -176,4 +183,5 @@ if [ "${2:-}" != run ]; then
     build
     exec unshare --net -- "$0" inside run
 fi
+own_namespace net
 prove
