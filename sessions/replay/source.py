@@ -1,14 +1,16 @@
 """Messages of a recording from any moment on, in the order of their times."""
 
+import heapq
 from collections.abc import Iterator
 from pathlib import Path
 
 from google.protobuf.message import DecodeError
-from mcap.exceptions import McapError
-from mcap.reader import make_reader
 
 from messages.contract.topics import Topic, TopicError, parse
-from sessions.recording.mcap_log import Damage, read
+from sessions.library.scan import rows_of
+from sessions.recording.mcap_damage import Damage
+from sessions.recording.mcap_index import keys_of, summary_of
+from sessions.recording.mcap_log import read, say
 from sessions.recording.samples import decode
 from sessions.replay.replay import Input
 
@@ -25,20 +27,15 @@ class Source:
         self.length_s = (end_ns - self.start_ns) / 1e9
 
     def _bounds(self) -> tuple[int, int]:
-        with self._path.open("rb") as stream:
-            try:
-                found = make_reader(stream).get_summary()
-            except (McapError, ValueError, EOFError):
-                found = None
-        self._indexed = (
-            found is not None and found.statistics is not None and bool(found.chunk_indexes)
-        )
-        if self._indexed and found.statistics.message_count:
-            return found.statistics.message_start_time, found.statistics.message_end_time
+        self._index = summary_of(self._path)
+        if self._index is not None:
+            found = self._index.statistics
+            return found.message_start_time, found.message_end_time
         damage = Damage()
         times = [
             row.log_ns for row in read(self._path, damage)
         ]  # without an index: as far as it can be read
+        say(self._path, damage)
         if not times:
             raise ValueError(f"{self._path}: no message in it, {damage}: want an MCAP recording")
         return min(times), max(times)
@@ -54,13 +51,24 @@ class Source:
                 continue
 
     def _rows(self, from_ns: int) -> Iterator[tuple[int, str, bytes]]:
-        if not self._indexed:
-            yield from (
-                (r.log_ns, r.key, r.payload) for r in read(self._path) if r.log_ns >= from_ns
-            )
+        """Of all keys, in the order of their times as far as the file has an index."""
+        if self._index is None:
+            rows = ((r.log_ns, r.key, r.payload) for r in read(self._path))
+            yield from (row for row in rows if row[0] >= from_ns)
             return
+        chunks = [c for c in self._index.chunk_indexes if c.message_end_time >= from_ns]
+        chunks.sort(key=lambda chunk: (chunk.message_start_time, chunk.chunk_start_offset))
+        damage, held, count = Damage(), [], 0
         with self._path.open("rb") as stream:
-            for _, channel, message in make_reader(stream).iter_messages(
-                starting_at=from_ns or None
-            ):
-                yield message.log_time, channel.topic, message.data
+            for chunk in chunks:
+                while held and held[0][0] < chunk.message_start_time:
+                    log_ns, _, key, payload = heapq.heappop(held)
+                    yield log_ns, key, payload
+                for row in rows_of(stream, chunk, keys_of(self._index), damage):
+                    if row[0] >= from_ns:
+                        count += 1  # equal times stay in the file's order
+                        heapq.heappush(held, (row[0], count, row[1], row[2]))
+        while held:
+            log_ns, _, key, payload = heapq.heappop(held)
+            yield log_ns, key, payload
+        say(self._path, damage)
