@@ -13,6 +13,7 @@ from google.protobuf.message import DecodeError, Message
 
 from messages.contract.checks import MESSAGE_BYTES, Refusal, check
 from messages.contract.topics import Address, Topic, TopicError, parse
+from messages.text import plain
 
 M = TypeVar("M", bound=Message)
 
@@ -47,7 +48,7 @@ class Door:
             mine[refusal.kind] += 1
             n = mine[refusal.kind]
         if n & (n - 1) == 0:
-            self._log.warning("%s: refused: %s (%d so far)", ascii(key[:200]), refusal, n)
+            self._log.warning("%s: refused: %s (%d so far)", plain(key, 200), plain(refusal), n)
 
     def of(self, device: str) -> dict[str, int]:
         """What was refused of one device, by kind."""
@@ -72,7 +73,7 @@ class Door:
                 self._addresses.clear()
             self._addresses[key] = found
         if found is None:
-            self.refuse(key, Refusal("key", "key", ascii(key[:80]), "one of docs/topics.md"))
+            self.refuse(key, Refusal("key", "key", repr(key[:80]), "one of docs/topics.md"))
         return found
 
     def admit(self, key: str, address: Address, size: int) -> bool:
