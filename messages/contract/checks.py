@@ -24,7 +24,20 @@ BYTES = 1_000_000  # of a field of bytes without a rule
 ITEMS = 4096  # of a list without a rule
 ENTRIES = 1024  # of a map
 NAMES = 1000  # sound ones that are remembered
-KINDS = ("bytes", "size", "key", "name", "device", "range", "number", "length", "value", "many")
+KINDS = (  # what a refusal can be counted as
+    "bytes",  # no message of the type
+    "size",
+    "key",
+    "name",
+    "device",  # it speaks in the name of another than its key
+    "range",
+    "number",  # no finite one
+    "length",
+    "value",  # not one of those that there are
+    "many",  # more devices or streams than there is room for
+    "answer",  # of a publisher: not what was asked for
+    "failure",  # we could not take it: a fault of ours
+)
 FLOATS = (FieldDescriptor.CPPTYPE_DOUBLE, FieldDescriptor.CPPTYPE_FLOAT)
 NATURAL = (FieldDescriptor.CPPTYPE_UINT32, FieldDescriptor.CPPTYPE_UINT64)
 
