@@ -13,6 +13,7 @@ from collections.abc import Callable
 
 import zenoh
 
+from messages import text
 from messages.bus import orders
 from messages.bus.session import BusSettings
 from messages.contract import gyrofree_pb2 as pb
@@ -236,6 +237,8 @@ class Recorder:
                     f"name {command.name[:80]!r}: want a letter or digit, then a-z, 0-9, _ and -,"
                     " at most 32"
                 )
+            if fault := text.check(command.note, lines=True) or text.check(command.user):
+                return f"note or user: {fault}"
             log.info("start ordered by %s", command.user or "an unnamed user")
             return (
                 ""
