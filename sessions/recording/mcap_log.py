@@ -174,7 +174,7 @@ class _Reading:
 
     def _chunk(self, body: bytes) -> Iterator[Recorded]:
         data, checked = content(body)
-        for opcode, begin, end in list(records(data)):
+        for opcode, begin, end in records(data):
             if opcode == Opcode.MESSAGE:
                 yield from self._message(data[begin:end], checked)
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):

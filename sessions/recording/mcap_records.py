@@ -6,16 +6,14 @@ import zlib
 from collections.abc import Iterator
 from typing import IO
 
-import lz4.frame
-import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.records import Channel, Chunk, Schema
 
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import RATE, TopicError, parse
+from sessions.recording import mcap_chunk
 
 RECORD_LIMIT = 64 * 1024**2  # bytes of a record that is read (our chunks have 128 KiB)
-CHUNK_LIMIT = 256 * 1024**2  # bytes of a chunk's content
 BLOCK = 1024**2  # bytes at once of a record that is passed over
 
 RECORD = struct.Struct("<BQ")  # opcode, length of what follows
@@ -86,32 +84,12 @@ def records(data: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def content(body: bytes) -> tuple[bytes, bool]:
-    """A chunk record's content, decompressed within CHUNK_LIMIT, and whether a CRC covers it.
-    Raises Unreadable.
-    """
+    """A chunk record's content, and whether a CRC covers it. Raises Unreadable."""
     chunk = parsed(Chunk, body)
-    size = chunk.uncompressed_size
-    if size > CHUNK_LIMIT:
-        raise Unreadable(f"a chunk of {size} bytes; the limit is {CHUNK_LIMIT}")
     try:
-        if chunk.compression == "zstd":
-            told = zstandard.get_frame_parameters(chunk.data).content_size
-            if told not in (size, 0, zstandard.CONTENTSIZE_UNKNOWN):
-                raise Unreadable(f"{told} bytes, the chunk says {size}")
-            data = zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=size)
-        elif chunk.compression == "lz4":
-            data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
-        elif chunk.compression:
-            raise Unreadable(f"compression {chunk.compression!r}; want zstd, lz4 or none")
-        else:
-            data = chunk.data
-    except (zstandard.ZstdError, RuntimeError) as error:
+        return mcap_chunk.content(chunk), bool(chunk.uncompressed_crc)
+    except mcap_chunk.ChunkError as error:
         raise Unreadable(str(error)) from None
-    if len(data) != size:
-        raise Unreadable(f"{len(data)} bytes, the chunk says {size}")
-    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
-        raise Unreadable("wrong CRC")
-    return data, bool(chunk.uncompressed_crc)
 
 
 def parsed(kind: type, body: bytes):
