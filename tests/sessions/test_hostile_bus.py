@@ -18,7 +18,8 @@ from messages.history.mending import Mender
 from messages.history.mending_state import FARTHEST, Arrival
 from sessions.library.catalogue import Catalogue
 from sessions.recording import mcap_log
-from sessions.recording.mcap_log import Damage, descriptor_set, read
+from sessions.recording.mcap_append import descriptor_set
+from sessions.recording.mcap_log import Damage, read
 from sessions.recording.recorder import Recorder
 from sessions.recording.settings import RecorderSettings
 from tests.sessions.test_bus import START, STOP, bus, client, order, recording, until  # noqa: F401
