@@ -25,7 +25,8 @@ from gyrofree.commands.options import (
 from gyrofree.commands.run import progress_bar
 from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
 from messages.contract.topics import TopicError, check_name
-from sessions.recording.manifest import SessionError, name_of
+from sessions.library.annotations import give_title
+from sessions.recording.manifest import SessionError, name_of, slug
 
 
 def export(
@@ -139,8 +140,13 @@ def import_log(
             print(f"note: {note}", file=sys.stderr)
         rows = list(importer.rows_of(source, settings.bus.prefix, device))
         folder = _estimated(
-            settings, rows, f"20240101-000000-{name}", f"made of {log.name}", settings.recorder.root
+            settings,
+            rows,
+            f"20240101-000000-{slug(name) or 'import'}",
+            f"made of {log.name}",
+            settings.recorder.root,
         )
+        give_title(folder, name)
     except (LogError, TopicError, SessionError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
     print(json.dumps({"session": folder.name}) if as_json else folder.name)
@@ -183,6 +189,9 @@ def rerun(
             help="KEY=VALUE of [estimator] for this run, as layout.half_side_m=0.0493; repeatable.",
         ),
     ] = None,
+    library_only: Annotated[
+        bool, typer.Option(help="Files in --set by name, of the folders for cards and axis maps.")
+    ] = False,
     as_json: AsJson = False,
     config: Config = None,
 ) -> None:
@@ -193,29 +202,32 @@ def rerun(
     """
     from estimator.choice import UnknownEstimator
     from estimator.pipeline import Pipeline
+    from gyrofree.running.library import from_library
     from sessions.replay.rerun import estimates_again, rerun_id, write_session
 
     settings = settings_of(config)
-    path = file_of(settings, session)
+    path, short = file_of(settings, session), slug(name, 24) or "new"
     chosen = {"rate": estimators, "navigators": navigators}
     changes = {
         key: [one.strip() for one in text.split(",")] for key, text in chosen.items() if text
     }
     try:
         estimator = with_changes(settings.estimator.model_copy(update=changes), changed or [])
+        estimator = from_library(settings.estimator, estimator) if library_only else estimator
         settings = settings.model_copy(update={"estimator": estimator})
         pipeline = Pipeline(estimator)
         with progress_bar() as progress:
-            rows = estimates_again(path, pipeline, name if beside else "", progress)
+            rows = estimates_again(path, pipeline, short if beside else "", progress)
             what = ", ".join([*sum(changes.values(), []), *(changed or [])]) or "this configuration"
             note = f"{path.parent.name} again: {what}"
             folder = write_session(
                 catalogue_of(settings).root,
-                rerun_id(path, name),
+                rerun_id(path, short),
                 rows,
                 note,
                 settings.model_dump(mode="json"),
             )
+        give_title(folder, name)
     except (UnknownEstimator, SessionError, ValueError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
     print(json.dumps({"session": folder.name}) if as_json else folder.name)

@@ -7,6 +7,7 @@ to trust the file: open (being recorded, or cut off), closed (complete, with its
 
 import os
 import re
+import unicodedata
 from pathlib import Path
 from typing import Literal
 
@@ -17,6 +18,18 @@ RECORDING = "recording.mcap"
 RECOVERED = "recovered.mcap"
 SESSION_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,31}")  # what a person may add to an id
 SESSION_ID = re.compile(r"[0-9]{8}-[0-9]{6}(-[a-z0-9][a-z0-9_-]{0,40})?")
+
+
+GERMAN = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})  # the usual way to write them
+
+
+def slug(name: str, longest: int = 32) -> str:
+    """What a person calls a session, as it may stand in an id: "Messung Prüfstand (2)" ->
+    "messung-pruefstand-2"; empty when no letter of it can.
+    """
+    small = unicodedata.normalize("NFC", name).lower().translate(GERMAN)
+    ascii_only = unicodedata.normalize("NFKD", small).encode("ascii", "ignore").decode()
+    return re.sub(r"[^a-z0-9_-]+", "-", ascii_only)[:longest].strip("-_")
 
 
 class SessionError(ValueError):
