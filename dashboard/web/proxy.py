@@ -8,6 +8,7 @@ here (scene_messages.py).
 import asyncio
 import logging
 import time
+from collections import Counter
 from collections.abc import Callable, Collection
 from pathlib import Path
 from urllib.parse import parse_qsl, urlencode
@@ -75,6 +76,7 @@ def router(
     """GET /scene/ and the WebSocket /scene/; scene_port gives viser's port on the loopback."""
     routes = APIRouter(include_in_schema=False)
     page, version = scene_page()
+    open_scenes: Counter[str] = Counter()  # user -> scenes
 
     @routes.get("/scene/")
     def scene(request: Request) -> Response:
@@ -95,10 +97,22 @@ def router(
     @routes.websocket("/scene")  # viser's page drops the last slash of its own address
     @routes.websocket("/scene/")
     async def scene_socket(socket: WebSocket) -> None:
-        if gate.session_of(socket) is None:
+        found = gate.session_of(socket)
+        if found is None:
             await socket.close(1008, "sign in first")
             return
-        await Relay(settings, gate, socket, open_labels).run(scene_port())
+        user = found[1].name
+        if open_scenes[user] >= settings.scenes_per_user or (
+            open_scenes.total() >= settings.scenes
+        ):
+            log.warning("%s has %d scenes open: one more refused", user, open_scenes[user])
+            await socket.close(1013, "too many scenes are open: close other tabs")
+            return
+        open_scenes[user] += 1
+        try:
+            await Relay(settings, gate, socket, open_labels).run(scene_port())
+        finally:
+            open_scenes[user] -= 1
 
     return routes
 
