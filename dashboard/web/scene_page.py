@@ -7,7 +7,9 @@ known beforehand, so both get a hash, and text that somebody else has brought in
 event handler, a script element) does not run. What has to stay open, and why:
 
     style-src 'unsafe-inline'     the page's libraries write style elements and attributes
-    script-src 'wasm-unsafe-eval' it decompresses by WebAssembly; texts are not evaluated
+    script-src 'wasm-unsafe-eval' it decompresses by WebAssembly. Texts are not evaluated: that is
+                                  wanted by a part for splats, which we do not draw, and by
+                                  viser's run_javascript, which we do not call
     blob: of script and worker    its workers are made of texts within the program
     img-src data: blob:           pictures and textures within its messages
 """
