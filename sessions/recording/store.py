@@ -23,7 +23,7 @@ from messages.contract.topics import Address, TopicError, parse
 from sessions.recording.certificate import Witness, certify
 from sessions.recording.keys import KeyState
 from sessions.recording.manifest import RECORDING, Manifest, sync_folder, write_manifest
-from sessions.recording.mcap_log import McapLog
+from sessions.recording.mcap_append import McapLog
 from sessions.recording.settings import RecorderSettings
 
 log = logging.getLogger(__name__)

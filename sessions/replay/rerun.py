@@ -12,7 +12,6 @@ from pathlib import Path
 from messages.contract.topics import ATTITUDE, AXES, ESTIMATOR, PIPELINE_INPUTS, POSE, parse
 from sessions.export.table import Progress, Selection, messages, silent
 from sessions.recording.manifest import SESSION_ID, Manifest, SessionError, check_id
-from sessions.recording.mcap_log import Damage
 from sessions.recording.settings import RecorderSettings
 from sessions.recording.store import SessionStore, versions
 from sessions.replay.reproduce import ESTIMATES, Pipeline, give_orders
@@ -32,7 +31,7 @@ def estimates_again(
     counts: dict[str, int] = {}
     size, seen = max(1, path.stat().st_size), 0
     give_orders(path, pipeline)
-    for row, topic, message in messages(path, Selection(), Damage()):
+    for row, topic, message in messages(path, Selection()):
         seen += len(row.payload) + 40
         if topic not in COMPUTED or name:
             yield row.log_ns, row.key, row.payload

@@ -49,10 +49,11 @@ class Link(Panel):
             ("GNSS good · bad", f"{m.gnss_good} · {m.gnss_bad}"),
         ]
         content = rows(items, s.stale("link"))
-        if m.damage:
-            reasons = sorted(m.damage.items(), key=lambda item: -item[1])
-            content += tag("p", "Damage by reason", class_="gf-title")
-            content += rows([(reason, number(count, 0)) for reason, count in reasons[:MOST]])
+        for title, counts in (("Left out, by reason", m.refused), ("Damage by reason", m.damage)):
+            if counts:
+                reasons = sorted(counts.items(), key=lambda item: -item[1])[:MOST]
+                content += tag("p", title, class_="gf-title")
+                content += rows([(reason, number(count, 0)) for reason, count in reasons])
         self._table = self.html(alert(m.message) + content, self._table)
 
 

@@ -77,6 +77,9 @@ class Record:
         lost = sum(m.lost.values())
         if lost:
             items.append(("lost on the bus", bad(f"{number(lost, 0)} messages")))
+        if m.refused:
+            kinds = ", ".join(f"{kind} {n}" for kind, n in sorted(m.refused.items()))
+            items.append(("refused on the bus", bad(kinds)))
         return alert(m.message) + rows(items, stale)
 
     def _order(self, action: int) -> None:
