@@ -40,6 +40,7 @@ log = logging.getLogger(__name__)
 
 JOIN_WAIT_S = 0.01  # samples held back for joining wait no longer than this for the next frame
 STATUS_EVERY_S = 1.0
+STOPPED_S = 1.5  # longer than any wait below: this process was stopped, or got no processor
 
 
 class DeviceLink:
@@ -56,6 +57,7 @@ class DeviceLink:
         self.name, self.device, self._keeper = name, device, keeper or Keeper()
         self._next_put: Put | None = None  # None: there is no bus yet
         self._live = False
+        self._looked = time.monotonic()
         self.journal = Journal(
             folder, settings.journal_bytes, settings.segment_bytes, settings.sync_s
         )
@@ -83,7 +85,14 @@ class DeviceLink:
             self.orders,
         )
         self.report = LinkReport(
-            device, self.decoder, self.samples, self.gnss, self.clock, self.journal, self.spool
+            device,
+            self.decoder,
+            self.samples,
+            self.gnss,
+            self.clock,
+            self.journal,
+            self.spool,
+            self.wall,
         )
 
     def run(self, stop: threading.Event) -> None:
@@ -118,9 +127,9 @@ class DeviceLink:
         self.report.message(self.readers, 0)  # rates and latency from here on
 
     def _loop(self, stop: threading.Event) -> None:
-        due = time.monotonic()
+        due = self._looked = time.monotonic()
         while not stop.is_set():
-            left = due - time.monotonic()
+            left = due - self._look()
             if left <= 0:
                 self._each_second()
                 due = max(due + STATUS_EVERY_S, time.monotonic())
@@ -141,12 +150,22 @@ class DeviceLink:
                 self.out.direct(self._next_put)
                 due = time.monotonic()  # the first status at once: it says that samples follow
 
+    def _look(self) -> float:
+        """Now, s; notices when this process was stopped meanwhile."""
+        now, before = time.monotonic(), self._looked
+        self._looked = now
+        if now - before > STOPPED_S:
+            self.watch.stopped(now - before)
+            self.report.stopped(now - before)
+            log.warning("%s: this process was stopped for %.1f s", self.name, now - before)
+        return now
+
     def _each_second(self) -> None:
         self.wall.follow()
         self.watch.look(self.readers[0].connected, time.monotonic_ns())
         if self.out.live:
             status = self.report.message(self.readers, self.queue.qsize())
-            self.out.publish(LINK, status, 0, time.time_ns())
+            self.out.publish(LINK, status, 0, self.wall.now_ns())
 
     def go_live(self, put: Put) -> None:
         """Publish from now on what is read from now on: put(topic, device, message), which must not
@@ -182,4 +201,4 @@ class DeviceLink:
             self.gnss.take(chunk.data, device_us, chunk.monotonic_ns)
         else:
             for frame in self.decoder.feed(chunk.data):
-                self.frames.take(frame, self.decoder.ledger.reboots, chunk.monotonic_ns)
+                self.frames.take(frame, self.decoder.ledger.reboots, chunk.monotonic_ns, chunk.late)
