@@ -40,8 +40,9 @@ from sessions.export.table import (
     tables,
 )
 from sessions.export.track import write_gpx, write_kml
-from sessions.recording.mcap_log import Damage, McapLog, Recorded, read
+from sessions.recording.mcap_log import Damage, McapLog, Recorded
 from sessions.recording.samples import decode
+from sessions.recording.timeline import straight
 
 RATE_ESTIMATE: Topic = replace(RATE, type=pb.RateEstimate)  # one sample of a batch
 ROW_GROUP = 20_000  # rows of Parquet written at once
@@ -178,7 +179,7 @@ def to_mcap(
     foreign: set[str] = set()
     with target.open("wb") as stream:
         log = McapLog(stream.fileno(), 128 * 1024)
-        for row in read(path, Damage()):
+        for row in straight(path, Damage()):
             start = row.log_ns if start is None else start
             try:
                 topic = parse(row.key).topic

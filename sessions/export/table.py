@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from messages.contract.topics import Topic, TopicError, parse
 from sessions.export.columns import TIME, Column, Columns
-from sessions.recording.mcap_log import Damage, Recorded, read
+from sessions.recording.mcap_log import Damage, Recorded
 from sessions.recording.samples import Gathering, decode
+from sessions.recording.timeline import straight
 
 Progress = Callable[[float, str], None]  # share done 0 to 1, what is being done
 
@@ -55,7 +56,7 @@ def messages(
     OSError.
     """
     start = None
-    for row in read(path, damage):
+    for row in straight(path, damage):
         start = row.log_ns if start is None else start
         if not selection.start_s <= (row.log_ns - start) / 1e9 <= selection.end_s:
             continue

@@ -22,7 +22,8 @@ from mcap.summary import Summary
 
 from messages.contract.topics import Topic, TopicError, parse
 from sessions.recording import mcap_chunk
-from sessions.recording.mcap_log import RECORD_LIMIT, Damage, read
+from sessions.recording.mcap_log import RECORD_LIMIT, Damage
+from sessions.recording.timeline import stepped, straight
 
 RECORD = struct.Struct("<BQ")  # opcode, length
 MESSAGE_HEAD = 22  # bytes before a message's payload: channel, sequence, log and publish time
@@ -51,7 +52,7 @@ class Extent:
 
 
 def summary_of(path: Path) -> Summary | None:
-    """The file's own index; None where it has none that can be read. Raises OSError."""
+    """The file's own index; None where it has none that can be gone by. Raises OSError."""
     found = path.stat()
     return _summary(path, found.st_size, found.st_mtime_ns)
 
@@ -68,6 +69,7 @@ def _summary(path: Path, size: int, mtime_ns: int) -> Summary | None:
         and found.statistics is not None
         and found.statistics.message_count
         and found.chunk_indexes
+        and not stepped(found.chunk_indexes)
     )
     return found if whole else None
 
@@ -88,7 +90,7 @@ def extent(path: Path) -> Extent:
         )
     damage = Damage()
     first = last = 0
-    for row in read(path, damage):
+    for row in straight(path, damage):
         first = min(first or row.log_ns, row.log_ns)
         last = max(last, row.log_ns)
     if not first:
@@ -116,7 +118,7 @@ def scan(
     """
     found = summary_of(path)
     if found is None:
-        for row in read(path):
+        for row in straight(path):
             if _wanted(row.key, topics):
                 yield Block(row.key, [row.log_ns], [row.payload])
         return

@@ -29,10 +29,17 @@ class Entry(NamedTuple):
 class Intake:
     """Takes messages in the order of arrival, gives them in the order of publication."""
 
-    def __init__(self, prefix: str, ask: Callable[[Question], None] | None, since_ns: int) -> None:
+    def __init__(
+        self,
+        prefix: str,
+        ask: Callable[[Question], None] | None,
+        since_ns: int,
+        now_ns: Callable[[], int] = time.time_ns,
+    ) -> None:
         """Without `ask` nothing is repaired. Runs that began after since_ns (UTC) are wanted from
-        their beginning.
+        their beginning. now_ns: the clock of the receive times.
         """
+        self._now_ns = now_ns
         self._prefix = prefix
         self._mender = None if ask is None else Mender(ask, since_ns=since_ns)
         self._answers: deque[tuple[Question, pb.HistoryReply | None]] = deque()
@@ -105,7 +112,7 @@ class Intake:
             stream = arrival.device, arrival.topic.source
             at_ns = arrival.at_ns
             if arrival.late:  # the publisher's clock may differ from ours; the order must not
-                at_ns = min(at_ns, time.time_ns())
+                at_ns = min(at_ns, self._now_ns())
             at_ns = self._last_ns[stream] = max(at_ns, self._last_ns.get(stream, 0))
             name = arrival.topic.name, arrival.device, arrival.estimator
             key = self._keys.get(name)

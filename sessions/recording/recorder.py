@@ -16,16 +16,18 @@ import zenoh
 from messages import text
 from messages.bus import orders
 from messages.bus.session import BusSettings
+from messages.clock import Clock
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import RECORDER
 from messages.history.mending_state import Question
 from sessions.recording.intake import Intake
-from sessions.recording.manifest import SESSION_NAME, Manifest
+from sessions.recording.manifest import SESSION_NAME, ClockStep, Manifest
 from sessions.recording.settings import RecorderSettings
 from sessions.recording.store import SessionStore, start
 
 log = logging.getLogger(__name__)
 
+LOOK_S = 1.0  # between two looks at the wall clock
 DRAIN_S = 0.1  # a message waits at most this long before it is in the running chunk
 REPAIR_S = 2.0  # the end of a session waits so long for gaps that are being filled
 RETRY_S = 5.0  # an automatic start that the disk refused is tried again after this
@@ -56,6 +58,8 @@ class Recorder:
         self._orders: deque[Order] = deque()
         self._ask = ask
         self._fresh = True
+        self._clock = Clock()
+        self._look_at = 0.0  # when the wall clock is looked at again
         self._intake = Intake(bus.prefix, None, 0)
         self._overflow = 0
         self._store: SessionStore | None = None
@@ -72,7 +76,7 @@ class Recorder:
         if len(self._inbox) >= self.settings.max_inbox:
             self._overflow += 1
             return
-        self._inbox.append((time.time_ns(), str(sample.key_expr), sample.payload.to_bytes()))
+        self._inbox.append((self._clock.now_ns(), str(sample.key_expr), sample.payload.to_bytes()))
 
     def on_order(self, order: Order) -> None:
         """Zenoh's thread: keep the order for the loop."""
@@ -101,6 +105,7 @@ class Recorder:
     def step(self) -> None:
         """Write what came in, answer orders, close a chunk when it is time."""
         self.wake.clear()
+        self._look_at_the_clock()
         self._auto_start()
         self._drain()
         while self._orders:
@@ -111,6 +116,19 @@ class Recorder:
             store.flush()
             if store.size >= self.settings.max_file_bytes:
                 self._rotate(store)
+
+    def _look_at_the_clock(self) -> None:
+        """Once a second: a step of the wall clock goes into session.json, and is said."""
+        if time.monotonic() < self._look_at:
+            return
+        self._look_at = time.monotonic() + LOOK_S
+        step = self._clock.look()
+        if step is not None:
+            log.warning("%s; the recording goes on by what has elapsed", step)
+            if self._store is not None:
+                self._store.manifest.clock_steps.append(
+                    ClockStep(at_utc_ns=step.at_ns, step_s=step.step_ns * 1e-9)
+                )
 
     def _drain(self) -> None:
         store, inbox = self._store, self._inbox
@@ -145,9 +163,12 @@ class Recorder:
         """Start a session; on refusal say why in the status and, with auto_start, try again
         later.
         """
+        if self._fresh and not self._inbox:
+            self._clock = Clock()  # by what the wall clock says now; within a session it has no say
         try:
             store = start(
                 self.settings,
+                self._clock.now_ns(),
                 name=name,
                 note=note,
                 user=user,
@@ -166,7 +187,9 @@ class Recorder:
             return False
         self._message, self._retry_at = "", None
         if self._fresh:  # a file that only goes on keeps what is known of the streams
-            self._intake = Intake(self.bus.prefix, self._ask, store.manifest.start_utc_ns)
+            self._intake = Intake(
+                self.bus.prefix, self._ask, store.manifest.start_utc_ns, self._clock.now_ns
+            )
         self._fresh = True
         self._store, self._recording = store, True
         self._last_flush = time.monotonic()
@@ -260,8 +283,12 @@ class Recorder:
         status.CopyFrom(self._describe(self._store) if self._store else self._last)
         status.recording = self._store is not None
         status.header.device = RECORDER
-        status.header.utc_ns = time.time_ns()
+        status.header.utc_ns = self._clock.now_ns()
         status.message = (self._store.error if self._store else "") or self._message
+        if self._store is not None:
+            steps = self._store.manifest.clock_steps
+            status.clock_steps = len(steps)
+            status.clock_offset_s = sum(step.step_s for step in steps)
         return status
 
     def _describe(self, store: SessionStore) -> pb.RecorderStatus:

@@ -11,8 +11,9 @@ from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
 
 from messages.contract.topics import Topic, TopicError, parse
-from sessions.recording.mcap_log import RECORD_LIMIT, Damage, chunk_at, read
+from sessions.recording.mcap_log import RECORD_LIMIT, Damage, chunk_at
 from sessions.recording.samples import decode
+from sessions.recording.timeline import stepped, straight
 from sessions.replay.replay import Input
 
 
@@ -35,17 +36,20 @@ class Source:
                 found = None
         self._index = found
         self._indexed = (
-            found is not None and found.statistics is not None and bool(found.chunk_indexes)
+            found is not None
+            and found.statistics is not None
+            and bool(found.chunk_indexes)
+            and not stepped(found.chunk_indexes)
         )
         if self._indexed and found.statistics.message_count:
             return found.statistics.message_start_time, found.statistics.message_end_time
         damage = Damage()
-        times = [
-            row.log_ns for row in read(self._path, damage)
-        ]  # without an index: as far as it can be read
-        if not times:
+        first = last = 0
+        for row in straight(self._path, damage):  # without an index: as far as it can be read
+            first, last = min(first or row.log_ns, row.log_ns), max(last, row.log_ns)
+        if not first:
             raise ValueError(f"{self._path}: no message in it, {damage}: want an MCAP recording")
-        return min(times), max(times)
+        return first, last
 
     def items(self, from_ns: int = 0) -> Iterator[Input]:
         """Decoded messages from this log time on, in its order."""
@@ -60,7 +64,7 @@ class Source:
     def _rows(self, from_ns: int) -> Iterator[tuple[int, str, bytes]]:
         if not self._indexed:
             yield from (
-                (r.log_ns, r.key, r.payload) for r in read(self._path) if r.log_ns >= from_ns
+                (r.log_ns, r.key, r.payload) for r in straight(self._path) if r.log_ns >= from_ns
             )
             return
         yield from self._indexed_rows(from_ns)
