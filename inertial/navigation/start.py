@@ -14,7 +14,7 @@ from inertial.elementary import dot, norm
 from inertial.navigation.alignment import Alignment, AlignmentSettings, Start
 from inertial.navigation.error_model import DP
 from inertial.navigation.filters import FilterConfig
-from inertial.navigation.fix import Fix
+from inertial.navigation.fix import UNKNOWN_HEIGHT_SIGMA, Fix
 from inertial.navigation.settings import NavigatorConfig
 
 Array = NDArray[np.float64]
@@ -45,6 +45,7 @@ class Startup:
 
     def fix(self, fix: Fix) -> Start | None:
         """Take a fix with a velocity; the start, when the alignment knows enough at its time."""
+        fix = fix.filled()
         self.align.fix(fix.t, fix.v_n, fix.sigma_v)
         if not self.history.reaches(fix.t):
             return None
@@ -63,8 +64,9 @@ class Startup:
 
 def first_leg(config: NavigatorConfig, chosen: FilterConfig, start: Start, fix: Fix) -> Any:
     """The filter's Leg at the fix that ended the alignment: attitude from there, position and
-    velocity of the fix.
+    velocity of the fix. What the fix does not know begins at zero with the sigma of not knowing.
     """
+    fix = fix.filled()
     model = chosen.model(config.imu)
     leg = core.new_leg(model.states)
     x = leg.x
@@ -87,6 +89,8 @@ def first_covariance(
     """(n, n) at the start: what is told, the fix, and what the alignment knows of itself."""
     c = config
     sigma_p = np.minimum(c.sigma_p, np.maximum(3.0 * fix.sigma_p, 0.1))
+    if fix.sigma_p[2] >= UNKNOWN_HEIGHT_SIGMA:
+        sigma_p[2] = fix.sigma_p[2]
     sigma_v = np.maximum(c.sigma_v, fix.sigma_v)
     attitude = [c.sigma_tilt, c.sigma_tilt, c.sigma_yaw]
     biases = [c.sigma_bias_accel] * 3 + [c.sigma_bias_gyro] * 3

@@ -15,18 +15,20 @@ from pathlib import Path
 from typing import IO
 
 from google.protobuf.descriptor import FileDescriptor
-from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Message, Schema
 from mcap.stream_reader import StreamReader
 
+from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import Topic
 from sessions.recording import mcap_chunk
 from sessions.recording.mcap_writer import McapWriter
 
 PROFILE = "gyrofree"
+RULES = "google/protobuf/descriptor.proto"  # what the contract's rules are written with
 _HEAD = struct.Struct("<BQ")  # opcode and length of a record
 RECORD_LIMIT = 64 * 1024**2  # bytes; a longer record is damage, not data (our chunks are 128 KiB)
 
@@ -48,7 +50,7 @@ def descriptor_set(topic: Topic) -> bytes:
     files: dict[str, FileDescriptor] = {}
 
     def visit(file: FileDescriptor) -> None:
-        if file.name not in files:
+        if file.name not in files and file.name != RULES:
             for dependency in file.dependencies:
                 visit(dependency)
             files[file.name] = file
@@ -56,8 +58,28 @@ def descriptor_set(topic: Topic) -> bytes:
     visit(topic.type.DESCRIPTOR.file)
     result = FileDescriptorSet()
     for file in files.values():
-        file.CopyToProto(result.file.add())
+        _without_rules(file, result.file.add())
     return result.SerializeToString()
+
+
+def _without_rules(file: FileDescriptor, out: FileDescriptorProto) -> None:
+    """A file as other viewers read it: our rules for what a field may hold are not theirs."""
+    file.CopyToProto(out)
+    if RULES not in out.dependency:
+        return
+    out.dependency.remove(RULES)
+    del out.extension[:]
+    found = list(out.message_type)
+    while found:
+        message = found.pop()
+        found += message.nested_type
+        message.options.ClearExtension(pb.open)
+        for field in message.field:
+            field.options.ClearExtension(pb.rule)
+            if not field.options.ByteSize():
+                field.ClearField("options")
+        if not message.options.ByteSize():
+            message.ClearField("options")
 
 
 class Sink:
