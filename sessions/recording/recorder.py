@@ -16,7 +16,6 @@ import zenoh
 from messages import text
 from messages.bus import orders
 from messages.bus.session import BusSettings
-from messages.clock import Clock
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import MESSAGE_BYTES, Refusal
 from messages.contract.door import Door, device_of
@@ -24,13 +23,13 @@ from messages.contract.topics import RECORDER
 from messages.history.mending_state import Question
 from messages.text import plain
 from sessions.recording.intake import Entry, Intake
-from sessions.recording.manifest import SESSION_NAME, ClockStep, Manifest
+from sessions.recording.manifest import SESSION_NAME, Manifest
+from sessions.recording.session_clock import SessionClock
 from sessions.recording.settings import RecorderSettings
 from sessions.recording.store import SessionStore, start
 
 log = logging.getLogger(__name__)
 
-LOOK_S = 1.0  # between two looks at the wall clock
 DRAIN_S = 0.1  # a message waits at most this long before it is in the running chunk
 REPAIR_S = 2.0  # the end of a session waits so long for gaps that are being filled
 RETRY_S = 5.0  # an automatic start that the disk refused is tried again after this
@@ -61,8 +60,7 @@ class Recorder:
         self._orders: deque[Order] = deque()
         self._ask = ask
         self._fresh = True
-        self._clock = Clock()
-        self._look_at = 0.0  # when the wall clock is looked at again
+        self._clock = SessionClock()
         self._bytes_in = self._bytes_out = 0  # of the inbox: counted each by one thread
         self._door = self._new_door()
         self._intake = Intake(bus.prefix, None, 0, self._door)
@@ -118,7 +116,7 @@ class Recorder:
     def step(self) -> None:
         """Write what came in, answer orders, close a chunk when it is time."""
         self.wake.clear()
-        self._look_at_the_clock()
+        self._clock.look(self._store.manifest if self._store is not None else None)
         self._auto_start()
         self._drain()
         while self._orders:
@@ -129,19 +127,6 @@ class Recorder:
             store.flush()
             if store.size >= self.settings.max_file_bytes:
                 self._rotate(store)
-
-    def _look_at_the_clock(self) -> None:
-        """Once a second: a step of the wall clock goes into session.json, and is said."""
-        if time.monotonic() < self._look_at:
-            return
-        self._look_at = time.monotonic() + LOOK_S
-        step = self._clock.look()
-        if step is not None:
-            log.warning("%s; the recording goes on by what has elapsed", step)
-            if self._store is not None:
-                self._store.manifest.clock_steps.append(
-                    ClockStep(at_utc_ns=step.at_ns, step_s=step.step_ns * 1e-9)
-                )
 
     def _drain(self) -> None:
         store, inbox = self._store, self._inbox
@@ -192,7 +177,7 @@ class Recorder:
         later.
         """
         if self._fresh and not self._inbox:
-            self._clock = Clock()  # by what the wall clock says now; within a session it has no say
+            self._clock.begin()
         try:
             store = start(
                 self.settings,
