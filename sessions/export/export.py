@@ -10,7 +10,6 @@ Big recordings stream: only mat holds all in memory.
 """
 
 import csv
-import logging
 import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -27,7 +26,7 @@ from scipy.io import savemat
 
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
-from messages.contract.topics import GNSS, LOG, NAV, RATE, Topic, TopicError, parse
+from messages.contract.topics import GNSS, LOG, NAV, RATE, Topic, parse
 from sessions.export.columns import Column
 from sessions.export.table import (
     Block,
@@ -40,15 +39,13 @@ from sessions.export.table import (
     tables,
 )
 from sessions.export.track import write_gpx, write_kml
-from sessions.recording.mcap_log import Damage, McapLog, Recorded
+from sessions.recording.mcap_append import McapLog
+from sessions.recording.mcap_log import Recorded
 from sessions.recording.samples import decode
 from sessions.recording.timeline import straight
 
 RATE_ESTIMATE: Topic = replace(RATE, type=pb.RateEstimate)  # one sample of a batch
 ROW_GROUP = 20_000  # rows of Parquet written at once
-
-
-log_of = logging.getLogger(__name__)
 
 
 class ExportError(ValueError):
@@ -176,16 +173,11 @@ def to_mcap(
     target = out / "cut.mcap"
     count = 0
     start = None
-    foreign: set[str] = set()
     with target.open("wb") as stream:
         log = McapLog(stream.fileno(), 128 * 1024)
-        for row in straight(path, Damage()):
+        for row in straight(path):
             start = row.log_ns if start is None else start
-            try:
-                topic = parse(row.key).topic
-            except TopicError:  # of another program: not ours to cut, and counted by `verify`
-                foreign.add(row.key)
-                continue
+            topic = parse(row.key).topic
             if (
                 selection.takes(topic)
                 and selection.start_s <= (row.log_ns - start) / 1e9 <= selection.end_s
@@ -202,8 +194,6 @@ def to_mcap(
     if not count:
         target.unlink()
         raise ExportError(f"{path}: no message of the wanted topics and time")
-    if foreign:
-        log_of.warning("%s: left out, not of this program: %s", path, ", ".join(sorted(foreign)))
     progress(1.0, "cut")
     return [target]
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from messages.clock import Moment
-from messages.contract.topics import Address, TopicError, parse
+from messages.contract.topics import Address, parse
 from sessions.recording.certificate import Witness, certify
 from sessions.recording.keys import KeyState
 from sessions.recording.manifest import (
@@ -25,7 +25,9 @@ from sessions.recording.manifest import (
     sync_folder,
     write_manifest,
 )
-from sessions.recording.mcap_log import Damage, McapLog, read
+from sessions.recording.mcap_append import McapLog
+from sessions.recording.mcap_damage import Damage
+from sessions.recording.mcap_log import read
 from sessions.recording.store import lock
 
 log = logging.getLogger(__name__)
@@ -79,11 +81,7 @@ def _copy(source: Path, fd: int, channels: dict[int, str] | None) -> Salvage:
     for message in read(source, result.damage, channels):
         state = states.get(message.key)
         if state is None:
-            try:
-                address = parse(message.key)
-            except TopicError:
-                result.damage.orphans += 1
-                continue
+            address = parse(message.key)
             state = KeyState(out.open_channel(message.key, address.topic), address)
             states[message.key], addresses[message.key] = state, address
         state.publish_time(message.payload)
@@ -139,7 +137,7 @@ def recover_session(folder: Path) -> Manifest | None:
     manifest.sha256 = found.sha256
     manifest.recovery = (
         f"{found.messages} messages from {original.stat().st_size} bytes of {RECORDING}, which was"
-        f" not closed: {found.damage}"
+        f" not closed: {'; '.join(filter(None, (str(found.damage), found.damage.others)))}"
     )
     write_manifest(folder, manifest)
     log.warning("%s: recovered %s", manifest.id, manifest.recovery)

@@ -29,7 +29,7 @@ from sessions.recording.manifest import (
     sync_folder,
     write_manifest,
 )
-from sessions.recording.mcap_log import McapLog
+from sessions.recording.mcap_append import McapLog
 from sessions.recording.settings import RecorderSettings
 
 log = logging.getLogger(__name__)

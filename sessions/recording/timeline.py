@@ -7,26 +7,24 @@ back with times that go on by the board's clock where a wall clock jumps; a reco
 passes through as it is, byte for byte.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from pathlib import Path
 
 from google.protobuf.message import DecodeError
-from mcap.records import ChunkIndex
 
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.header import first_field
 from messages.contract.topics import Topic, TopicError, parse
-from sessions.recording.mcap_log import Damage, Recorded, read
+from sessions.recording.mcap_damage import Damage
+from sessions.recording.mcap_index import BACK_S, PAUSE_S
+from sessions.recording.mcap_log import Recorded, read
 
 SAME_S = 2.0  # two offsets of UTC against a board's clock that differ by less are one
-BACK_S, FORWARD_S = 1.0, 5.0  # a step of the wall clock, against what the board's clock says
+FORWARD_S = 5.0  # a step of the wall clock, against what the board's clock says; back: BACK_S
 APART_S = 30.0  # receive time and the message's own time, against those of the first message
 STANDS_S = 3.0  # receive times stand still for so long: a clock set back, and the order kept
-PAUSE_S = 60.0  # receive times that jump further may do so because a clock was set
 LEVELS = 16  # offsets that are remembered, of one boot
-STILL_CHUNKS = 8  # that end at one time, one after another
 
 
 @dataclass
@@ -54,25 +52,6 @@ def straight(
     """What `read` gives, with times on one axis. Raises OSError."""
     timeline = Timeline()
     yield from map(timeline.place, read(path, damage, channels))
-
-
-def stepped(chunks: Iterable[ChunkIndex]) -> bool:
-    """Do the receive times of a file go back, jump or stand still, as far as its index tells? Then
-    the index cannot be gone by, and the file has to be read by `straight`.
-    """
-    ordered = sorted(chunks, key=lambda chunk: chunk.chunk_start_offset)
-    pause_ns, back_ns = PAUSE_S * 1e9, BACK_S * 1e9
-    if any(one.message_end_time - one.message_start_time > pause_ns for one in ordered):
-        return True
-    still = 0
-    for before, one in pairwise(ordered):
-        jump = one.message_start_time - before.message_end_time
-        if jump < -back_ns or jump > pause_ns:
-            return True
-        still = still + 1 if one.message_end_time <= before.message_end_time else 0
-        if still >= STILL_CHUNKS:
-            return True
-    return False
 
 
 class Timeline:

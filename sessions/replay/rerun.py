@@ -18,7 +18,6 @@ from sessions.recording.manifest import (
     check_id,
     next_number,
 )
-from sessions.recording.mcap_log import Damage
 from sessions.recording.settings import RecorderSettings
 from sessions.recording.store import SessionStore, versions
 from sessions.replay.reproduce import ESTIMATES, Pipeline, give_orders
@@ -38,7 +37,7 @@ def estimates_again(
     counts: dict[str, int] = {}
     size, seen = max(1, path.stat().st_size), 0
     give_orders(path, pipeline)
-    for row, topic, message in messages(path, Selection(), Damage()):
+    for row, topic, message in messages(path, Selection()):
         seen += len(row.payload) + 40
         if topic not in COMPUTED or name:
             yield row.log_ns, row.key, row.payload

@@ -54,7 +54,7 @@ class Analysis:
     allan_axes: list[Allan] = field(default_factory=list)
     navigation: list[NavigationResult] = field(default_factory=list)
     gravity: float = GRAVITY  # m/s^2
-    completeness: float | None = None  # 0 to 1
+    completeness: float | None = None  # 0 to 1; None where the recording itself is damaged
 
     def rate(self, name: str) -> RateResult | None:
         """The result of an estimator."""
@@ -79,7 +79,7 @@ def analyse(run: Run, manifest: Manifest | None) -> Analysis:
         else [],
         navigation=_navigation(run),
         gravity=g,
-        completeness=_completeness(manifest, run.device),
+        completeness=_completeness(manifest, run.device) if run.whole else None,
     )
 
 

@@ -23,7 +23,8 @@ from messages.contract import rates
 from messages.contract.topics import ACCEL, GNSS, RATE
 from sessions.export.export import ExportError, export
 from sessions.export.table import Selection, tables
-from sessions.recording.mcap_log import McapLog, read
+from sessions.recording.mcap_append import McapLog
+from sessions.recording.mcap_log import read
 
 KEY = "gyrofree/cube/rate/products-ekf"
 

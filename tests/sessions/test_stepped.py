@@ -18,7 +18,8 @@ from sessions.library.curves_build import build
 from sessions.library.remove import Retention, too_many
 from sessions.library.scan import extent
 from sessions.recording.manifest import RECORDING, read_manifest, write_manifest
-from sessions.recording.mcap_log import McapLog, read
+from sessions.recording.mcap_append import McapLog
+from sessions.recording.mcap_log import read
 from sessions.recording.timeline import straight
 from sessions.replay.source import Source
 
