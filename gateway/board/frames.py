@@ -34,7 +34,7 @@ class FrameHandler:
         self._device, self._state, self._clock, self._pps = device, state, clock, pps
         self._watch, self._samples, self._tacho = watch, samples, tacho
         self._gnss, self._orders = gnss, orders
-        self._reboots = 0
+        self._reboots = self._boots = 0
         self._late = False
         self._time = Continued()
 
@@ -82,9 +82,17 @@ class FrameHandler:
         """The board has booted: its clock and counters begin again."""
         if self._state.epoch is not None:
             text = f"the board restarted (boot {self._state.epoch} -> {epoch})"
-            log.warning("%s: %s", self._device, text)
+            self._boots += 1
+            if (
+                self._boots < 8 or self._boots & (self._boots - 1) == 0
+            ):  # a line may show nothing else
+                log.warning("%s: %s", self._device, text)
             self._watch.rebooted(text, received_ns)
         self._samples.flush()  # still as of the boot before
+        self.begin_anew(epoch)
+
+    def begin_anew(self, epoch: int) -> None:
+        """Forget what frames have said so far."""
         self._state.restart(epoch)
         self._clock.reset()
         self._time = Continued()

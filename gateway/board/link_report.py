@@ -13,11 +13,13 @@ from gateway.settings import DeviceSettings
 from gateway.time.clock import DeviceClock
 from gateway.time.wall import WallClock
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.door import Door
 from messages.history.journal import Journal
 from messages.history.spool import Spool
 
 UNREADABLE_S = 2.0  # bytes but no frame for so long: not our protocol, or not our speed
 UNREADABLE_BYTES = 100
+REFUSED_TOLD_S = 60.0  # that something was refused is said for so long
 BEHIND_CHUNKS = 2000
 CRYSTAL_PPM = 1000.0  # no crystal is this far off
 TOLD_S = 60.0  # that this process was stopped is said for so long
@@ -35,8 +37,10 @@ class LinkReport:
         clock: DeviceClock,
         journal: Journal,
         spool: Spool,
+        door: Door,
         wall: WallClock,
     ) -> None:
+        self._door, self._refused, self._refused_at = door, 0, -REFUSED_TOLD_S
         self._device, self._decoder, self._samples, self._gnss = device, decoder, samples, gnss
         self._clock, self._journal, self._published = clock, journal, spool.journal
         self._wall = wall
@@ -96,6 +100,7 @@ class LinkReport:
             gnss_good=self._gnss.good,
             gnss_bad=self._gnss.bad,
             damage=ledger.damage,
+            refused=self._door.counts(),
             stops=self._stops,
             stopped_s=self._stopped_s,
             clock_offset_s=self._wall.offset_s,
@@ -125,6 +130,16 @@ class LinkReport:
             found.append(
                 f"{device.port}: bytes come but no frame can be read; most likely the speed is"
                 f" wrong: set `baud` to the board's (now {device.baud})"
+            )
+        refused = self._door.counts()
+        total = sum(refused.values())
+        if total > self._refused:
+            self._refused, self._refused_at = total, now
+        if now - self._refused_at < REFUSED_TOLD_S:
+            kinds = ", ".join(f"{kind} {n}" for kind, n in sorted(refused.items()))
+            found.append(
+                f"whole frames whose values cannot be are left out ({kinds}): is the firmware of"
+                " another version, or does something else write to this line? The log names them"
             )
         if self._journal.message:
             found.append(self._journal.message)

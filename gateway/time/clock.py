@@ -17,6 +17,7 @@ BUCKET_S = (
 )
 SLOPE_AFTER_S = 10.0  # before that scatter / span says nothing about skew
 SLOPE_PRIOR = 100e-6  # a crystal's tolerance, used until then
+LEAST_SLOPE = -0.999  # a device that runs a thousand times as fast as the host; -1 has no inverse
 JUMP_S = 1.0  # a receipt this far from the line is no delay any more
 JUMP_COUNT = 20  # so many in a row: the device's clock jumped ...
 JUMP_SETTLE_NS = 3_000_000_000  # ... when, being late, they have not caught up for so long
@@ -179,6 +180,7 @@ class DeviceClock:
                 slope = (y1 - y0) / (x1 - x0)
                 if x1 >= mean:
                     break
+        slope = max(slope, LEAST_SLOPE)
         offset = min(y - slope * (x - mean) for x, y in points)
         self._line = Line(mean, offset, slope)
         above = [y - self._line.at(x) for x, y in points]

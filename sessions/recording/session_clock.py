@@ -12,7 +12,7 @@ LOOK_S = 1.0  # between two looks at the wall clock
 
 
 class SessionClock:
-    """Elapsed time as UTC; the wall clock is asked when a session begins, and watched after that."""
+    """Elapsed time as UTC; the wall clock is asked when a session begins, and then watched."""
 
     def __init__(self) -> None:
         self._clock = Clock()

@@ -79,6 +79,9 @@ class Record:
         lost = sum(m.lost.values())
         if lost:
             items.append(("lost on the bus", f'<b class="gf-bad">{number(lost, 0)} messages</b>'))
+        if m.refused:
+            kinds = ", ".join(f"{kind} {n}" for kind, n in sorted(m.refused.items()))
+            items.append(("refused on the bus", f'<b class="gf-bad">{escape(kinds)}</b>'))
         alert = f'<p class="gf-alert">{escape(m.message)}</p>' if m.message else ""
         return alert + rows(items, stale)
 
