@@ -195,6 +195,8 @@ FixResult take_one(Leg& leg, const Model& model, const Settings& settings, Memor
   return out;
 }
 
+State state_of(const FixResult& said) { return {said.x, said.P, said.nis / std::max(said.dof, 1)}; }
+
 // The same of the filter beside it, which counts its own refusals.
 FixResult take_other(const Model& model, const Settings& settings, Memory& memory, Samples samples,
                      std::size_t k, std::size_t stop, const Fix& fix) {
@@ -218,8 +220,7 @@ FixResult take_at(Leg& leg, const Model& model, const Settings& settings, Memory
   FixResult out = take_one(leg, model, settings, memory, samples, k, stop, fix);
   if (!trial.running) return out;
   const FixResult& without = leg.wheels ? other : out;
-  if (was_used(without.status) &&
-      judge_wheels(trial, leg, settings.trial, fix.t, {out.x, out.P}, {other.x, other.P})) {
+  if (was_used(without.status) && judge_wheels(trial, leg, settings.trial, fix.t, state_of(out), state_of(other))) {
     std::swap(memory.refused, trial.refused), std::swap(memory.doubted, trial.doubted);
     out = other;
     out.switched = 1;

@@ -43,7 +43,7 @@ void begin_trial(Trial& trial, Leg& leg, const TrialSettings& settings) {
   begin_again(trial, leg, leg.time);
 }
 
-double difference_of(const State& with, const State& without, double floor) {
+double difference_of(const State& with, const State& without, const TrialSettings& s) {
   // Exp(-(psi_with - psi_without)), small: half its skew part
   const Matrix3 turn = Matrix3(with.x.C_nb) * Matrix3(without.x.C_nb).transpose();
   Vector<COMPARED> d;
@@ -51,8 +51,8 @@ double difference_of(const State& with, const State& without, double floor) {
       with.x.v_n - without.x.v_n;
   double sum = 0.0;
   for (int i = 0; i < COMPARED; ++i) {
-    const double known = without.P(i, i);
-    sum += d(i) * d(i) / (std::max(known - with.P(i, i), 0.0) + floor * known);
+    const double floor = i < DV ? s.floor_psi : s.floor_v;
+    sum += d(i) * d(i) / (std::max(without.P(i, i) - with.P(i, i), 0.0) + floor * floor);
   }
   return sum / COMPARED;
 }
@@ -62,10 +62,12 @@ bool judge_wheels(Trial& trial, Leg& leg, const TrialSettings& s, double t, cons
   const bool believed = leg.wheels;
   const State &with = believed ? shown : other, &without = believed ? other : shown;
   const double strain = believed ? leg.strain : trial.other.strain;
+  const bool lost = without.nis_per_row > std::max(s.lost, with.nis_per_row);
+  if (lost || t - trial.last > s.outage) trial.settled = t + s.recovery;
   const double dt = std::min(t - trial.last, MOST_GAP_S);
   trial.last = t;
-  if (level_speed(without.x.v_n) > s.least_speed) {
-    const double now = std::min(difference_of(with, without, s.floor), MOST_SQUARE);
+  if (t >= trial.settled && level_speed(without.x.v_n) > s.least_speed) {
+    const double now = std::min(difference_of(with, without, s), MOST_SQUARE);
     trial.difference += std::min(1.0, dt / s.memory) * (now - trial.difference);
     trial.agreement = trial.difference < s.agreed ? trial.agreement + dt : 0.0;
   }

@@ -22,7 +22,12 @@ struct TrialSettings {
   double again = 60.0;        // s of it after they were contradicted; doubled each time
   double most_again = 960.0;  // s
   double heading = 0.0524;    // rad, sigma above which the filter without wheels cannot tell
-  double floor = 0.02;        // share of P_without that is added to P_without - P_with
+  double floor_psi = 0.0035;  // rad, difference that says nothing: no model is better
+  double floor_v = 0.05;      // m/s, likewise
+  double lost = 2.0;          // NIS per row above which the filter without wheels, if the other foresaw
+                              // the fix better, is the one to blame: it drifts away without fixes
+  double outage = 5.0;        // s without fixes, after which it must find its way again first
+  double recovery = 20.0;     // s that it takes
   double least_speed = 2.0;   // m/s, below which the wheels were not used either
   double strain = 4.0;        // mean NIS per row of the constraint itself that ends belief
 
@@ -30,7 +35,8 @@ struct TrialSettings {
   static void visit(Self& s, Visitor& v) {
     v("memory", s.memory), v("contradicted", s.contradicted), v("agreed", s.agreed);
     v("proof", s.proof), v("again", s.again), v("most_again", s.most_again);
-    v("heading", s.heading), v("floor", s.floor), v("least_speed", s.least_speed);
+    v("heading", s.heading), v("floor_psi", s.floor_psi), v("floor_v", s.floor_v), v("lost", s.lost);
+    v("outage", s.outage), v("recovery", s.recovery), v("least_speed", s.least_speed);
     v("strain", s.strain);
   }
 };
@@ -45,6 +51,7 @@ struct Trial {
   double agreement = 0.0;   // s
   double wanted = 0.0;      // s of it
   double last = 0.0;        // s, time of the fix looked at last
+  double settled = 0.0;     // s, until when the filter without wheels finds its way again
   double begun = 0.0;       // s, when the filter with wheels began from the one without
   bool doubted_before = false;  // the wheels were contradicted once
 
@@ -54,21 +61,22 @@ struct Trial {
   static void visit(Self& s, Visitor& v) {
     v("running", s.running), v("other", s.other), v("refused", s.refused), v("doubted", s.doubted);
     v("difference", s.difference), v("agreement", s.agreement), v("wanted", s.wanted);
-    v("last", s.last), v("begun", s.begun), v("doubted_before", s.doubted_before);
+    v("last", s.last), v("settled", s.settled), v("begun", s.begun), v("doubted_before", s.doubted_before);
   }
 };
 
 // Starts the trial of a filter that begins: `leg` goes on without wheels.
 void begin_trial(Trial& trial, Leg& leg, const TrialSettings& settings);
 
-// A filter's state and covariance at a fix.
+// A filter's state and covariance at a fix, and how well it foresaw it.
 struct State {
   const Nominal& x;
   const Eigen::Matrix<double, MOVING, MOVING, Eigen::RowMajor>& P;
+  double nis_per_row;
 };
 
 // The mean over attitude and velocity of the squared difference over its variance (E-54).
-double difference_of(const State& with, const State& without, double floor);
+double difference_of(const State& with, const State& without, const TrialSettings& settings);
 
 // Looks at both filters at a fix of time t that the one without wheels used; `shown` is what `leg`
 // made of it. True: the wheels are believed from now on, or no more, and `leg` and the other have
