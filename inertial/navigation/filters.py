@@ -32,6 +32,7 @@ class Trial:
     agreed: float = 1.5  # below it counts as agreement
     proof: float = 15.0  # s of agreement in motion until the wheels are believed
     again: float = 60.0  # s of it after they were contradicted
+    turn: float = math.radians(30.0)  # rad of headings that the agreement must have gone through
     heading: float = math.radians(3.0)  # rad, sigma above which the one without cannot tell
     strain: float = 4.0  # mean NIS per row of the constraint itself that ends belief
 

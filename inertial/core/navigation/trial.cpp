@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/elementary.hpp"
+
 namespace gyrofree::navigation {
 namespace {
 
@@ -19,6 +21,20 @@ void begin_again(Trial& trial, const Leg& without, double t) {
   trial.other.strain = 0.0;
   trial.difference = trial.agreement = 0.0;
   trial.begun = t;
+}
+
+// How long they have agreed, and through what turn.
+void agree(Trial& trial, const Nominal& x, bool agrees, double dt) {
+  Vector3 forward = x.C_nb.col(0);
+  forward[DOWN] = 0.0;
+  if (!agrees || trial.agreement <= 0.0) {
+    trial.agreement = trial.turned = 0.0;
+    trial.forward = forward;
+  }
+  if (!agrees) return;
+  trial.agreement += dt;
+  const double turned = elementary::atan2(norm_of(cross(trial.forward, forward)), dot(trial.forward, forward));
+  trial.turned = std::max(trial.turned, turned);
 }
 
 void contradict(Trial& trial, Leg& leg, const TrialSettings& s, double t) {
@@ -69,14 +85,15 @@ bool judge_wheels(Trial& trial, Leg& leg, const TrialSettings& s, double t, cons
   if (t >= trial.settled && level_speed(without.x.v_n) > s.least_speed) {
     const double now = std::min(difference_of(with, without, s), MOST_SQUARE);
     trial.difference += std::min(1.0, dt / s.memory) * (now - trial.difference);
-    trial.agreement = trial.difference < s.agreed ? trial.agreement + dt : 0.0;
+    agree(trial, without.x, trial.difference < s.agreed, dt);
   }
   if (trial.difference > s.contradicted || strain > s.strain) {
     contradict(trial, leg, s, t);
     return believed;
   }
   const double yaw_variance = without.P(PSI + DOWN, PSI + DOWN);
-  if (believed || trial.agreement < trial.wanted || yaw_variance > s.heading * s.heading) return false;
+  const bool seen = trial.turned >= s.turn && yaw_variance <= s.heading * s.heading;
+  if (believed || trial.agreement < trial.wanted || !seen) return false;
   std::swap(leg, trial.other);
   return true;
 }

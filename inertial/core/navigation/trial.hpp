@@ -21,6 +21,8 @@ struct TrialSettings {
   double proof = 15.0;        // s of agreement in motion until the wheels are believed
   double again = 60.0;        // s of it after they were contradicted; doubled each time
   double most_again = 960.0;  // s
+  double turn = 0.5236;       // rad, range of headings that the agreement must have gone through: straight
+                              // on, wheels and a crab look alike
   double heading = 0.0524;    // rad, sigma above which the filter without wheels cannot tell
   double floor_psi = 0.0035;  // rad, difference that says nothing: no model is better
   double floor_v = 0.05;      // m/s, likewise
@@ -35,7 +37,7 @@ struct TrialSettings {
   static void visit(Self& s, Visitor& v) {
     v("memory", s.memory), v("contradicted", s.contradicted), v("agreed", s.agreed);
     v("proof", s.proof), v("again", s.again), v("most_again", s.most_again);
-    v("heading", s.heading), v("floor_psi", s.floor_psi), v("floor_v", s.floor_v), v("lost", s.lost);
+    v("turn", s.turn), v("heading", s.heading), v("floor_psi", s.floor_psi), v("floor_v", s.floor_v), v("lost", s.lost);
     v("outage", s.outage), v("recovery", s.recovery), v("least_speed", s.least_speed);
     v("strain", s.strain);
   }
@@ -50,6 +52,8 @@ struct Trial {
   double difference = 0.0;  // its mean square (E-55)
   double agreement = 0.0;   // s
   double wanted = 0.0;      // s of it
+  Vector3 forward = Vector3::Zero();  // of the body in n, level, at its beginning
+  double turned = 0.0;      // rad, farthest from there
   double last = 0.0;        // s, time of the fix looked at last
   double settled = 0.0;     // s, until when the filter without wheels finds its way again
   double begun = 0.0;       // s, when the filter with wheels began from the one without
@@ -60,7 +64,7 @@ struct Trial {
   template <class Self, class Visitor>
   static void visit(Self& s, Visitor& v) {
     v("running", s.running), v("other", s.other), v("refused", s.refused), v("doubted", s.doubted);
-    v("difference", s.difference), v("agreement", s.agreement), v("wanted", s.wanted);
+    v("difference", s.difference), v("agreement", s.agreement), v("wanted", s.wanted), v("forward", s.forward), v("turned", s.turned);
     v("last", s.last), v("settled", s.settled), v("begun", s.begun), v("doubted_before", s.doubted_before);
   }
 };
