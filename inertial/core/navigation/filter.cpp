@@ -202,7 +202,7 @@ FixResult take_other(const Model& model, const Settings& settings, Memory& memor
                      std::size_t k, std::size_t stop, const Fix& fix) {
   Trial& trial = memory.trial;
   std::swap(memory.refused, trial.refused), std::swap(memory.doubted, trial.doubted);
-  const FixResult out = take_one(trial.other, model, settings, memory, samples, k, stop, fix);
+  FixResult out = take_one(trial.other, model, settings, memory, samples, k, stop, fix);
   std::swap(memory.refused, trial.refused), std::swap(memory.doubted, trial.doubted);
   return out;
 }
