@@ -8,6 +8,7 @@ import time
 
 import zenoh
 
+from messages import text
 from messages.bus import orders
 from messages.bus import session as busmod
 from messages.contract import gyrofree_pb2 as pb
@@ -50,6 +51,8 @@ class Desk:
 
     def note(self, device: str, note: pb.Note) -> None:
         """Publish a remark, for the recording and for every chart."""
+        if fault := text.check(note.text, lines=True):
+            raise orders.Refused(f"note: {fault}")
         if not self.connected:
             raise orders.NoAnswer("no router: is `gyrofree router` running?")
         note.header.run = self._since

@@ -1,10 +1,11 @@
 """What the REST interface takes and gives: SI units, times in s since 1970."""
 
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from dashboard.data.device import Device
+from messages import text
 from messages.contract import gyrofree_pb2 as pb
 from sessions.library.catalogue import SessionInfo
 
@@ -13,6 +14,21 @@ class Strict(BaseModel):
     """A body: no unknown keys, no conversions (true is no number), no NaN and no infinity."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+
+def _checked(lines: bool) -> AfterValidator:
+    def check(given: str) -> str:
+        given = text.composed(given)
+        if fault := text.check(given, lines):
+            raise ValueError(fault)
+        return given
+
+    return AfterValidator(check)
+
+
+# what people write: nothing that acts on a page, a terminal or the reader's eye (messages.text)
+Line = Annotated[str, _checked(lines=False)]
+Lines = Annotated[str, _checked(lines=True)]
 
 
 class Health(BaseModel):
@@ -71,7 +87,7 @@ class RecordingOut(BaseModel):
 
 class StartRecording(Strict):
     name: str = Field(default="", max_length=32, pattern=r"^([a-z0-9][a-z0-9_-]*)?$")
-    note: str = Field(default="", max_length=2000)
+    note: Lines = Field(default="", max_length=2000)
 
 
 class StartReplay(Strict):

@@ -17,7 +17,7 @@ from dashboard.web.auth import Role
 from dashboard.web.control import ControlError
 from dashboard.web.front import Asker, Front, front_of, needs
 from dashboard.web.jobs import Job, Jobs
-from dashboard.web.schemas import Strict
+from dashboard.web.schemas import Line, Lines, Strict
 from sessions.library.annotations import (
     Annotations,
     SessionNote,
@@ -55,12 +55,12 @@ class ExportOrder(Strict):
 
 
 class NoteOrder(Strict):
-    text: str = Field(min_length=1, max_length=2000)
+    text: Lines = Field(min_length=1, max_length=2000)
     at_s: float | None = Field(default=None, ge=0)
 
 
 class LabelOrder(Strict):
-    title: str | None = Field(default=None, max_length=200)
+    title: Line | None = Field(default=None, max_length=200)
     tags: list[str] | None = Field(default=None, max_length=20)
     outcome: Literal["", "pass", "fail", "incomplete"] | None = None
 

@@ -36,6 +36,7 @@ from inertial.navigation.solution import (
     Wheels,
     correction_of,
     nothing_compared,
+    without_height,
 )
 from inertial.navigation.start import HEIGHT_UP, Startup, first_leg
 from inertial.rotation import from_matrix
@@ -69,7 +70,8 @@ class Navigator:
         self._how = ""
         self._last_fix: Fix | None = None
         self._last_used = -math.inf
-        self._origin: tuple[float, float, float] | None = None
+        self._origin: tuple[float, float, float] | None = None  # its height may be NaN: unknown
+        self._datum = 0.0
 
     @property
     def nominal(self) -> Any:
@@ -172,6 +174,8 @@ class Navigator:
         self.counts["dragged"] += fix.drag > 0.0
         if self._origin is None:
             self._origin = (fix.latitude, fix.longitude, fix.height)
+        elif fix.has_height and not math.isfinite(self._origin[2]):
+            self._origin = (*self._origin[:2], fix.height)
         if not self._live.navigating:
             return self._start(fix)
         if self._live.too_late(fix.t):
@@ -215,6 +219,8 @@ class Navigator:
     def _took(self, fix: Fix) -> None:
         self._last_fix = fix
         self._last_used = fix.t
+        if fix.has_height:
+            self._datum = fix.datum
         self.counts["used"] += 1
 
     def _refuse(self, said: Correction, count: str, reason: str) -> Correction:
@@ -249,11 +255,11 @@ class Navigator:
             return self._waiting_solution(t)
         x, P = self.nominal, self.covariance()
         place = (x.latitude, x.longitude, x.height)
-        return Solution(
+        solution = Solution(
             t,
             self.mode,
             *place,
-            np.array(ned_between(self._origin, place)),
+            np.array(ned_between(self._known_origin(), place)),
             x.v_n,
             from_matrix(x.C_nb),
             x.bias_accel,
@@ -263,8 +269,17 @@ class Navigator:
             self._origin,
             t - self._last_used,
             self.horizon,
+            self._datum,
             self.text,
         )
+        return without_height(solution)
+
+    def _known_origin(self) -> tuple[float, float, float]:
+        """The origin to count from; at height 0 as long as no fix had one."""
+        if self._origin is None:
+            return 0.0, 0.0, 0.0
+        north, east, height = self._origin
+        return north, east, height if math.isfinite(height) else 0.0
 
     def _waiting_solution(self, t: float) -> Solution:
         c, fix, align = self.config, self._last_fix, self._startup.align
@@ -272,6 +287,7 @@ class Navigator:
         v, where = np.zeros(3), (0.0, 0.0, 0.0)
         sigma_p, sigma_v = np.full(3, 1e7), np.full(3, 100.0)
         if fix is not None:
+            fix = fix.filled()
             where, sigma_p = (fix.latitude, fix.longitude, fix.height), fix.sigma_p
             if fix.v_n is not None:
                 # 2 m/s^2: how fast a car changes its mind
@@ -279,23 +295,24 @@ class Navigator:
             sigma_p = sigma_p + (np.abs(v) + 1.0) * age
         tilt = c.sigma_tilt if align.levelled else math.pi
         biases = [c.sigma_bias_accel] * 3 + [c.sigma_bias_gyro] * 3
-        origin = self._origin or (0.0, 0.0, 0.0)
-        return Solution(
+        solution = Solution(
             t,
             self.mode,
             *where,
-            np.array(ned_between(origin, where)),
+            np.array(ned_between(self._known_origin(), where)),
             v,
             from_matrix(align.C),
             np.zeros(3),
             align.gyro_bias,
             np.concatenate([[tilt, tilt, math.pi], sigma_v, sigma_p, biases]),
             np.diag(sigma_p**2),
-            origin,
+            self._origin or (0.0, 0.0, 0.0),
             age,
             None,
+            self._datum,
             align.text,
         )
+        return without_height(solution)
 
 
 def _maker(name: str) -> Callable[..., Navigator]:

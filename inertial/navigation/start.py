@@ -16,7 +16,7 @@ from inertial.navigation.alignment import Alignment, AlignmentSettings, Start
 from inertial.navigation.alignment_positions import Positions
 from inertial.navigation.error_model import DP
 from inertial.navigation.filters import FilterConfig
-from inertial.navigation.fix import Fix
+from inertial.navigation.fix import UNKNOWN_HEIGHT_SIGMA, Fix
 from inertial.navigation.settings import NavigatorConfig
 
 Array = NDArray[np.float64]
@@ -51,6 +51,7 @@ class Startup:
         """Take a fix; the start at its time, when the alignment knows enough. A receiver without
         velocities is asked for the way between its positions.
         """
+        fix = fix.filled()
         if fix.v_n is not None:
             return self._ask(fix.t, fix.v_n, fix.sigma_v)
         walked = self._positions.take(fix)
@@ -88,8 +89,9 @@ class Startup:
 
 def first_leg(config: NavigatorConfig, chosen: FilterConfig, start: Start, fix: Fix) -> Any:
     """The filter's Leg at the fix that ended the alignment: attitude from there, position and
-    velocity of the fix.
+    velocity of the fix. What the fix does not know begins at zero with the sigma of not knowing.
     """
+    fix = fix.filled()
     model = chosen.model(config.imu)
     leg = core.new_leg(model.states)
     x = leg.x
@@ -112,6 +114,8 @@ def first_covariance(
     """(n, n) at the start: what is told, the fix, and what the alignment knows of itself."""
     c = config
     sigma_p = np.minimum(c.sigma_p, np.maximum(3.0 * fix.sigma_p, 0.1))
+    if fix.sigma_p[2] >= UNKNOWN_HEIGHT_SIGMA:
+        sigma_p[2] = fix.sigma_p[2]
     sigma_v = np.maximum(c.sigma_v, fix.sigma_v if start.sigma_v is None else start.sigma_v)
     sigma_yaw = c.sigma_yaw if start.sigma_yaw is None else max(c.sigma_yaw, start.sigma_yaw)
     attitude = [c.sigma_tilt, c.sigma_tilt, sigma_yaw]

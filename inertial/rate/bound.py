@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from inertial.core import native
 from inertial.layouts.layout import Layout
 from inertial.rate import products_model as model
-from inertial.rate.observed import Sensor, sensor
+from inertial.rate.observed import Sensor, axis_noise, sensor
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class Knowledge:
     known_still: bool = True
     gravity: bool = False
     fixed_axis: bool = False
-    sigma_axis: float = 0.0408  # m/s^2
+    sigma_axis: float | None = None  # m/s^2; None: what the layout says
     standstill: int = 450  # samples before the first, which the biases come from
     tilt: float = 0.05  # rad, of the first levelling
     bias: float = 0.4  # m/s^2, of one axis before that
@@ -48,10 +48,16 @@ SOURCE_STILL = Knowledge()
 IN_USE = Knowledge(gravity=True, fixed_axis=True)  # the model of products-ekf
 
 
-def known(what: Knowledge) -> native.RateKnowledge:
+def axis_sigma(layout: Layout, what: Knowledge) -> float:
+    """Noise of one axis that the bound goes by, m/s^2."""
+    return axis_noise(layout) if what.sigma_axis is None else what.sigma_axis
+
+
+def known(layout: Layout, what: Knowledge) -> native.RateKnowledge:
     """Knowledge for the core, which takes gravity and a fixed axis for known."""
     out = native.RateKnowledge()
-    out.biases, out.share = what.sigma_axis**2 / what.standstill, 1.0 / what.standstill
+    out.biases = axis_sigma(layout, what) ** 2 / what.standstill
+    out.share = 1.0 / what.standstill
     out.tilt, out.bias, out.centre = (what.tilt * GRAVITY) ** 2, what.bias**2, what.centre**2
     out.pivot, out.wander, out.axis_from = what.pivot**2, what.axis_wander**2, what.axis_from**2
     return out
@@ -66,7 +72,7 @@ def rate_bound(
     3) rad/s^2. Raises GeometryError for a layout that does not see omega' and p.
     """
     s = sensor(layout, what.sigma_axis)
-    P, out = _prior(s, q_nb[0], what), np.empty((len(t_s), 3))
+    P, out = _prior(s, axis_sigma(layout, what), q_nb[0], what), np.empty((len(t_s), 3))
     m, M, SQ = s.m, s.M, np.vstack([s.SQ_alpha, s.SQ_force])
     for k in range(len(t_s)):
         dt = t_s[k] - t_s[k - 1] if k else t_s[1] - t_s[0]
@@ -88,9 +94,9 @@ def rate_bound(
     return out
 
 
-def _prior(s: Sensor, q_nb: Array, what: Knowledge) -> Array:
+def _prior(s: Sensor, sigma_axis: float, q_nb: Array, what: Knowledge) -> Array:
     P = np.zeros((model.STATES, model.STATES))
-    biases = what.sigma_axis**2 / what.standstill * s.drift
+    biases = sigma_axis**2 / what.standstill * s.drift
     P[np.ix_(model.BIASES, model.BIASES)] = biases
     P[0:3, 0:3] = 1e-10 * np.eye(3)
     if what.gravity:
@@ -156,7 +162,7 @@ class Along:
 
     def __init__(self, layout: Layout, what: Knowledge = IN_USE) -> None:
         """Raises GeometryError for a layout that does not see omega' and p."""
-        self._native = native.RateBound(sensor(layout, what.sigma_axis), known(what))
+        self._native = native.RateBound(sensor(layout, what.sigma_axis), known(layout, what))
 
     @property
     def sigma(self) -> Array | None:

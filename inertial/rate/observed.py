@@ -42,15 +42,24 @@ Sensor = native.RateSensor
 """
 
 
-def sensor(layout: Layout, sigma_axis: float, excluded: int = 0) -> Sensor:
-    """Constants for noise sigma_axis (m/s^2, one sample of one axis); bit k of `excluded` takes
-    axis k out.
+LEAST_NOISE = 1e-4  # m/s^2; a layout that says less has no noise by oversight
+
+
+def axis_noise(layout: Layout) -> float:
+    """Noise of one sample of one axis as the layout says it, m/s^2, RMS over its axes."""
+    return max(LEAST_NOISE, float(np.sqrt(np.mean(layout.noise**2))))
+
+
+def sensor(layout: Layout, sigma_axis: float | None = None, excluded: int = 0) -> Sensor:
+    """Constants for noise sigma_axis (m/s^2, one sample of one axis; None: what the layout says);
+    bit k of `excluded` takes axis k out.
 
     Raises GeometryError when the axes left do not see angular acceleration and specific force,
     naming what is unseen.
     """
     if layout.axes > MOST_AXES:
         raise GeometryError(f"layout {layout.name}: {layout.axes} axes, want at most {MOST_AXES}")
+    sigma_axis = axis_noise(layout) if sigma_axis is None else sigma_axis
     used = np.array([0.0 if excluded >> k & 1 else 1.0 for k in range(layout.axes)])
     keep = np.nonzero(used)[0]
     S, B = np.zeros((6, layout.axes)), np.zeros((6, layout.axes))

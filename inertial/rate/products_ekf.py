@@ -34,8 +34,10 @@ class Config:
     still: stillness.Config = field(
         default_factory=stillness.Config
     )  # its sigma_axis is the filter's noise too
-    bias: float = 0.4  # m/s^2, of one axis before the first standstill: 40 mg
-    scale: float = 0.007  # scale and cross-axis error left after calibration, of 1
+    # m/s^2, of one axis before the first standstill; None: 40 mg, or what the layout says if more
+    bias: float | None = None
+    # scale and cross-axis error of 1; None: 0.007, or what the layout says if more
+    scale: float | None = None
     drift: float = 3e-4  # m/s^2 per root second, bias instability of one axis
     tilt: float = 0.05  # rad, of the first levelling
     gravity: float = 0.01  # m/s^2, of local gravity
@@ -64,14 +66,32 @@ class Config:
     gravity_aid: bool = True  # tilt from gravity where the centre's motion allows
 
 
-def tuning(config: Config, method: str = "ekf") -> native.RateTuning:
+BIAS = 0.4  # m/s^2: 40 mg
+SCALE = 0.007  # of 1
+
+
+def axis_bias(layout: Layout, config: Config) -> float:
+    """Sigma of an axis' bias before the first standstill, m/s^2, RMS over the axes."""
+    if config.bias is not None:
+        return config.bias
+    return max(BIAS, float(np.sqrt(np.mean([sensor.bias**2 for sensor in layout.sensors]))))
+
+
+def axis_scale(layout: Layout, config: Config) -> float:
+    """Sigma of an axis' scale error, of 1, RMS over the axes."""
+    if config.scale is not None:
+        return config.scale
+    return max(SCALE, float(np.sqrt(np.mean([one.scale_error**2 for one in layout.sensors]))))
+
+
+def tuning(layout: Layout, config: Config, method: str = "ekf") -> native.RateTuning:
     """Config for the core."""
     c, g, out = config, GRAVITY, native.RateTuning()
     north = 0.0 if c.latitude is None else EARTH_RATE * native.cos(c.latitude)
     down = 0.0 if c.latitude is None else -EARTH_RATE * native.sin(c.latitude)
     values = {
         "method": METHODS[method],
-        "scale": c.scale**2,
+        "scale": axis_scale(layout, c) ** 2,
         "drift": c.drift**2,
         "centre": c.centre**2,
         "pivot_drift": c.pivot_drift**2,
@@ -81,7 +101,7 @@ def tuning(config: Config, method: str = "ekf") -> native.RateTuning:
         "force_gate": c.force_gate,
         "unseen_alpha": c.unseen_alpha**2,
         "forget": 1.0 / c.forget_s,
-        "bias": c.bias**2,
+        "bias": axis_bias(layout, c) ** 2,
         "tilt": (c.tilt * g) ** 2,
         "gravity": c.gravity**2,
         "pivot": c.pivot**2,
@@ -118,9 +138,9 @@ class ProductsFilter:
         self.bound, self.excluded = bound, excluded
         self.sensor = sensor(layout, config.still.sigma_axis, excluded)
         limits = stillness.limits(config.still)
-        self.native = native.RateProductsFilter(self.sensor, tuning(config, method), limits)
+        self.native = native.RateProductsFilter(self.sensor, tuning(layout, config, method), limits)
         if bound is not None:
-            self.native.follow(sensor(layout, bound.sigma_axis), known(bound))
+            self.native.follow(sensor(layout, bound.sigma_axis), known(layout, bound))
 
     def __getstate__(self) -> tuple[Any, ...]:
         made_of = self.layout, self.config, self.method, self.bound, self.excluded
@@ -178,5 +198,5 @@ class ProductsFilter:
         if mask == self.excluded:
             return
         old, new = self.sensor, sensor(self.layout, self.config.still.sigma_axis, mask)
-        self.native.exclude(new, *carry_biases(old, new, self.config.bias))
+        self.native.exclude(new, *carry_biases(old, new, axis_bias(self.layout, self.config)))
         self.sensor, self.excluded = new, mask

@@ -1,7 +1,7 @@
 """Is the body still? Questions on the newest samples, with stated limits (E-20 to E-25).
 
-    spread    do the axes scatter more than their noise?                   chi-square of N (window -
-    1) degrees quiet     do the mean omega' and products of two windows differ
+    spread    do omega', products and p scatter more than their noise?     chi-square of 12 (window
+    - 1) degrees quiet     do the mean omega' and products of two windows differ
               from those of the last standstill?                           chi-square of 3 + m
               degrees
     turn      does omega', summed over 4 to 128 samples, differ from the
@@ -37,13 +37,11 @@ class Config:
     tests/bench/bench_rate.py.
     """
 
-    sigma_axis: float = (
-        0.0408  # m/s^2, one sample of one axis: 4 mg noise and 3.9 mg counts (ADXL345, 100 Hz)
-    )
+    sigma_axis: float | None = None  # m/s^2, one sample of one axis; None: what the layout says
     window: int = 25  # samples
     short_window: int = 8  # samples; notices the start of a turn sooner
     spread_limit: float = (
-        1.45  # mean square scatter over sigma_axis^2: 5 sigma above 1 for 12 axes and 25 samples
+        1.45  # mean square scatter over the noise: 5 sigma above 1 for 12 numbers and 25 samples
     )
     quiet_limit: float = 38.0  # chi-square, 9 degrees: once in 50 000 windows by chance
     turn_limit: float = 22.0  # chi-square, 3 degrees: once in 15 000 sums by chance
@@ -83,5 +81,6 @@ def limits(config: Config) -> native.RateStillLimits:
         )
     out = native.RateStillLimits()
     for one in fields(Config):
-        setattr(out, one.name, getattr(config, one.name))
+        if one.name != "sigma_axis":  # it is in the sensor's constants
+            setattr(out, one.name, getattr(config, one.name))
     return out

@@ -13,7 +13,14 @@ import zenoh
 from google.protobuf.message import DecodeError, Message
 
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import control_key, recorder_control_key, replay_control_key
+from messages.contract.checks import check
+from messages.contract.topics import (
+    TopicError,
+    check_name,
+    control_key,
+    recorder_control_key,
+    replay_control_key,
+)
 
 OVERDUE = b"Timeout"  # what Zenoh answers, here or in the router, when the time is over
 REASON_LENGTH = 500  # characters of a refusal that are passed on
@@ -152,8 +159,8 @@ def take(
 ) -> zenoh.Queryable:
     """Call handler(order) on Zenoh's thread for each order; undeclare the result at the end.
 
-    `device` "*" takes the orders for any device. Bytes that are no command, and orders for several
-    devices at once, are refused here.
+    `device` "*" takes the orders for any device. Bytes that are no command, values
+    that the contract does not allow, and orders for several devices at once, are refused here.
     """
 
     def on_query(query: zenoh.Query) -> None:
@@ -165,9 +172,16 @@ def take(
             reason = f"{len(payload)} bytes are no {kind.command.__name__}"
             query.reply_err(reason.encode())
             return
+        wrong = check(command)
+        if wrong:
+            query.reply_err(f"not taken: {wrong[0]}".encode())
+            return
         if "*" in asked:
             query.reply_err(f"an order is for one device, not for {asked}".encode())
             return
-        handler(Order(query, asked.split("/")[1], command))
+        try:
+            handler(Order(query, check_name(asked.split("/")[1]), command))
+        except TopicError as error:
+            query.reply_err(str(error).encode())
 
     return session.declare_queryable(kind.key(prefix, device), on_query)

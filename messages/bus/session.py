@@ -14,9 +14,10 @@ from collections.abc import Callable
 from typing import TypeVar
 
 import zenoh
-from google.protobuf.message import DecodeError, Message
+from google.protobuf.message import Message
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from messages.contract.door import read
 from messages.contract.topics import NAME, REPLAY_SUFFIX, Topic
 from messages.history.spool import Spool
 
@@ -244,21 +245,12 @@ class Publishers:
 
 
 def decode(topic: Topic[M], payload: bytes) -> M | None:
-    """The message, or None (and a log line) for bytes that are not one: a foreign publisher must
-    not stop a service.
+    """The message, or None (and a log line) for bytes that are not one of the contract: a foreign
+    publisher must not stop whoever listens.
     """
-    message = topic.type()
-    try:
-        message.ParseFromString(payload)
-    except DecodeError as error:
-        log.warning(
-            "%s: %d bytes are no %s (%s): ignored",
-            topic.name,
-            len(payload),
-            topic.type.__name__,
-            error,
-        )
-        return None
+    message, refusal = read(topic, payload)
+    if refusal is not None:
+        log.warning("%s: ignored: %s", topic.name, refusal)
     return message
 
 

@@ -1,3 +1,4 @@
+from google.protobuf import descriptor_pb2 as _descriptor_pb2
 from google.protobuf.internal import containers as _containers
 from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
 from google.protobuf import descriptor as _descriptor
@@ -19,6 +20,26 @@ SOURCE_HARDWARE: Source
 SOURCE_SIMULATED: Source
 SOURCE_EMULATED: Source
 SOURCE_PLAYED: Source
+RULE_FIELD_NUMBER: _ClassVar[int]
+rule: _descriptor.FieldDescriptor
+OPEN_FIELD_NUMBER: _ClassVar[int]
+open: _descriptor.FieldDescriptor
+
+class Rule(_message.Message):
+    __slots__ = ("min", "max", "most", "row", "columns", "name")
+    MIN_FIELD_NUMBER: _ClassVar[int]
+    MAX_FIELD_NUMBER: _ClassVar[int]
+    MOST_FIELD_NUMBER: _ClassVar[int]
+    ROW_FIELD_NUMBER: _ClassVar[int]
+    COLUMNS_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    min: float
+    max: float
+    most: int
+    row: int
+    columns: str
+    name: bool
+    def __init__(self, min: _Optional[float] = ..., max: _Optional[float] = ..., most: _Optional[int] = ..., row: _Optional[int] = ..., columns: _Optional[str] = ..., name: _Optional[bool] = ...) -> None: ...
 
 class Header(_message.Message):
     __slots__ = ("device", "sequence", "epoch", "device_us", "utc_ns", "utc_sigma_s", "source", "run", "late")
@@ -149,8 +170,15 @@ class GnssFix(_message.Message):
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., fix_utc_ns: _Optional[int] = ..., latitude_deg: _Optional[float] = ..., longitude_deg: _Optional[float] = ..., height_m: _Optional[float] = ..., height_msl_m: _Optional[float] = ..., position_sigma_ned_m: _Optional[_Iterable[float]] = ..., v_n_mps: _Optional[_Iterable[float]] = ..., velocity_sigma_ned_mps: _Optional[_Iterable[float]] = ..., quality: _Optional[_Union[GnssFix.Quality, str]] = ..., satellites: _Optional[int] = ..., hdop: _Optional[float] = ..., talker: _Optional[str] = ..., device_time_s: _Optional[float] = ...) -> None: ...
 
 class LinkStatus(_message.Message):
-    __slots__ = ("header", "connected", "port", "message", "bytes_in", "good_frames", "good_bytes", "bad_chunks", "bad_bytes", "pending_bytes", "lost_frames", "device_dropped", "lost_samples", "reboots", "unknown_frames", "reconnects", "sample_rate_hz", "frame_rate_hz", "latency_p50_s", "latency_p99_s", "clock_skew_ppm", "clock_residual_s", "clock_window_s", "journal_sequence", "durable_sequence", "gnss_good", "gnss_bad", "damage", "published_sequence", "published_durable")
+    __slots__ = ("header", "connected", "port", "message", "bytes_in", "good_frames", "good_bytes", "bad_chunks", "bad_bytes", "pending_bytes", "lost_frames", "device_dropped", "lost_samples", "reboots", "unknown_frames", "reconnects", "sample_rate_hz", "frame_rate_hz", "latency_p50_s", "latency_p99_s", "clock_skew_ppm", "clock_residual_s", "clock_window_s", "journal_sequence", "durable_sequence", "gnss_good", "gnss_bad", "damage", "published_sequence", "published_durable", "refused")
     class DamageEntry(_message.Message):
+        __slots__ = ("key", "value")
+        KEY_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        key: str
+        value: int
+        def __init__(self, key: _Optional[str] = ..., value: _Optional[int] = ...) -> None: ...
+    class RefusedEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
         VALUE_FIELD_NUMBER: _ClassVar[int]
@@ -187,6 +215,7 @@ class LinkStatus(_message.Message):
     DAMAGE_FIELD_NUMBER: _ClassVar[int]
     PUBLISHED_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     PUBLISHED_DURABLE_FIELD_NUMBER: _ClassVar[int]
+    REFUSED_FIELD_NUMBER: _ClassVar[int]
     header: Header
     connected: bool
     port: str
@@ -217,7 +246,8 @@ class LinkStatus(_message.Message):
     damage: _containers.ScalarMap[str, int]
     published_sequence: int
     published_durable: int
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., connected: _Optional[bool] = ..., port: _Optional[str] = ..., message: _Optional[str] = ..., bytes_in: _Optional[int] = ..., good_frames: _Optional[int] = ..., good_bytes: _Optional[int] = ..., bad_chunks: _Optional[int] = ..., bad_bytes: _Optional[int] = ..., pending_bytes: _Optional[int] = ..., lost_frames: _Optional[int] = ..., device_dropped: _Optional[int] = ..., lost_samples: _Optional[int] = ..., reboots: _Optional[int] = ..., unknown_frames: _Optional[int] = ..., reconnects: _Optional[int] = ..., sample_rate_hz: _Optional[float] = ..., frame_rate_hz: _Optional[float] = ..., latency_p50_s: _Optional[float] = ..., latency_p99_s: _Optional[float] = ..., clock_skew_ppm: _Optional[float] = ..., clock_residual_s: _Optional[float] = ..., clock_window_s: _Optional[float] = ..., journal_sequence: _Optional[int] = ..., durable_sequence: _Optional[int] = ..., gnss_good: _Optional[int] = ..., gnss_bad: _Optional[int] = ..., damage: _Optional[_Mapping[str, int]] = ..., published_sequence: _Optional[int] = ..., published_durable: _Optional[int] = ...) -> None: ...
+    refused: _containers.ScalarMap[str, int]
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., connected: _Optional[bool] = ..., port: _Optional[str] = ..., message: _Optional[str] = ..., bytes_in: _Optional[int] = ..., good_frames: _Optional[int] = ..., good_bytes: _Optional[int] = ..., bad_chunks: _Optional[int] = ..., bad_bytes: _Optional[int] = ..., pending_bytes: _Optional[int] = ..., lost_frames: _Optional[int] = ..., device_dropped: _Optional[int] = ..., lost_samples: _Optional[int] = ..., reboots: _Optional[int] = ..., unknown_frames: _Optional[int] = ..., reconnects: _Optional[int] = ..., sample_rate_hz: _Optional[float] = ..., frame_rate_hz: _Optional[float] = ..., latency_p50_s: _Optional[float] = ..., latency_p99_s: _Optional[float] = ..., clock_skew_ppm: _Optional[float] = ..., clock_residual_s: _Optional[float] = ..., clock_window_s: _Optional[float] = ..., journal_sequence: _Optional[int] = ..., durable_sequence: _Optional[int] = ..., gnss_good: _Optional[int] = ..., gnss_bad: _Optional[int] = ..., damage: _Optional[_Mapping[str, int]] = ..., published_sequence: _Optional[int] = ..., published_durable: _Optional[int] = ..., refused: _Optional[_Mapping[str, int]] = ...) -> None: ...
 
 class BoardInfo(_message.Message):
     __slots__ = ("header", "board_id", "uid", "firmware", "axes", "sample_period_s", "status", "faults")
@@ -523,7 +553,14 @@ class Truth(_message.Message):
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., for_index: _Optional[int] = ..., q_nb: _Optional[_Iterable[float]] = ..., omega_ib_b_radps: _Optional[_Iterable[float]] = ..., alpha_b_radps2: _Optional[_Iterable[float]] = ..., f_b_mps2: _Optional[_Iterable[float]] = ..., angle_z_rad: _Optional[float] = ..., profile_time_s: _Optional[float] = ...) -> None: ...
 
 class EstimatorStatus(_message.Message):
-    __slots__ = ("header", "estimator", "samples", "gaps", "missing_samples", "us_per_sample", "state", "message", "bias_f_b_mps2", "bias_alpha_radps2", "layout", "version", "restart")
+    __slots__ = ("header", "estimator", "samples", "gaps", "missing_samples", "us_per_sample", "state", "message", "bias_f_b_mps2", "bias_alpha_radps2", "layout", "version", "restart", "refused")
+    class RefusedEntry(_message.Message):
+        __slots__ = ("key", "value")
+        KEY_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        key: str
+        value: int
+        def __init__(self, key: _Optional[str] = ..., value: _Optional[int] = ...) -> None: ...
     HEADER_FIELD_NUMBER: _ClassVar[int]
     ESTIMATOR_FIELD_NUMBER: _ClassVar[int]
     SAMPLES_FIELD_NUMBER: _ClassVar[int]
@@ -537,6 +574,7 @@ class EstimatorStatus(_message.Message):
     LAYOUT_FIELD_NUMBER: _ClassVar[int]
     VERSION_FIELD_NUMBER: _ClassVar[int]
     RESTART_FIELD_NUMBER: _ClassVar[int]
+    REFUSED_FIELD_NUMBER: _ClassVar[int]
     header: Header
     estimator: str
     samples: int
@@ -550,7 +588,8 @@ class EstimatorStatus(_message.Message):
     layout: str
     version: str
     restart: bytes
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., samples: _Optional[int] = ..., gaps: _Optional[int] = ..., missing_samples: _Optional[int] = ..., us_per_sample: _Optional[float] = ..., state: _Optional[str] = ..., message: _Optional[str] = ..., bias_f_b_mps2: _Optional[_Iterable[float]] = ..., bias_alpha_radps2: _Optional[_Iterable[float]] = ..., layout: _Optional[str] = ..., version: _Optional[str] = ..., restart: _Optional[bytes] = ...) -> None: ...
+    refused: _containers.ScalarMap[str, int]
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., samples: _Optional[int] = ..., gaps: _Optional[int] = ..., missing_samples: _Optional[int] = ..., us_per_sample: _Optional[float] = ..., state: _Optional[str] = ..., message: _Optional[str] = ..., bias_f_b_mps2: _Optional[_Iterable[float]] = ..., bias_alpha_radps2: _Optional[_Iterable[float]] = ..., layout: _Optional[str] = ..., version: _Optional[str] = ..., restart: _Optional[bytes] = ..., refused: _Optional[_Mapping[str, int]] = ...) -> None: ...
 
 class Horizon(_message.Message):
     __slots__ = ("n", "inputs", "membership_name", "membership", "crisp")
@@ -927,7 +966,7 @@ class RecorderCommand(_message.Message):
     def __init__(self, action: _Optional[_Union[RecorderCommand.Action, str]] = ..., name: _Optional[str] = ..., note: _Optional[str] = ..., user: _Optional[str] = ...) -> None: ...
 
 class RecorderStatus(_message.Message):
-    __slots__ = ("header", "recording", "session", "seconds", "messages", "bytes", "durable_messages", "message", "lost", "repaired", "repairing")
+    __slots__ = ("header", "recording", "session", "seconds", "messages", "bytes", "durable_messages", "message", "lost", "repaired", "repairing", "refused")
     class LostEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -936,6 +975,13 @@ class RecorderStatus(_message.Message):
         value: int
         def __init__(self, key: _Optional[str] = ..., value: _Optional[int] = ...) -> None: ...
     class RepairedEntry(_message.Message):
+        __slots__ = ("key", "value")
+        KEY_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        key: str
+        value: int
+        def __init__(self, key: _Optional[str] = ..., value: _Optional[int] = ...) -> None: ...
+    class RefusedEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
         VALUE_FIELD_NUMBER: _ClassVar[int]
@@ -953,6 +999,7 @@ class RecorderStatus(_message.Message):
     LOST_FIELD_NUMBER: _ClassVar[int]
     REPAIRED_FIELD_NUMBER: _ClassVar[int]
     REPAIRING_FIELD_NUMBER: _ClassVar[int]
+    REFUSED_FIELD_NUMBER: _ClassVar[int]
     header: Header
     recording: bool
     session: str
@@ -964,7 +1011,8 @@ class RecorderStatus(_message.Message):
     lost: _containers.ScalarMap[str, int]
     repaired: _containers.ScalarMap[str, int]
     repairing: int
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., recording: _Optional[bool] = ..., session: _Optional[str] = ..., seconds: _Optional[float] = ..., messages: _Optional[int] = ..., bytes: _Optional[int] = ..., durable_messages: _Optional[int] = ..., message: _Optional[str] = ..., lost: _Optional[_Mapping[str, int]] = ..., repaired: _Optional[_Mapping[str, int]] = ..., repairing: _Optional[int] = ...) -> None: ...
+    refused: _containers.ScalarMap[str, int]
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., recording: _Optional[bool] = ..., session: _Optional[str] = ..., seconds: _Optional[float] = ..., messages: _Optional[int] = ..., bytes: _Optional[int] = ..., durable_messages: _Optional[int] = ..., message: _Optional[str] = ..., lost: _Optional[_Mapping[str, int]] = ..., repaired: _Optional[_Mapping[str, int]] = ..., repairing: _Optional[int] = ..., refused: _Optional[_Mapping[str, int]] = ...) -> None: ...
 
 class HistoryQuery(_message.Message):
     __slots__ = ("topics", "of", "after_run", "after_sequence", "until_run", "until_sequence", "from_utc_ns", "until_utc_ns", "position", "max_bytes", "until_of", "every_s")

@@ -5,7 +5,6 @@ file spells a key. A key is ``<prefix>/<device>/<topic>`` or, for topics of whic
 estimator, ``<prefix>/<device>/<topic>/<estimator>``. Prefix, device and estimator names match NAME.
 """
 
-import re
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -15,10 +14,10 @@ from foxglove_schemas_protobuf.Log_pb2 import Log
 from google.protobuf.message import Message
 
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.names import NAME
 
 M = TypeVar("M", bound=Message)
 
-NAME = re.compile(r"[a-z][a-z0-9_-]{0,31}")
 REPLAY_SUFFIX = "-replay"  # of a device's name when a recording of it is played on the bus
 RECORDER = "recorder"  # the device name under which the recorder speaks
 
@@ -149,20 +148,25 @@ def check_name(name: str) -> str:
     """The name itself; raises TopicError when it may not stand in a key."""
     if not NAME.fullmatch(name):
         raise TopicError(
-            f"name {name!r}: want a-z, 0-9, _ and - after a first letter, at most 32 characters"
+            f"name {name[:80]!r}: want a-z, 0-9, _ and - after a first letter, at most 32"
+            " characters"
         )
     return name
 
 
 def parse(key: str) -> Address:
-    """Take a key apart; raises TopicError for one that is not in the table."""
+    """Take a key apart; raises TopicError for one that is not in the table, or has a name that is
+    none.
+    """
     parts = key.split("/")
     topic = BY_NAME.get(parts[2]) if len(parts) in (3, 4) else None
     if topic is None or (len(parts) == 4) != topic.per_estimator:
         known = ", ".join(BY_NAME)
         raise TopicError(
-            f"key {key!r}: want <prefix>/<device>/<topic>[/<estimator>], topic one of {known}"
+            f"key {key[:200]!r}: want <prefix>/<device>/<topic>[/<estimator>], topic one of {known}"
         )
+    for name in (parts[0], parts[1], *parts[3:]):
+        check_name(name)
     return Address(parts[0], parts[1], topic, parts[3] if topic.per_estimator else "")
 
 

@@ -15,6 +15,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from messages import text
 from sessions.recording.manifest import SessionError
 
 FILE = "annotations.json"
@@ -68,6 +69,7 @@ def change_annotations(folder: Path, change: Callable[[Annotations], Annotations
     with (folder / (FILE + ".lock")).open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         changed = change(read_annotations(folder))
+        _check_words(changed)
         for tag in changed.tags:
             if not TAG.fullmatch(tag):
                 raise SessionError(
@@ -81,6 +83,16 @@ def change_annotations(folder: Path, change: Callable[[Annotations], Annotations
             os.fsync(stream.fileno())
         os.replace(new, folder / FILE)
     return changed
+
+
+def _check_words(said: Annotations) -> None:
+    """Raises SessionError for words that act on what they are shown in: see messages.text."""
+    words = [("title", said.title, False)]
+    for one in said.notes[-1:]:  # those before it were looked at when they were written
+        words += [("note", one.text, True), ("author", one.author, False)]
+    for what, word, lines in words:
+        if fault := text.check(word, lines):
+            raise SessionError(f"{what}: {fault}")
 
 
 def add_note(folder: Path, note: SessionNote) -> Annotations:

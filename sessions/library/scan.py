@@ -16,13 +16,13 @@ from typing import IO
 import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
-from mcap.reader import make_reader
+from mcap.reader import SeekingReader
 from mcap.records import Chunk, ChunkIndex
-from mcap.stream_reader import get_chunk_data_stream
 from mcap.summary import Summary
 
 from messages.contract.topics import Topic, TopicError, parse
-from sessions.recording.mcap_log import Damage, read
+from sessions.recording import mcap_chunk
+from sessions.recording.mcap_log import RECORD_LIMIT, Damage, read
 
 RECORD = struct.Struct("<BQ")  # opcode, length
 MESSAGE_HEAD = 22  # bytes before a message's payload: channel, sequence, log and publish time
@@ -60,7 +60,7 @@ def summary_of(path: Path) -> Summary | None:
 def _summary(path: Path, size: int, mtime_ns: int) -> Summary | None:
     with path.open("rb") as stream:
         try:
-            found = make_reader(stream).get_summary()
+            found = SeekingReader(stream, record_size_limit=RECORD_LIMIT).get_summary()
         except (McapError, ValueError, EOFError, struct.error):
             return None
     whole = (
@@ -145,6 +145,8 @@ def _wanted(key: str, topics: tuple[Topic, ...]) -> bool:
 def _blocks(stream: IO[bytes], chunk: ChunkIndex, keys: dict[int, str]) -> Iterator[Block]:
     """The wanted messages of one chunk, key by key; none of a chunk that cannot be read."""
     stream.seek(chunk.chunk_start_offset)
+    if max(chunk.chunk_length, chunk.message_index_length) > RECORD_LIMIT:
+        return
     try:
         data = _inside(stream.read(chunk.chunk_length))
     except Exception:  # damaged lengths make the library raise almost anything, see mcap_log
@@ -174,4 +176,4 @@ def _payloads(data: bytes, offsets: list[int]) -> list[bytes]:
 def _inside(record: bytes) -> bytes:
     """A chunk's records, decompressed and checked by their CRC."""
     chunk = Chunk.read(ReadDataStream(io.BytesIO(record[RECORD.size :])))
-    return get_chunk_data_stream(chunk, validate_crc=True)[0].read(chunk.uncompressed_size)
+    return mcap_chunk.content(chunk)

@@ -80,6 +80,8 @@ class Manifest(BaseModel):
     ] = {}  # MCAP channel id -> bus key, so that a file can be read without its first chunk
     overflow: int = 0  # messages not recorded because the disk or the process could not keep up
     unknown: int = 0  # messages on keys that are not in the topic table; not recorded
+    # messages not recorded, by device and what was wrong with them (messages/contract/door.py)
+    refused: dict[str, dict[str, int]] = {}
     recovery: str = ""  # what the recovery found and kept
     certificate: dict[str, dict[str, object]] = {}  # per device: certificate.DeviceCertificate
     provenance: dict[str, dict[str, object]] = {}  # per device: firmware, board, calibration files

@@ -6,21 +6,30 @@ looks into a payload.
 """
 
 import hashlib
+import io
 import os
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 from google.protobuf.descriptor import FileDescriptor
-from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Message, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.stream_reader import StreamReader
 
+from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import Topic
+from sessions.recording import mcap_chunk
 from sessions.recording.mcap_writer import McapWriter
 
 PROFILE = "gyrofree"
+RULES = "google/protobuf/descriptor.proto"  # what the contract's rules are written with
+_HEAD = struct.Struct("<BQ")  # opcode and length of a record
 RECORD_LIMIT = 64 * 1024**2  # bytes; a longer record is damage, not data (our chunks are 128 KiB)
 
 
@@ -41,7 +50,7 @@ def descriptor_set(topic: Topic) -> bytes:
     files: dict[str, FileDescriptor] = {}
 
     def visit(file: FileDescriptor) -> None:
-        if file.name not in files:
+        if file.name not in files and file.name != RULES:
             for dependency in file.dependencies:
                 visit(dependency)
             files[file.name] = file
@@ -49,8 +58,28 @@ def descriptor_set(topic: Topic) -> bytes:
     visit(topic.type.DESCRIPTOR.file)
     result = FileDescriptorSet()
     for file in files.values():
-        file.CopyToProto(result.file.add())
+        _without_rules(file, result.file.add())
     return result.SerializeToString()
+
+
+def _without_rules(file: FileDescriptor, out: FileDescriptorProto) -> None:
+    """A file as other viewers read it: our rules for what a field may hold are not theirs."""
+    file.CopyToProto(out)
+    if RULES not in out.dependency:
+        return
+    out.dependency.remove(RULES)
+    del out.extension[:]
+    found = list(out.message_type)
+    while found:
+        message = found.pop()
+        found += message.nested_type
+        message.options.ClearExtension(pb.open)
+        for field in message.field:
+            field.options.ClearExtension(pb.rule)
+            if not field.options.ByteSize():
+                field.ClearField("options")
+        if not message.options.ByteSize():
+            message.ClearField("options")
 
 
 class Sink:
@@ -152,7 +181,7 @@ class McapLog:
 class Damage:
     """What was wrong with a file that was read to its readable end."""
 
-    chunks: int = 0  # complete, but with a wrong CRC or not to be decompressed
+    chunks: int = 0  # complete, but with a wrong CRC, not to be decompressed, or larger than said
     orphans: int = 0  # messages of channels that no readable chunk declares
     tail: str = ""  # why reading ended before the file's end; empty when it did not
 
@@ -207,8 +236,21 @@ def _records(stream: IO[bytes], damage: Damage) -> Iterator[Schema | Channel | M
         if not isinstance(record, Chunk):
             continue
         try:
-            inside = breakup_chunk(record, validate_crc=True)
-        except Exception:
+            yield from mcap_chunk.records(record)
+        except mcap_chunk.ChunkError:
             damage.chunks += 1
-            continue
-        yield from inside
+
+
+def chunk_at(stream: IO[bytes], offset: int) -> Iterator[Message]:
+    """Messages of the chunk whose record begins at this byte, as the file's index says; none where
+    there is no readable chunk.
+    """
+    stream.seek(offset)
+    opcode, length = _HEAD.unpack(stream.read(_HEAD.size).ljust(_HEAD.size, b"\0"))
+    if opcode != Opcode.CHUNK or length > RECORD_LIMIT:
+        return
+    try:
+        chunk = Chunk.read(ReadDataStream(io.BytesIO(stream.read(length))))
+        yield from (one for one in mcap_chunk.records(chunk) if isinstance(one, Message))
+    except (mcap_chunk.ChunkError, McapError, struct.error, UnicodeDecodeError):
+        return

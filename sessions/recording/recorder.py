@@ -9,16 +9,20 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import zenoh
 
+from messages import text
 from messages.bus import orders
 from messages.bus.session import BusSettings
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.checks import MESSAGE_BYTES, Refusal
+from messages.contract.door import Door, device_of
 from messages.contract.topics import RECORDER
 from messages.history.mending_state import Question
-from sessions.recording.intake import Intake
+from messages.text import plain
+from sessions.recording.intake import Entry, Intake
 from sessions.recording.manifest import SESSION_NAME, Manifest
 from sessions.recording.settings import RecorderSettings
 from sessions.recording.store import SessionStore, start
@@ -55,7 +59,9 @@ class Recorder:
         self._orders: deque[Order] = deque()
         self._ask = ask
         self._fresh = True
-        self._intake = Intake(bus.prefix, None, 0)
+        self._bytes_in = self._bytes_out = 0  # of the inbox: counted each by one thread
+        self._door = self._new_door()
+        self._intake = Intake(bus.prefix, None, 0, self._door)
         self._overflow = 0
         self._store: SessionStore | None = None
         self._recording = False  # read by Zenoh's thread
@@ -68,9 +74,17 @@ class Recorder:
         """Zenoh's thread: note the receive time and leave."""
         if not self._recording:
             return
-        if len(self._inbox) >= self.settings.max_inbox:
+        size, waiting = len(sample.payload), self._bytes_in - self._bytes_out
+        if size > MESSAGE_BYTES:
+            self._door.too_large(str(sample.key_expr), size)
+            return
+        if (
+            len(self._inbox) >= self.settings.max_inbox
+            or waiting + size > self.settings.max_inbox_bytes
+        ):
             self._overflow += 1
             return
+        self._bytes_in += size
         self._inbox.append((time.time_ns(), str(sample.key_expr), sample.payload.to_bytes()))
 
     def on_order(self, order: Order) -> None:
@@ -116,11 +130,13 @@ class Recorder:
         if store is None:
             return
         intake = self._intake
-        for entry in intake.answers():
-            store.add(*entry)
+        self._add(store, "an answer", intake.answers())
         for _ in range(len(inbox)):  # what comes in meanwhile waits for the next step
-            for entry in intake.take(*inbox.popleft()):
-                store.add(*entry)
+            received_ns, key, payload = inbox.popleft()
+            self._bytes_out += len(payload)
+            self._add(store, key, intake.take(received_ns, key, payload))
+        store.manifest.refused = self._door.by_device()
+        store.manifest.unknown = self._door.refused["key"]
         if self._overflow:
             log.error(
                 "%s: %d messages came faster than they can be written",
@@ -129,6 +145,19 @@ class Recorder:
             )
             store.manifest.overflow += self._overflow
             self._overflow = 0
+
+    def _add(self, store: SessionStore, key: str, entries: Iterable[Entry]) -> None:
+        """Write what is ready. A fault of ours costs a message and is counted, not the session."""
+        try:
+            for entry in entries:
+                store.add(*entry)
+        except Exception as error:
+            log.exception("%s: a message could not be recorded", plain(key))
+            failure = Refusal("failure", "message", type(error).__name__, "to be recorded")
+            self._door.refuse(key, failure, device_of(key))
+
+    def _new_door(self) -> Door:
+        return Door("recorder", most_devices=self.settings.max_devices)
 
     def _auto_start(self) -> None:
         if (
@@ -165,7 +194,10 @@ class Recorder:
             return False
         self._message, self._retry_at = "", None
         if self._fresh:  # a file that only goes on keeps what is known of the streams
-            self._intake = Intake(self.bus.prefix, self._ask, store.manifest.start_utc_ns)
+            self._door = self._new_door()
+            self._intake = Intake(
+                self.bus.prefix, self._ask, store.manifest.start_utc_ns, self._door
+            )
         self._fresh = True
         self._store, self._recording = store, True
         self._last_flush = time.monotonic()
@@ -236,6 +268,8 @@ class Recorder:
                     f"name {command.name[:80]!r}: want a letter or digit, then a-z, 0-9, _ and -,"
                     " at most 32"
                 )
+            if fault := text.check(command.note, lines=True) or text.check(command.user):
+                return f"note or user: {fault}"
             log.info("start ordered by %s", command.user or "an unnamed user")
             return (
                 ""
@@ -272,4 +306,5 @@ class Recorder:
             lost={key: lost for key, lost in store.lost().items() if lost},
             repaired=store.repaired(),
             repairing=self._intake.held,
+            refused=self._door.counts(),
         )

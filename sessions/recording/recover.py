@@ -127,7 +127,8 @@ def recover_session(folder: Path) -> Manifest | None:
         count.repaired = manifest.keys[key].repaired if key in manifest.keys else 0
     manifest.keys, manifest.channels = found.keys, found.channels
     manifest.certificate = {
-        device: c.model_dump() for device, c in certify(found.keys, found.witness.wire()).items()
+        device: c.model_dump()
+        for device, c in certify(found.keys, found.witness.wire(), manifest.refused).items()
     }
     manifest.provenance = found.witness.provenance() or manifest.provenance
     manifest.devices = sorted({parse(key).device for key in found.keys})

@@ -1,14 +1,17 @@
 """Messages of a recording from any moment on, in the order of their times."""
 
+import heapq
+import itertools
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 
 from google.protobuf.message import DecodeError
 from mcap.exceptions import McapError
-from mcap.reader import make_reader
+from mcap.reader import SeekingReader
 
 from messages.contract.topics import Topic, TopicError, parse
-from sessions.recording.mcap_log import Damage, read
+from sessions.recording.mcap_log import RECORD_LIMIT, Damage, chunk_at, read
 from sessions.recording.samples import decode
 from sessions.replay.replay import Input
 
@@ -27,9 +30,10 @@ class Source:
     def _bounds(self) -> tuple[int, int]:
         with self._path.open("rb") as stream:
             try:
-                found = make_reader(stream).get_summary()
-            except (McapError, ValueError, EOFError):
+                found = SeekingReader(stream, record_size_limit=RECORD_LIMIT).get_summary()
+            except (McapError, ValueError, EOFError, struct.error):
                 found = None
+        self._index = found
         self._indexed = (
             found is not None and found.statistics is not None and bool(found.chunk_indexes)
         )
@@ -59,8 +63,28 @@ class Source:
                 (r.log_ns, r.key, r.payload) for r in read(self._path) if r.log_ns >= from_ns
             )
             return
+        yield from self._indexed_rows(from_ns)
+
+    def _indexed_rows(self, from_ns: int) -> Iterator[tuple[int, str, bytes]]:
+        """By the file's index, one chunk at a time: a message waits until no later chunk can have
+        an earlier one.
+        """
+        waiting: list[tuple[int, int, str, bytes]] = []
+        order = itertools.count()
+        chunks = sorted(
+            (one for one in self._index.chunk_indexes if one.message_end_time >= from_ns),
+            key=lambda one: one.message_start_time,
+        )
         with self._path.open("rb") as stream:
-            for _, channel, message in make_reader(stream).iter_messages(
-                starting_at=from_ns or None
-            ):
-                yield message.log_time, channel.topic, message.data
+            for one in chunks:
+                while waiting and waiting[0][0] < one.message_start_time:
+                    log_ns, _, key, payload = heapq.heappop(waiting)
+                    yield log_ns, key, payload
+                for message in chunk_at(stream, one.chunk_start_offset):
+                    channel = self._index.channels.get(message.channel_id)
+                    if channel is not None and message.log_time >= from_ns:
+                        row = message.log_time, next(order), channel.topic, message.data
+                        heapq.heappush(waiting, row)
+        while waiting:
+            log_ns, _, key, payload = heapq.heappop(waiting)
+            yield log_ns, key, payload

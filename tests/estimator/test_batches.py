@@ -124,7 +124,7 @@ def test_the_live_bound_is_that_of_whole_matrices():
         live.step(omega, alpha, q, still, 0.01)
         if (k + 1) % n:
             continue
-        P = bound._prior(s, q, what) if P is None else P
+        P = bound._prior(s, bound.axis_sigma(table.layout, what), q, what) if P is None else P
         x = np.zeros(STATES)
         x[:3], x[12:15] = omega, bound._up(q)
         P = bound._moved(P, x, alpha, SQ, s, n * 0.01, still, what, n)

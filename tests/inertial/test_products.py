@@ -123,7 +123,7 @@ def test_the_core_predicts_as_whole_matrices_do(x, alpha, seed, fixed):
 @law
 @given(x=states, alpha=vectors, seed=st.integers(0, 99))
 def test_the_core_corrects_as_whole_matrices_do(x, alpha, seed):
-    P, t = covariance(seed), tuning(Config())
+    P, t = covariance(seed), tuning(CUBE(0.05), Config())
     t.products_gate = t.force_gate = np.inf
     c_m, p, late = np.arange(6.0), np.arange(3.0), alpha + np.array([0.3, -0.2, 0.5])
     for kind in ("edges-12", "cube"):
@@ -141,7 +141,11 @@ def test_the_core_corrects_as_whole_matrices_do(x, alpha, seed):
 @law
 @given(x=states, alpha=vectors, seed=st.integers(0, 99))
 def test_points_of_what_is_not_linear_are_those_of_all_states(x, alpha, seed):
-    P, t, s = covariance(seed), tuning(Config()), sensor(LAYOUTS["edges-12"](0.05), 0.04)
+    P, t, s = (
+        covariance(seed),
+        tuning(CUBE(0.05), Config()),
+        sensor(LAYOUTS["edges-12"](0.05), 0.04),
+    )
     t.products_gate, c_m = np.inf, np.arange(6.0)
     said = native.rate_predict(x, P, alpha, 0.01, True, False, True, s)
     agrees(said, twin.predict_unscented(x, P, alpha, s, 0.01))
@@ -150,7 +154,7 @@ def test_points_of_what_is_not_linear_are_those_of_all_states(x, alpha, seed):
 
 
 def test_an_innovation_beyond_the_gate_changes_nothing():
-    x, P, s, t = np.zeros(22), covariance(1), sensor(CUBE(0.05), 0.04), tuning(Config())
+    x, P, s, t = np.zeros(22), covariance(1), sensor(CUBE(0.05), 0.04), tuning(CUBE(0.05), Config())
     said = native.rate_by_products(x, P, np.full(6, 1e3), False, s, t)
     assert (said[0] == x).all() and (said[1] == P).all() and said[2] > t.products_gate
 

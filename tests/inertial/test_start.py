@@ -132,7 +132,7 @@ def test_the_first_fit_is_that_of_whole_matrices(seed):
     while rows["phase"][-1] == Phase.WAITING:
         rows = core.rows(t_s[n : n + 1], readings[n : n + 1])
         n += 1
-    s, t = core.sensor, tuning(core.config)
+    s, t = core.sensor, tuning(core.layout, core.config)
     y = readings[n - 8 : n] @ s.W.T
     mean = y.mean(axis=0)
     outer = np.zeros((3, 3))

@@ -15,13 +15,13 @@ class StillTwin:
 
     def __init__(self, s, c):
         self.s, self.c = s, c
-        self.a, self.y = np.zeros((0, s.n)), np.zeros((0, 12))
+        self.y = np.zeros((0, 12))
         self.still_for = self.quiet_for = self.slow_for = self.hold = 0
         self.reference, self.learnt, self.learning = np.zeros(12), 0, 0
 
     def step(self, a, omega, P, dt):
         """One sample (n,), the caller's rate and its covariance: still, depth."""
-        self.a, self.y = np.vstack([self.a, a]), np.vstack([self.y, self.s.W @ a])
+        self.y = np.vstack([self.y, self.s.W @ a])
         standing, still = self.still_for > 0, self._stands(omega, P, dt)
         depth = self._began() if standing else 0
         if still and not depth:
@@ -41,7 +41,7 @@ class StillTwin:
         self.quiet_for = self.slow_for = 0
         if (
             len(self.y) < c.window
-            or self._scatter() > c.spread_limit * c.sigma_axis**2
+            or self._scatter() > 1.0 + (c.spread_limit - 1.0) * np.sqrt(12.0 / (6 + self.s.m))
             or self.hold
         ):
             return False
@@ -56,9 +56,10 @@ class StillTwin:
         return self.slow_for * dt >= 2.0 * c.patience_s
 
     def _scatter(self):
-        """Mean square of the axes in use about their means over the window (E-20)."""
-        window = self.a[-self.c.window :, self.s.used > 0.0]
-        return window.var(axis=0, ddof=1).mean()
+        """Mean square of y about its mean over the window, over its noise (E-20)."""
+        seen = 6 + self.s.m  # omega', c of m numbers, p
+        R = np.concatenate([np.diag(self.s.R_alpha), np.diag(self.s.R_c), np.diag(self.s.R_p)])
+        return np.sum(self.y[-self.c.window :].var(axis=0, ddof=1) / R) / seen
 
     def _moved(self, window):
         """Chi-square of the mean [omega', c] against the reference (E-21)."""

@@ -24,10 +24,13 @@ void say(FixResult& out, const Leg& leg, const Measurement& z, const RowMatrix& 
          const Vector3& rate_b) {
   out.nis = nis;
   out.dof = z.rows();
-  out.y.head(z.rows()) = z.y;
-  for (int i = 0; i < z.rows(); ++i) out.sigma(i) = std::sqrt(S(i, i));
+  for (int i = 0; i < z.rows(); ++i) {
+    if (is_silent(z, i)) continue;
+    out.y(i) = z.y(i);
+    out.sigma(i) = std::sqrt(S(i, i));
+  }
   out.yaw = yaw_of_course(leg.x, rate_b);
-  out.error_ned = z.y.segment<3>(POSITION_ROW);
+  out.error_ned = out.y.segment<3>(POSITION_ROW);
   out.error_ned[DOWN] = -out.error_ned[DOWN];
 }
 
@@ -132,7 +135,7 @@ FixResult take(Leg& leg, const Model& model, const Settings& s, Memory& memory, 
 
   const bool weighs = s.huber < FOREVER && s.window == Horizon::NONE;
   const Weights weight = weighs ? huber_weights(innovation.S, z.y, s.huber) : Weights(Weights::Ones());
-  const Status status = judge(memory, s, white.nis, z.rows(), weight);
+  const Status status = judge(memory, s, white.nis, said_rows(z), weight);
   out.status = status;
   if (status == Status::REJECTED) return out;
   if (status == Status::READMITTED) {  // believe less of the filter, and nothing of what its horizon holds

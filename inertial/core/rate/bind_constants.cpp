@@ -77,7 +77,7 @@ void bind_sensor(nb::module_& m) {
 void bind_limits(nb::module_& m) {
   nb::class_<StillLimits> c(m, "RateStillLimits", "still.Config for the core.");
   c.def(nb::init<>());
-  c.def_rw("sigma_axis", &StillLimits::sigma_axis).def_rw("spread_limit", &StillLimits::spread_limit);
+  c.def_rw("spread_limit", &StillLimits::spread_limit);
   c.def_rw("quiet_limit", &StillLimits::quiet_limit).def_rw("turn_limit", &StillLimits::turn_limit);
   c.def_rw("tilt_limit", &StillLimits::tilt_limit).def_rw("steady_limit", &StillLimits::steady_limit);
   c.def_rw("drift_steady", &StillLimits::drift_steady).def_rw("rate_limit", &StillLimits::rate_limit);

@@ -61,7 +61,7 @@ class ProductsFilter {
     Row* row = rows_of(out, t_s.shape(0));
     for (std::size_t k = 0; k < t_s.shape(0); ++k, ++row) {
       memory_->frame.advance(c_, t_s.data()[k], f_axis.data() + k * c_.sensor.n);
-      write(memory_->frame, c_.sensor, *row);
+      write(memory_->frame, memory_->frame.sensor(c_), *row);
       if (follows_ && memory_->frame.started()) follow(*row);
       put(row->bound_sigma, memory_->bound.sigma());
     }
@@ -80,6 +80,8 @@ class ProductsFilter {
   nb::bytes snapshot() const { return image(*memory_); }
   void restore_from(const nb::bytes& bytes) { restore(*memory_, bytes); }
   const Frame& frame() const { return memory_->frame; }
+  Noise& noise() { return memory_->frame.noise(); }
+  const Noise& noise() const { return memory_->frame.noise(); }
 
  private:
   void follow(const Row& row) {
@@ -168,6 +170,10 @@ void bind_products(nb::module_& m) {
   bind_running(c);
   c.def("follow", nb::overload_cast<const Sensor&, const Knowledge&>(&ProductsFilter::follow), nb::arg("sensor"),
         nb::arg("knowledge"), "Say the bound along the estimate, of all axes.");
+  c.def("hear", [](ProductsFilter& f, double ratio) { f.noise().hear(ratio); }, nb::arg("ratio"),
+        "What parity says of the axes' variance over the configured one, by one sample (E-58).");
+  c.def_prop_ro("noise", [](const ProductsFilter& f) { return nb::make_tuple(f.noise().quiet(), f.noise().force()); },
+                "Measured variances over the configured ones: of omega' and c, of p.");
   c.def("exclude", &ProductsFilter::exclude, nb::arg("sensor"), nb::arg("T"), nb::arg("unknown"));
   c.def("correct", &ProductsFilter::correct, nb::arg("t_s"), nb::arg("rate"), nb::arg("sigma"), nb::arg("signed"),
         nb::arg("axis_b"), "A tachometer's report (E-50); False where it is not used.");

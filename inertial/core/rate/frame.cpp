@@ -45,9 +45,20 @@ void Frame::tick(double t_s) {
   ++steps_;
 }
 
-void Frame::advance(const Constants& c, double t_s, const double* a) {
+// The constants with the noise that was measured.
+const Constants& Frame::believed(const Constants& c) {
+  noisier_ = !watch_.noise().as_configured();
+  if (!noisier_) return c;
+  if (renewed_) now_ = c;
+  renewed_ = false;
+  apply(watch_.noise(), c.sensor, now_.sensor);
+  return now_;
+}
+
+void Frame::advance(const Constants& configured, double t_s, const double* a) {
   tick(t_s);
-  watch_.take(c.sensor, a, dt_);
+  watch_.take(configured.sensor, a, dt_);
+  const Constants& c = believed(configured);
   said_ = Said();
   Filter& f = first_.filter;
   if (!started_)
@@ -240,6 +251,7 @@ void Frame::count(const Constants& c) {
 
 void Frame::exchange_axes(const Matrix<MEASURED>& T, const Matrix<MEASURED>& unknown) {
   watch_.unlearn();
+  renewed_ = true;
   kept_.clear();
   fitted_ = 0;
   Covariance full = Covariance::Identity();

@@ -78,6 +78,10 @@ class Frame {
   // when it is too old, contradicts by more than 6 sigma, or nothing is known.
   bool correct(const Constants& c, const Report& report);
 
+  // The sensor with the noise that was measured (E-58).
+  const Sensor& sensor(const Constants& c) const { return noisier_ ? now_.sensor : c.sensor; }
+  Noise& noise() { return watch_.noise(); }
+  const Noise& noise() const { return watch_.noise(); }
   const Filter& filter() const { return first_.filter; }
   const Filter& other() const { return second_.filter; }
   const Said& said() const { return said_; }
@@ -94,6 +98,7 @@ class Frame {
   long lost() const { return lost_; }
 
  private:
+  const Constants& believed(const Constants& c);
   void tick(double t_s);
   void restart();
   void wait(const Constants& c, bool still);
@@ -112,6 +117,9 @@ class Frame {
   void stay();
 
   Watch watch_;
+  Constants now_;       // with the noise that was measured, where that is not as configured
+  bool noisier_ = false;  // they are in use
+  bool renewed_ = true;   // the constants they are made of
   Start first_;
   Start second_;  // of the other sign, while there are two
   KeptStates<DEPTH / EVERY + 1> kept_;

@@ -5,6 +5,11 @@ namespace {
 
 constexpr int LENGTHS[] = {4, 8, 16, 32, 64, 128};  // samples over which omega' is summed
 
+// The more numbers a layout gives, the less its scatter does by chance.
+double scatter_limit(const Sensor& s, const StillLimits& c) {
+  constexpr double FULL = 12.0;  // numbers of the layout that the limit is said for
+  return 1.0 + (c.spread_limit - 1.0) * std::sqrt(FULL / (6 + s.m));
+}
 
 }  // namespace
 
@@ -23,12 +28,14 @@ void Watch::take(const Sensor& s, const double* a, double dt) {
   const Eigen::Index k = count % DEPTH, now = count % TOTALS;
   const Eigen::Index before = (count + TOTALS - 1) % TOTALS;
   ring_dt(k) = dt;
-  for (int i = 0; i < s.n; ++i) ring_a(i, k) = a[i];
   ring_y.col(k) = s.measure(a);
   if (filled == 0) ring_total.col(before).setZero();
   ring_total.col(now) = ring_y.col(k) + ring_total.col(before);
   ++count;
   ++filled;
+  if (filled < DIFFERENCED) return;
+  const long last = newest();
+  measured.observe(s, y(last) - y(last - 3) + 3.0 * (y(last - 2) - y(last - 1)));
 }
 
 Measurement Watch::mean_of(int window) const {
@@ -37,32 +44,29 @@ Measurement Watch::mean_of(int window) const {
   return out;
 }
 
-// Mean square of the axes about their means over the window, (m/s^2)^2 (E-20); running sums, made
-// anew now and then.
+// Mean square of y about its mean over the window, over its noise (E-20); running sums, made anew now
+// and then.
 double Watch::scatter(const Sensor& s, int window) {
-  const Eigen::Index now = newest() % DEPTH;
+  const Measurement now = y(newest());
   if (filled == window || count % DEPTH == 0) {
-    offset = ring_a.col(now);
+    offset = now;
     sum.setZero();
     sum_of_squares.setZero();
     for (int ago = 0; ago < window; ++ago) {
-      const Vector<MOST_AXES> d = ring_a.col((newest() - ago) % DEPTH) - offset;
+      const Measurement d = y(newest() - ago) - offset;
       sum += d;
       sum_of_squares += d.cwiseProduct(d);
     }
   } else {
-    const Vector<MOST_AXES> come = ring_a.col(now) - offset;
-    const Vector<MOST_AXES> gone = ring_a.col((newest() - window) % DEPTH) - offset;
+    const Measurement come = now - offset, gone = y(newest() - window) - offset;
     sum += come - gone;
     sum_of_squares += come.cwiseProduct(come) - gone.cwiseProduct(gone);
   }
-  double total = 0.0, axes = 0.0;
-  for (int i = 0; i < s.n; ++i) {
-    if (s.used(i) == 0.0) continue;
-    total += sum_of_squares(i) - sum(i) * sum(i) / window;
-    axes += 1.0;
-  }
-  return total / ((window - 1) * axes);
+  const Measurement total = sum_of_squares - sum.cwiseProduct(sum) / window;
+  double ratio = 0.0;
+  for (int k = 0; k < 3; ++k) ratio += total(ALPHA_M + k) / s.R_alpha(k, k) + total(FORCE_M + k) / s.R_p(k, k);
+  for (int k = 0; k < s.m; ++k) ratio += total(PRODUCTS_M + k) / s.R_c(k, k);
+  return ratio / ((window - 1) * (6 + s.m));
 }
 
 // Mean y over the window that ended `ago` samples ago.
@@ -164,7 +168,7 @@ bool Watch::restless() {
 
 bool Watch::stands(const Sensor& s, const StillLimits& c, const Vector3& omega, const Matrix3& P, double dt) {
   if (hold > 0) --hold;
-  if (filled < c.window || scatter(s, c.window) > c.spread_limit * square(c.sigma_axis) || hold > 0)
+  if (filled < c.window || scatter(s, c.window) > scatter_limit(s, c) || hold > 0)
     return restless();
   const double told = rate_excludes_zero(omega, P, c.rate_slack);
   const bool slow = told < c.rate_limit;

@@ -3,12 +3,12 @@
 // tests/support/still_twin.py.
 #pragma once
 
-#include "rate/sensor.hpp"
+#include "rate/noise.hpp"
 
 namespace gyrofree::rate {
 
 struct StillLimits {
-  double sigma_axis, spread_limit, quiet_limit, turn_limit, tilt_limit, steady_limit, drift_steady;
+  double spread_limit, quiet_limit, turn_limit, tilt_limit, steady_limit, drift_steady;
   double rate_limit, rate_slack, sure_rate, likely_rate, begin_limit, patience_s;
   double drift, drift_now, drift_tilt;
   int window, short_window, steady_span, brief_span, guard, hold;
@@ -28,9 +28,10 @@ class Watch {
   void forget();
   // Of other axes than before: nothing that was learnt of them holds.
   void unlearn();
-  // Remember one sample of all axes.
+  // Remember one sample of all axes; s has the configured noise.
   void take(const Sensor& s, const double* a, double dt);
-  // Is the sample taken last one of standstill, by the caller's omega and its covariance?
+  // Is the sample taken last one of standstill, by the caller's omega and its covariance? s has the
+  // measured noise.
   Verdict detect(const Sensor& s, const StillLimits& c, const Vector3& omega, const Matrix3& P, double dt);
 
   long newest() const { return count - 1; }
@@ -42,6 +43,8 @@ class Watch {
   // Sum of all y up to a sample of the last 256, but for a constant.
   Measurement total(long sample) const { return ring_total.col((sample + TOTALS) % TOTALS); }
   Measurement mean_of(int window) const;
+  Noise& noise() { return measured; }
+  const Noise& noise() const { return measured; }
 
  private:
   double scatter(const Sensor& s, int window);
@@ -56,14 +59,14 @@ class Watch {
   bool restless();
   void learn(const StillLimits& c);
 
-  Matrix<MOST_AXES, DEPTH> ring_a = Matrix<MOST_AXES, DEPTH>::Zero();
   Matrix<MEASURED, DEPTH> ring_y = Matrix<MEASURED, DEPTH>::Zero();
   Matrix<MEASURED, TOTALS> ring_total = Matrix<MEASURED, TOTALS>::Zero();
   Vector<DEPTH> ring_dt = Vector<DEPTH>::Zero();
-  // Of the readings in the window: one of them, and sum and sum of squares of what they differ by.
-  Vector<MOST_AXES> offset = Vector<MOST_AXES>::Zero();
-  Vector<MOST_AXES> sum = Vector<MOST_AXES>::Zero();
-  Vector<MOST_AXES> sum_of_squares = Vector<MOST_AXES>::Zero();
+  // Of y in the window: one of them, and sum and sum of squares of what they differ by.
+  Measurement offset = Measurement::Zero();
+  Measurement sum = Measurement::Zero();
+  Measurement sum_of_squares = Measurement::Zero();
+  Noise measured;
   Measurement reference = Measurement::Zero();  // mean y of the last standstill
   Measurement gathered = Measurement::Zero();   // of this standstill without its newest samples
   long count = 0;       // samples taken

@@ -39,7 +39,7 @@ bool Frame::correct(const Constants& c, const Report& report) {
   const long n = static_cast<long>(samples), now = watch_.newest();
   const Vector3 gained = (watch_.total(now) - watch_.total(now - n)).segment<3>(ALPHA_M);
   const double noise =
-      report.sigma * report.sigma + n * dt_ * dt_ * dot(report.axis_b, c.sensor.R_alpha * report.axis_b);
+      report.sigma * report.sigma + n * dt_ * dt_ * dot(report.axis_b, sensor(c).R_alpha * report.axis_b);
   const auto said_of = [&](const Start& begun) {
     return innovation(begun.filter, report, gained, n, dt_, noise);
   };
