@@ -5,14 +5,11 @@ again.
 import functools
 import json
 import sys
-import tomllib
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from pydantic import ValidationError
 
-from estimator.settings import EstimatorSettings
 from gyrofree.commands.options import (
     AsJson,
     Config,
@@ -20,6 +17,7 @@ from gyrofree.commands.options import (
     UnitsAsNamed,
     catalogue_of,
     file_of,
+    session_name,
     settings_of,
 )
 from gyrofree.commands.run import progress_bar
@@ -120,7 +118,9 @@ def import_log(
         Path | None, typer.Option(help="CSV of GNSS epochs beside a single CSV of samples.")
     ] = None,
     device: Annotated[str, typer.Option(help="Device name for the samples.")] = "log",
-    name: Annotated[str, typer.Option(help="Added to the session's id.")] = "import",
+    name: Annotated[
+        str, typer.Option(help="Added to the session's id.", callback=session_name)
+    ] = "import",
     units_as_named: UnitsAsNamed = False,
     as_json: AsJson = False,
     config: Config = None,
@@ -177,7 +177,11 @@ def rerun(
         str, typer.Option(help="Navigation filters to run, separated by commas.")
     ] = "",
     name: Annotated[
-        str, typer.Option(help="Added to the new session's id and to the new estimators' names.")
+        str,
+        typer.Option(
+            help="Added to the new session's id and the new estimators' names.",
+            callback=session_name,
+        ),
     ] = "new",
     beside: Annotated[
         bool, typer.Option("--beside/--instead", help="Keep the old estimates beside.")
@@ -202,7 +206,7 @@ def rerun(
     """
     from estimator.choice import UnknownEstimator
     from estimator.pipeline import Pipeline
-    from gyrofree.running.library import from_library
+    from gyrofree.running.rerun_settings import from_library, with_changes
     from sessions.replay.rerun import estimates_again, rerun_id, write_session
 
     settings = settings_of(config)
@@ -231,34 +235,6 @@ def rerun(
     except (UnknownEstimator, SessionError, ValueError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
     print(json.dumps({"session": folder.name}) if as_json else folder.name)
-
-
-def with_changes(settings: EstimatorSettings, changes: list[str]) -> EstimatorSettings:
-    """Settings with `key=value` texts applied, values as in TOML (a bare word is a string); raises
-    ValueError.
-    """
-    data = settings.model_dump()
-    for text in changes:
-        key, equals, value = (part.strip() for part in text.partition("="))
-        try:
-            parsed = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
-            parsed = value
-        place, *inner = key.split(".")
-        table, name = data, place
-        for part in inner:
-            table, name = table.get(name) if isinstance(table, dict) else None, part
-        if not equals or not isinstance(table, dict) or name not in table:
-            raise ValueError(
-                f"--set {text!r}: want KEY=VALUE with a key of [estimator], like"
-                " layout.half_side_m=0.0493"
-            )
-        table[name] = parsed
-    try:
-        return EstimatorSettings.model_validate(data)
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise ValueError(f"--set {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
 
 
 def reprocess(

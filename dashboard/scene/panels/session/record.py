@@ -74,6 +74,11 @@ class Record:
                 )
             )
             items.append(("size", number(m.bytes / 1e6, 1, "MB")))
+        if m.clock_steps:
+            text = (
+                f"set {m.clock_steps} times, {m.clock_offset_s:+,.1f} s in all; times go on without"
+            )
+            items.append(("wall clock", f'<b class="gf-bad">{text}</b>'))
         lost = sum(m.lost.values())
         if lost:
             items.append(("lost on the bus", bad(f"{number(lost, 0)} messages")))

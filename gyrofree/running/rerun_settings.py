@@ -1,13 +1,17 @@
-"""Files that a person at the page may name: those of the library, by name, and no others.
+"""Settings of an estimator changed for one rerun, and what files a person at the page may name:
+those of the library, by name, and no others.
 
 Whoever may order a rerun over the network is not for that allowed to have the server open any file
 of its disk. Every setting whose value is a file or folder counts, also one that is added later:
 what is not in FOLDERS is refused.
 """
 
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+
+from pydantic import ValidationError
 
 from estimator.settings import EstimatorSettings
 from messages.text import file_name, plain
@@ -35,6 +39,34 @@ def from_library(configured: EstimatorSettings, changed: EstimatorSettings) -> E
             table = table[part]
         table[place[-1]] = _file(getattr(configured, FOLDERS[place[0]]), str(value), place)
     return EstimatorSettings.model_validate(data)
+
+
+def with_changes(settings: EstimatorSettings, changes: list[str]) -> EstimatorSettings:
+    """Settings with `key=value` texts applied, values as in TOML (a bare word is a string); raises
+    ValueError.
+    """
+    data = settings.model_dump()
+    for text in changes:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        try:
+            parsed = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            parsed = value
+        place, *inner = key.split(".")
+        table, name = data, place
+        for part in inner:
+            table, name = table.get(name) if isinstance(table, dict) else None, part
+        if not equals or not isinstance(table, dict) or name not in table:
+            raise ValueError(
+                f"--set {text!r}: want KEY=VALUE with a key of [estimator], like"
+                " layout.half_side_m=0.0493"
+            )
+        table[name] = parsed
+    try:
+        return EstimatorSettings.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise ValueError(f"--set {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
 
 
 def _files(place: tuple[str, ...], value: Any) -> Iterator[tuple[tuple[str, ...], Any]]:
