@@ -27,6 +27,7 @@ from scipy.io import savemat
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
 from messages.contract.topics import GNSS, LOG, NAV, RATE, Topic, parse
+from messages.text import cell
 from sessions.export.columns import Column
 from sessions.export.table import (
     Block,
@@ -40,8 +41,9 @@ from sessions.export.table import (
 )
 from sessions.export.track import write_gpx, write_kml
 from sessions.recording.mcap_append import McapLog
-from sessions.recording.mcap_log import Recorded, read
+from sessions.recording.mcap_log import Recorded
 from sessions.recording.samples import decode
+from sessions.recording.timeline import straight
 
 RATE_ESTIMATE: Topic = replace(RATE, type=pb.RateEstimate)  # one sample of a batch
 ROW_GROUP = 20_000  # rows of Parquet written at once
@@ -81,8 +83,12 @@ def to_csv(
 
 
 def _cells(column: Column, values: NDArray[Any]) -> list[float | int | str]:
-    """A column for CSV: nothing for NaN, whole numbers without a point."""
+    """A column for CSV: nothing for NaN, whole numbers without a point, no text that a spreadsheet
+    executes.
+    """
     cells: list[float | int | str] = values.tolist()
+    if column.text:
+        return [cell(text) for text in cells]
     if values.dtype.kind != "f":
         return cells
     return ["" if v != v else int(v) if column.whole else v for v in cells]
@@ -174,7 +180,7 @@ def to_mcap(
     start = None
     with target.open("wb") as stream:
         log = McapLog(stream.fileno(), 128 * 1024)
-        for row in read(path):
+        for row in straight(path):
             start = row.log_ns if start is None else start
             topic = parse(row.key).topic
             if (
