@@ -157,7 +157,8 @@ def run_log(
     """Tracks of the estimators that can use this layout, what the axis monitor says, and why others
     cannot. Raises LogError, CardError.
     """
-    f_axis = data.f_axis * np.array(shape.gain)
+    gain = np.array(shape.gain)
+    f_axis = data.f_axis if np.all(gain == 1.0) else data.f_axis * gain
     if card is not None:
         shape, f_axis = card.layout(shape), card.correct(f_axis)
     chosen = list(names) if names else list(ESTIMATORS)
