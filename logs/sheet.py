@@ -143,6 +143,8 @@ class Sheet:
         try:
             with opened(self.path, self.size) as stream, self._open(stream, names, rows) as reader:
                 yield from reader
+        except UnicodeDecodeError as error:
+            raise LogError(f"{self.path}: no text in {self.encoding}: {error.reason}") from None
         except pa.ArrowInvalid as error:
             if "straddling" in str(error):
                 line = long_line(self.path, self.size)
@@ -165,7 +167,8 @@ class Sheet:
                 block_size=LINE,
                 skip_rows=self.header_line,
                 column_names=unique,
-                encoding=self.encoding,
+                # numbers are ASCII; bytes that Windows-1252 does not know must not end the reading
+                encoding="latin-1" if self.encoding == "cp1252" else self.encoding,
             ),
             pa.csv.ParseOptions(
                 delimiter=self.separator,
