@@ -84,6 +84,8 @@ class LinkReport:
             gnss_bad=self._gnss.bad,
             damage=ledger.damage,
         )
+        for name, count in self._gnss.refused.items():
+            status.refused[f"receiver: {name}"] = count
         self._at, self._samples_at = now, self._samples.count
         self._frames_at = ledger.good_frames
         return status
@@ -98,6 +100,8 @@ class LinkReport:
                 f"{device.port}: bytes come but no frame can be read; most likely the speed is"
                 f" wrong: set `baud` to the board's (now {device.baud})"
             )
+        if receiver := self._gnss.message(now):
+            found.append(receiver)
         if self._journal.message:
             found.append(self._journal.message)
         elif self._published.message:

@@ -1,5 +1,5 @@
-"""Places and vectors of the Earth's own frame (x to Greenwich, z to the north pole), as old receivers
-give them.
+"""Places and vectors of the Earth's own frame, x to Greenwich and z to the north pole, as old
+receivers give them.
 """
 
 import math

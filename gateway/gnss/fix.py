@@ -15,7 +15,7 @@ TRUSTED_ACCURACY_M = 100.0  # of a position for whose fix no message answers
 WEEK_ROLLOVER_NS = 1024 * 7 * 86400 * 10**9  # GPS week counter of 10 bits
 DAY_NS = 86400 * 10**9
 YEAR_2000_NS = 946_684_800 * 10**9
-YEAR_2080_NS = 3_471_292_800 * 10**9
+YEAR_2060_NS = 2_840_140_800 * 10**9
 NAN = math.nan
 
 __all__ = ["NONE", "RTK_FIXED", "Fix", "nmea_fix", "plausible_utc", "ubx_fix", "unroll_weeks"]
@@ -184,5 +184,5 @@ def unroll_weeks(fix_utc_ns: int, host_utc_ns: int) -> int:
 
 
 def plausible_utc(fix_utc_ns: int) -> int:
-    """0 for the dates that receivers count from before they know better: 1980, 1999, 2080."""
-    return fix_utc_ns if YEAR_2000_NS <= fix_utc_ns < YEAR_2080_NS else 0
+    """0 for the dates that receivers count from before they know better: 1980, 1999, 2079."""
+    return fix_utc_ns if YEAR_2000_NS <= fix_utc_ns < YEAR_2060_NS else 0

@@ -1,5 +1,5 @@
-"""NMEA 0183 sentences with a right checksum become records: GGA, GNS, RMC, GLL, VTG, GST, GSA, ZDA of
-any talker.
+"""NMEA 0183 sentences with a right checksum become records: GGA, GNS, RMC, GLL, VTG, GST, GSA and
+ZDA of any talker.
 """
 
 from collections.abc import Callable
