@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from datetime import date, timedelta
 
 from gateway.gnss.fields import Refused, utc_ns_of
-from gateway.gnss.fix import DAY_NS, Fix, nmea_fix, ubx_fix
+from gateway.gnss.fix import DAY_NS, Fix, Stamp, nmea_fix, ubx_fix
 from gateway.gnss.nmea import Sentence, sentence_of
 from gateway.gnss.stream import GnssStream, RawMessage
 from gateway.gnss.ubx_read import Nav, nav_of
@@ -29,12 +29,14 @@ MOST_NAMES = 64  # of messages that are told apart
 @dataclass
 class _UbxEpoch:
     tow_ms: int
+    began: Stamp
     parts: dict[str, Nav] = field(default_factory=dict)
 
 
 @dataclass
 class _NmeaEpoch:
     tod_ns: int
+    began: Stamp
     parts: dict[str, Sentence] = field(default_factory=dict)
 
 
@@ -55,6 +57,8 @@ class GnssDecoder:
         self._date: date | None = None
         self._last_tod_ns = 0
         self._dimensions: int | None = None
+        self._pending_since: Stamp = None  # of the message that is half received
+        self._now: Stamp = None  # of the message that is looked at
 
     @property
     def good(self) -> int:
@@ -71,19 +75,18 @@ class GnssDecoder:
         """Messages with a wrong checksum, or with content that makes no sense."""
         return self.stream.bad + self.unreadable
 
-    @property
-    def idle(self) -> bool:
-        """True when the next byte begins an epoch: nothing is open and nothing half received."""
-        return self._ubx is None and self._nmea is None and not self.stream.pending
-
-    def feed(self, data: bytes) -> list[Fix]:
-        """Epochs completed by these bytes."""
+    def feed(self, data: bytes, stamp: Stamp = None) -> list[Fix]:
+        """Epochs completed by these bytes, each with the stamp of its own first byte."""
         fixes: list[Fix] = []
-        for message in self.stream.feed(data):
+        self._now = self._pending_since if self.stream.pending else stamp
+        messages = self.stream.feed(data)
+        self._pending_since = stamp if messages else self._now
+        for message in messages:
             try:
                 fixes += self._take(message)
             except Refused as refusal:
                 self.refused[refusal.text] += 1
+            self._now = stamp
         return fixes
 
     def flush(self) -> list[Fix]:
@@ -107,7 +110,7 @@ class GnssDecoder:
         fixes: list[Fix] = []
         if self._ubx is None or self._ubx.tow_ms != nav.tow_ms:
             fixes = self._close_ubx()
-            self._ubx = _UbxEpoch(nav.tow_ms)
+            self._ubx = _UbxEpoch(nav.tow_ms, self._now)
         self._ubx.parts[nav.name] = nav
         if self._ubx_roster and self._ubx_roster <= set(self._ubx.parts):
             fixes += self._close_ubx()
@@ -120,7 +123,7 @@ class GnssDecoder:
         self._ubx_roster = set(epoch.parts) - SELDOM
         self._muted = UBX_MUTES_NMEA
         self._nmea_leads, self._nmea_since_ubx = self._nmea_since_ubx > 1, 0
-        return [] if self._nmea_leads else [ubx_fix(epoch.parts)]
+        return [] if self._nmea_leads else [replace(ubx_fix(epoch.parts), began=epoch.began)]
 
     # --- NMEA
 
@@ -135,7 +138,7 @@ class GnssDecoder:
         fixes: list[Fix] = []
         if self._nmea is None or self._nmea.tod_ns != tod_ns:
             fixes = self._close_nmea()
-            self._nmea = _NmeaEpoch(tod_ns)
+            self._nmea = _NmeaEpoch(tod_ns, self._now)
         self._keep(self._nmea.parts, sentence)
         self._date = sentence.day or self._date
         if self._nmea_roster and self._nmea_roster <= set(self._nmea.parts):
@@ -166,4 +169,5 @@ class GnssDecoder:
             self._muted -= 1
             return []
         fix = nmea_fix(epoch.parts, self._dimensions)
-        return [replace(fix, fix_utc_ns=utc_ns_of(self._date, epoch.tod_ns))]
+        utc_ns = utc_ns_of(self._date, epoch.tod_ns)
+        return [replace(fix, fix_utc_ns=utc_ns, began=epoch.began)]

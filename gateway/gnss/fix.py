@@ -4,7 +4,7 @@ records that have passed the door.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from gateway.gnss.nmea import NONE, RTK_FIXED, Sentence
 from gateway.gnss.ubx_read import Nav, Three
@@ -17,6 +17,7 @@ DAY_NS = 86400 * 10**9
 YEAR_2000_NS = 946_684_800 * 10**9
 YEAR_2060_NS = 2_840_140_800 * 10**9
 NAN = math.nan
+Stamp = tuple[int, int | None] | None  # us of the board, monotonic ns; of a read
 
 __all__ = ["NONE", "RTK_FIXED", "Fix", "nmea_fix", "plausible_utc", "ubx_fix", "unroll_weeks"]
 
@@ -42,6 +43,7 @@ class Fix:
     track_deg: float | None = None  # course over ground; None when too slow to have one
     satellites: int = 0
     hdop: float = 0.0
+    began: Stamp = field(default=None, compare=False)  # of the epoch's first byte
 
 
 # --- NMEA

@@ -30,8 +30,6 @@ class GnssLink:
         self.decoder = GnssDecoder()
         self.clock = ReceiverClock()
         self._latency_s = latency_s
-        self._first_us = 0
-        self._first_ns: int | None = None
 
     def restart(self) -> None:
         """The board's clock begins again; the receiver's goes on."""
@@ -43,19 +41,14 @@ class GnssLink:
         """Fixes completed by these bytes, which came at device_us. utc_ns: now, against week
         rollover.
         """
-        if self.decoder.idle:
-            self._first_us, self._first_ns = device_us, monotonic_ns
-        for fix in self.decoder.feed(data):
+        for fix in self.decoder.feed(data, (device_us, monotonic_ns)):
             fix_utc_ns = plausible_utc(unroll_weeks(fix.fix_utc_ns, utc_ns))
             fix = replace(fix, fix_utc_ns=fix_utc_ns)
-            yield Arrival(fix, self._first_us, self._first_ns, self._device_time(fix))
-            self._first_us, self._first_ns = (
-                device_us,
-                monotonic_ns,
-            )  # what follows it came with these bytes
+            first_us, first_ns = fix.began or (device_us, monotonic_ns)
+            yield Arrival(fix, first_us, first_ns, self._device_time(fix, first_us))
 
-    def _device_time(self, fix: Fix) -> float:
-        if not self._first_us:
+    def _device_time(self, fix: Fix, first_us: int) -> float:
+        if not first_us:
             return 0.0
-        at_us = self.clock.device_us(fix, self._first_us)
+        at_us = self.clock.device_us(fix, first_us)
         return 0.0 if at_us is None else at_us / 1e6 - self._latency_s

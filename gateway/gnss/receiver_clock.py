@@ -40,6 +40,7 @@ class ReceiverClock:
         self._weeks: bool | None = None  # counts by time of week, else by UTC
         self._last: tuple[int, int] | None = None  # us: receiver's, board's
         self._behind: list[tuple[int, int]] = []  # fixes that may be behind a step
+        self._trusted = 0  # fixes of one count so far
 
     def device_us(self, fix: Fix, arrival_us: int) -> float | None:
         """us of the board's clock at the fix, which came at arrival_us; None: unknown."""
@@ -52,12 +53,14 @@ class ReceiverClock:
         ):
             if not self._stepped(here):
                 return None
-            log.warning("the receiver's time stepped by %+.3f s", ahead)
-            self.steps, self.last_step_s = self.steps + 1, ahead
+            if self._trusted >= STEP_FIXES:  # before that it has only begun
+                log.warning("the receiver's time stepped by %+.3f s", ahead)
+                self.steps, self.last_step_s = self.steps + 1, ahead
+            self._trusted = len(self._behind)
             self._clock = DeviceClock()
             for before in self._behind:
                 self._clock.add(before[0], before[1] * 1000)
-        self._behind, self._last = [], here
+        self._behind, self._last, self._trusted = [], here, self._trusted + 1
         self._clock.add(now_us, arrival_us * 1000)
         return self._clock.host_ns(now_us) / 1e3
 

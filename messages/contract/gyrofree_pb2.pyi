@@ -185,7 +185,7 @@ class GnssFix(_message.Message):
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., fix_utc_ns: _Optional[int] = ..., latitude_deg: _Optional[float] = ..., longitude_deg: _Optional[float] = ..., height_m: _Optional[float] = ..., height_msl_m: _Optional[float] = ..., position_sigma_ned_m: _Optional[_Iterable[float]] = ..., v_n_mps: _Optional[_Iterable[float]] = ..., velocity_sigma_ned_mps: _Optional[_Iterable[float]] = ..., quality: _Optional[_Union[GnssFix.Quality, str]] = ..., satellites: _Optional[int] = ..., hdop: _Optional[float] = ..., talker: _Optional[str] = ..., device_time_s: _Optional[float] = ..., height_reference: _Optional[_Union[HeightReference, str]] = ...) -> None: ...
 
 class LinkStatus(_message.Message):
-    __slots__ = ("header", "connected", "port", "message", "bytes_in", "good_frames", "good_bytes", "bad_chunks", "bad_bytes", "pending_bytes", "lost_frames", "device_dropped", "lost_samples", "reboots", "unknown_frames", "reconnects", "sample_rate_hz", "frame_rate_hz", "latency_p50_s", "latency_p99_s", "clock_skew_ppm", "clock_residual_s", "clock_window_s", "journal_sequence", "durable_sequence", "gnss_good", "gnss_bad", "damage", "published_sequence", "published_durable", "refused")
+    __slots__ = ("header", "connected", "port", "message", "bytes_in", "good_frames", "good_bytes", "bad_chunks", "bad_bytes", "pending_bytes", "lost_frames", "device_dropped", "lost_samples", "reboots", "unknown_frames", "reconnects", "sample_rate_hz", "frame_rate_hz", "latency_p50_s", "latency_p99_s", "clock_skew_ppm", "clock_residual_s", "clock_window_s", "journal_sequence", "durable_sequence", "gnss_good", "gnss_bad", "damage", "published_sequence", "published_durable", "refused", "stops", "stopped_s", "clock_offset_s")
     class DamageEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -231,6 +231,9 @@ class LinkStatus(_message.Message):
     PUBLISHED_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     PUBLISHED_DURABLE_FIELD_NUMBER: _ClassVar[int]
     REFUSED_FIELD_NUMBER: _ClassVar[int]
+    STOPS_FIELD_NUMBER: _ClassVar[int]
+    STOPPED_S_FIELD_NUMBER: _ClassVar[int]
+    CLOCK_OFFSET_S_FIELD_NUMBER: _ClassVar[int]
     header: Header
     connected: bool
     port: str
@@ -262,7 +265,10 @@ class LinkStatus(_message.Message):
     published_sequence: int
     published_durable: int
     refused: _containers.ScalarMap[str, int]
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., connected: _Optional[bool] = ..., port: _Optional[str] = ..., message: _Optional[str] = ..., bytes_in: _Optional[int] = ..., good_frames: _Optional[int] = ..., good_bytes: _Optional[int] = ..., bad_chunks: _Optional[int] = ..., bad_bytes: _Optional[int] = ..., pending_bytes: _Optional[int] = ..., lost_frames: _Optional[int] = ..., device_dropped: _Optional[int] = ..., lost_samples: _Optional[int] = ..., reboots: _Optional[int] = ..., unknown_frames: _Optional[int] = ..., reconnects: _Optional[int] = ..., sample_rate_hz: _Optional[float] = ..., frame_rate_hz: _Optional[float] = ..., latency_p50_s: _Optional[float] = ..., latency_p99_s: _Optional[float] = ..., clock_skew_ppm: _Optional[float] = ..., clock_residual_s: _Optional[float] = ..., clock_window_s: _Optional[float] = ..., journal_sequence: _Optional[int] = ..., durable_sequence: _Optional[int] = ..., gnss_good: _Optional[int] = ..., gnss_bad: _Optional[int] = ..., damage: _Optional[_Mapping[str, int]] = ..., published_sequence: _Optional[int] = ..., published_durable: _Optional[int] = ..., refused: _Optional[_Mapping[str, int]] = ...) -> None: ...
+    stops: int
+    stopped_s: float
+    clock_offset_s: float
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., connected: _Optional[bool] = ..., port: _Optional[str] = ..., message: _Optional[str] = ..., bytes_in: _Optional[int] = ..., good_frames: _Optional[int] = ..., good_bytes: _Optional[int] = ..., bad_chunks: _Optional[int] = ..., bad_bytes: _Optional[int] = ..., pending_bytes: _Optional[int] = ..., lost_frames: _Optional[int] = ..., device_dropped: _Optional[int] = ..., lost_samples: _Optional[int] = ..., reboots: _Optional[int] = ..., unknown_frames: _Optional[int] = ..., reconnects: _Optional[int] = ..., sample_rate_hz: _Optional[float] = ..., frame_rate_hz: _Optional[float] = ..., latency_p50_s: _Optional[float] = ..., latency_p99_s: _Optional[float] = ..., clock_skew_ppm: _Optional[float] = ..., clock_residual_s: _Optional[float] = ..., clock_window_s: _Optional[float] = ..., journal_sequence: _Optional[int] = ..., durable_sequence: _Optional[int] = ..., gnss_good: _Optional[int] = ..., gnss_bad: _Optional[int] = ..., damage: _Optional[_Mapping[str, int]] = ..., published_sequence: _Optional[int] = ..., published_durable: _Optional[int] = ..., refused: _Optional[_Mapping[str, int]] = ..., stops: _Optional[int] = ..., stopped_s: _Optional[float] = ..., clock_offset_s: _Optional[float] = ...) -> None: ...
 
 class BoardInfo(_message.Message):
     __slots__ = ("header", "board_id", "uid", "firmware", "axes", "sample_period_s", "status", "faults")
@@ -983,7 +989,7 @@ class RecorderCommand(_message.Message):
     def __init__(self, action: _Optional[_Union[RecorderCommand.Action, str]] = ..., name: _Optional[str] = ..., note: _Optional[str] = ..., user: _Optional[str] = ...) -> None: ...
 
 class RecorderStatus(_message.Message):
-    __slots__ = ("header", "recording", "session", "seconds", "messages", "bytes", "durable_messages", "message", "lost", "repaired", "repairing", "refused")
+    __slots__ = ("header", "recording", "session", "seconds", "messages", "bytes", "durable_messages", "message", "lost", "repaired", "repairing", "refused", "clock_steps", "clock_offset_s")
     class LostEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -1017,6 +1023,8 @@ class RecorderStatus(_message.Message):
     REPAIRED_FIELD_NUMBER: _ClassVar[int]
     REPAIRING_FIELD_NUMBER: _ClassVar[int]
     REFUSED_FIELD_NUMBER: _ClassVar[int]
+    CLOCK_STEPS_FIELD_NUMBER: _ClassVar[int]
+    CLOCK_OFFSET_S_FIELD_NUMBER: _ClassVar[int]
     header: Header
     recording: bool
     session: str
@@ -1029,7 +1037,9 @@ class RecorderStatus(_message.Message):
     repaired: _containers.ScalarMap[str, int]
     repairing: int
     refused: _containers.ScalarMap[str, int]
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., recording: _Optional[bool] = ..., session: _Optional[str] = ..., seconds: _Optional[float] = ..., messages: _Optional[int] = ..., bytes: _Optional[int] = ..., durable_messages: _Optional[int] = ..., message: _Optional[str] = ..., lost: _Optional[_Mapping[str, int]] = ..., repaired: _Optional[_Mapping[str, int]] = ..., repairing: _Optional[int] = ..., refused: _Optional[_Mapping[str, int]] = ...) -> None: ...
+    clock_steps: int
+    clock_offset_s: float
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., recording: _Optional[bool] = ..., session: _Optional[str] = ..., seconds: _Optional[float] = ..., messages: _Optional[int] = ..., bytes: _Optional[int] = ..., durable_messages: _Optional[int] = ..., message: _Optional[str] = ..., lost: _Optional[_Mapping[str, int]] = ..., repaired: _Optional[_Mapping[str, int]] = ..., repairing: _Optional[int] = ..., refused: _Optional[_Mapping[str, int]] = ..., clock_steps: _Optional[int] = ..., clock_offset_s: _Optional[float] = ...) -> None: ...
 
 class HistoryQuery(_message.Message):
     __slots__ = ("topics", "of", "after_run", "after_sequence", "until_run", "until_sequence", "from_utc_ns", "until_utc_ns", "position", "max_bytes", "until_of", "every_s")

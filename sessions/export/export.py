@@ -41,8 +41,9 @@ from sessions.export.table import (
 )
 from sessions.export.track import write_gpx, write_kml
 from sessions.recording.mcap_append import McapLog
-from sessions.recording.mcap_log import Recorded, read
+from sessions.recording.mcap_log import Recorded
 from sessions.recording.samples import decode
+from sessions.recording.timeline import straight
 
 RATE_ESTIMATE: Topic = replace(RATE, type=pb.RateEstimate)  # one sample of a batch
 ROW_GROUP = 20_000  # rows of Parquet written at once
@@ -175,7 +176,7 @@ def to_mcap(
     start = None
     with target.open("wb") as stream:
         log = McapLog(stream.fileno(), 128 * 1024)
-        for row in read(path):
+        for row in straight(path):
             start = row.log_ns if start is None else start
             topic = parse(row.key).topic
             if (

@@ -24,6 +24,7 @@ from messages.history.mending_state import Question
 from messages.text import plain
 from sessions.recording.intake import Entry, Intake
 from sessions.recording.manifest import SESSION_NAME, Manifest
+from sessions.recording.session_clock import SessionClock
 from sessions.recording.settings import RecorderSettings
 from sessions.recording.store import SessionStore, start
 
@@ -59,6 +60,7 @@ class Recorder:
         self._orders: deque[Order] = deque()
         self._ask = ask
         self._fresh = True
+        self._clock = SessionClock()
         self._bytes_in = self._bytes_out = 0  # of the inbox: counted each by one thread
         self._door = self._new_door()
         self._intake = Intake(bus.prefix, None, 0, self._door)
@@ -85,7 +87,7 @@ class Recorder:
             self._overflow += 1
             return
         self._bytes_in += size
-        self._inbox.append((time.time_ns(), str(sample.key_expr), sample.payload.to_bytes()))
+        self._inbox.append((self._clock.now_ns(), str(sample.key_expr), sample.payload.to_bytes()))
 
     def on_order(self, order: Order) -> None:
         """Zenoh's thread: keep the order for the loop."""
@@ -114,6 +116,7 @@ class Recorder:
     def step(self) -> None:
         """Write what came in, answer orders, close a chunk when it is time."""
         self.wake.clear()
+        self._clock.look(self._store.manifest if self._store is not None else None)
         self._auto_start()
         self._drain()
         while self._orders:
@@ -173,9 +176,12 @@ class Recorder:
         """Start a session; on refusal say why in the status and, with auto_start, try again
         later.
         """
+        if self._fresh and not self._inbox:
+            self._clock.begin()
         try:
             store = start(
                 self.settings,
+                self._clock.now_ns(),
                 name=name,
                 note=note,
                 user=user,
@@ -196,7 +202,11 @@ class Recorder:
         if self._fresh:  # a file that only goes on keeps what is known of the streams
             self._door = self._new_door()
             self._intake = Intake(
-                self.bus.prefix, self._ask, store.manifest.start_utc_ns, self._door
+                self.bus.prefix,
+                self._ask,
+                store.manifest.start_utc_ns,
+                self._door,
+                self._clock.now_ns,
             )
         self._fresh = True
         self._store, self._recording = store, True
@@ -291,8 +301,12 @@ class Recorder:
         status.CopyFrom(self._describe(self._store) if self._store else self._last)
         status.recording = self._store is not None
         status.header.device = RECORDER
-        status.header.utc_ns = time.time_ns()
+        status.header.utc_ns = self._clock.now_ns()
         status.message = (self._store.error if self._store else "") or self._message
+        if self._store is not None:
+            steps = self._store.manifest.clock_steps
+            status.clock_steps = len(steps)
+            status.clock_offset_s = sum(step.step_s for step in steps)
         return status
 
     def _describe(self, store: SessionStore) -> pb.RecorderStatus:

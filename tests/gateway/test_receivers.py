@@ -288,6 +288,18 @@ def test_a_late_read_is_no_step():
     )
 
 
+def test_an_epoch_that_is_left_out_lends_nobody_its_arrival():
+    """A receiver that speaks both: where NMEA leads no more, UBX must not come a period early."""
+    link = GnssLink()
+    stream = [(1.0 + k, sentence(rmc(at(k)))) for k in range(4)]
+    stream += [(4.2 + 0.2 * k, nav_pvt(T0 + 3.2 + 0.2 * k)) for k in range(20)]
+    for arrival in (a for t, data in stream for a in link.feed(data, round(t * 1e6), None, 0)):
+        if arrival.fix.tow_ns is not None:
+            assert arrival.device_us / 1e6 == pytest.approx(
+                arrival.fix.fix_utc_ns / 1e9 - T0 + 1.0, abs=1e-3
+            )
+
+
 def test_the_week_of_gps_begins_again():
     link = GnssLink()
     start = 1718495982 - 10  # ten seconds before Sunday 2024-06-16 00:00 of GPS

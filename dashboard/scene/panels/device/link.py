@@ -47,10 +47,11 @@ class Link(Panel):
             ("GNSS good · bad", f"{m.gnss_good} · {m.gnss_bad}"),
         ]
         content = rows(items, s.stale("link"))
-        if m.damage:
-            reasons = sorted(m.damage.items(), key=lambda item: -item[1])
-            content += '<p class="gf-title">Damage by reason</p>'
-            content += rows([(escape(reason), number(count, 0)) for reason, count in reasons])
+        for title, counts in (("Left out, by reason", m.refused), ("Damage by reason", m.damage)):
+            if counts:
+                reasons = sorted(counts.items(), key=lambda item: -item[1])
+                content += f'<p class="gf-title">{title}</p>'
+                content += rows([(escape(reason), number(count, 0)) for reason, count in reasons])
         if m.message:
             content = f'<p class="gf-alert">{escape(m.message)}</p>' + content
         self._table = self.html(content, self._table)

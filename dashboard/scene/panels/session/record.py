@@ -71,9 +71,17 @@ class Record:
                 )
             )
             items.append(("size", number(m.bytes / 1e6, 1, "MB")))
+        if m.clock_steps:
+            text = (
+                f"set {m.clock_steps} times, {m.clock_offset_s:+,.1f} s in all; times go on without"
+            )
+            items.append(("wall clock", f'<b class="gf-bad">{text}</b>'))
         lost = sum(m.lost.values())
         if lost:
             items.append(("lost on the bus", f'<b class="gf-bad">{number(lost, 0)} messages</b>'))
+        if m.refused:
+            kinds = ", ".join(f"{kind} {n}" for kind, n in sorted(m.refused.items()))
+            items.append(("refused on the bus", f'<b class="gf-bad">{escape(kinds)}</b>'))
         alert = f'<p class="gf-alert">{escape(m.message)}</p>' if m.message else ""
         return alert + rows(items, stale)
 
