@@ -13,6 +13,7 @@ from inertial.attitude.filters import ATTITUDES
 from inertial.timing import Timing
 from logs.attitude_log import Trial, read_trials
 from logs.sheet import LogError
+from messages.text import drawn
 
 Array = NDArray[np.float64]
 
@@ -154,7 +155,7 @@ def _draw(
                 color=colour,
                 label=f"{name}: {rms:.2f}° RMS",
             )
-        axis.set_title(trial.name, fontsize=9, loc="left")
+        axis.set_title(drawn(trial.name), fontsize=9, loc="left")
         axis.set_ylabel("inclination error, °")
         axis.grid(True, which="major", alpha=0.3)
         axis.legend(fontsize=8, loc="upper right")
