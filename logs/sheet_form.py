@@ -17,6 +17,12 @@ class LogError(ValueError):
     """A log that cannot be used; names file, line and column, and says what was wanted."""
 
 
+def printable(text: str, most: int = 60) -> str:
+    """Words of a file as a message may show them: no control characters, not too long."""
+    shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text[:most])
+    return shown + (" ..." if len(text) > most else "")
+
+
 def header_line(lines: Sequence[str]) -> int:
     """Number of the first line that is neither empty nor a comment; 0 without one."""
     texts = (line.strip() for line in lines)
