@@ -77,14 +77,18 @@ Measurement Watch::mean(int window, int ago) const {
 }
 
 // Chi-square of the mean [omega', c] of the window against the reference (E-21).
-double Watch::moved(const Sensor& s, int window, double drift) const {
+double Watch::moved(const Sensor& s, const StillLimits& c, int window) const {
+  const double drift = c.drift;
   const double share = 1.0 / window + 1.0 / learnt;
   const Measurement all = mean(window) - reference;
+  // scale errors of a body that stands another way up: over the variance of one sample of an axis
+  const double noise = s.R_alpha(0, 0) / s.drift(0, 0);
+  const double leant = square(c.scale) * square_of(Vector3(all.segment<3>(FORCE_M))) / noise;
   double chi2 = 0.0;
   for (int k = 0; k < s.spread.size(); ++k) {
     double along = 0.0;
     for (int r = 0; r < PRODUCTS_M + s.m; ++r) along += s.basis(k, r) * all(r);
-    chi2 += along * along / (s.spread(k) * share + drift * drift);
+    chi2 += along * along / (s.spread(k) * (share + leant) + drift * drift);
   }
   return chi2;
 }
@@ -173,8 +177,8 @@ bool Watch::stands(const Sensor& s, const StillLimits& c, const Vector3& omega, 
   const double told = rate_excludes_zero(omega, P, c.rate_slack);
   const bool slow = told < c.rate_limit;
   if (!settled(s, c, omega, P, told)) return restless();
-  if (learnt == 0 || (moved(s, c.window, c.drift) <= c.quiet_limit &&
-                      moved(s, c.short_window, c.drift) <= c.quiet_limit)) {
+  if (learnt == 0 || (moved(s, c, c.window) <= c.quiet_limit &&
+                      moved(s, c, c.short_window) <= c.quiet_limit)) {
     ++quiet_for;
     slow_for = 0;
     return slow || quiet_for * dt >= c.patience_s;

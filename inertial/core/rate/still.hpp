@@ -10,7 +10,7 @@ namespace gyrofree::rate {
 struct StillLimits {
   double spread_limit, quiet_limit, turn_limit, tilt_limit, steady_limit, drift_steady;
   double rate_limit, rate_slack, sure_rate, likely_rate, begin_limit, patience_s;
-  double drift, drift_now, drift_tilt;
+  double drift, drift_now, drift_tilt, scale;
   int window, short_window, steady_span, brief_span, guard, hold;
 };
 
@@ -49,7 +49,7 @@ class Watch {
  private:
   double scatter(const Sensor& s, int window);
   Measurement mean(int window, int ago = 0) const;
-  double moved(const Sensor& s, int window, double drift) const;
+  double moved(const Sensor& s, const StillLimits& c, int window) const;
   double turned(const Sensor& s, int length, double drift) const;
   double tilted(const Sensor& s, int window, double drift) const;
   double swung(const Sensor& s, const StillLimits& c, int span) const;
