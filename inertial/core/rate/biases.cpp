@@ -80,7 +80,9 @@ void add_to_biases(Covariance& P, const Matrix<MEASURED>& D, double factor) {
 // A scale error e of an axis is a bias e (f - f at the last standstill): it comes and goes with the
 // readings. So what is known of a bias beyond that at rest, and its deviation, follow the readings up
 // and down again. Beside it every bias walks.
-void grow_biases(Filter& f, const Sensor& s, const Tuning& t, double seconds, bool turning) {
+void grow_biases(Filter& f, const Sensor& s, const Tuning& t, const Moment& moment) {
+  const double seconds = moment.grow;
+  const bool turning = moment.turning;
   const Vector<MOST_AXES> away = away_from_rest(f, s, t, turning);
   if (!turning) {
     for (int k = 0; k < MEASURED; ++k) {
@@ -100,7 +102,7 @@ void grow_biases(Filter& f, const Sensor& s, const Tuning& t, double seconds, bo
     f.x(b) = f.rest_bias(k) + follow(b) * (f.x(b) - f.rest_bias(k));
   }
   for (int j = 0; j < STATES; ++j) f.P.col(j) = f.P.col(j).cwiseProduct(follow * follow(j));
-  add_to_biases(f.P, s.drift, t.drift * seconds);
+  add_to_biases(f.P, s.drift, (t.drift + moment.wander) * seconds);
   if (turning) swing_biases(f, s, t, seconds);
 }
 

@@ -181,7 +181,7 @@ void Frame::run(const Constants& c, long first, long now, bool fixed, const Stat
     Vector3 at;
     if (end != nullptr) at = back(*end, watch_.total(now), watch_.total(sample), now - sample, dt_);
     const Moment moment{watch_.dt(sample), !still_, fixed, eighth ? EVERY * dt_ : 0.0, end == nullptr ? nullptr : &at,
-                        agreement_.forgetting()};
+                        agreement_.forgetting(), watch_.wander()};
     step(first_.filter, c.sensor, c.tuning, watch_.y(sample), moment, said_);
     if (branches_ == 2) step(second_.filter, c.sensor, c.tuning, watch_.y(sample), moment, other_said_);
   }

@@ -3,6 +3,7 @@
 // tests/support/still_twin.py.
 #pragma once
 
+#include "rate/drift.hpp"
 #include "rate/noise.hpp"
 
 namespace gyrofree::rate {
@@ -43,6 +44,8 @@ class Watch {
   // Sum of all y up to a sample of the last 256, but for a constant.
   Measurement total(long sample) const { return ring_total.col((sample + TOTALS) % TOTALS); }
   Measurement mean_of(int window) const;
+  // (m/s^2)^2 per s, by which biases of one axis wander more than is configured.
+  double wander() const { return 2.0 * walk.variance() * std::clamp(seconds - settled_s, 2.0, 20.0); }
   Noise& noise() { return measured; }
   const Noise& noise() const { return measured; }
 
@@ -57,7 +60,9 @@ class Watch {
   int began(const Sensor& s, const StillLimits& c) const;
   bool stands(const Sensor& s, const StillLimits& c, const Vector3& omega, const Matrix3& P, double dt);
   bool restless();
-  void learn(const StillLimits& c);
+  double leant(const Sensor& s, const StillLimits& c, const Measurement& d) const;
+  double axis_noise(const Sensor& s) const { return s.R_alpha(0, 0) / s.drift(0, 0); }
+  void learn(const Sensor& s, const StillLimits& c);
 
   Matrix<MEASURED, DEPTH> ring_y = Matrix<MEASURED, DEPTH>::Zero();
   Matrix<MEASURED, TOTALS> ring_total = Matrix<MEASURED, TOTALS>::Zero();
@@ -67,6 +72,9 @@ class Watch {
   Measurement sum = Measurement::Zero();
   Measurement sum_of_squares = Measurement::Zero();
   Noise measured;
+  Drift walk;
+  double seconds = 0.0;    // of all samples
+  double settled_s = 0.0;  // when the reference was last learnt
   Measurement reference = Measurement::Zero();  // mean y of the last standstill
   Measurement gathered = Measurement::Zero();   // of this standstill without its newest samples
   long count = 0;       // samples taken
