@@ -111,6 +111,9 @@ def show(result: "Comparison") -> None:
     _show_differences(result)
     if result.tracks:
         _show_tracks(result)
+    for one in result.sessions:
+        for text in one.curves.said:
+            print(f"note: {one.curves.session}: {text}")
 
 
 def _show_offsets(result: "Comparison") -> None:

@@ -134,8 +134,7 @@ def compare_estimates(settings: Settings, path: Path, as_json: bool) -> int:
                 *(str(row[name]) for name in ("equal", "different", "missing", "first_difference")),
             )
         show_table(table)
-        if other:
-            print(other)
+        print(*filter(None, (f"recording: {result.damage}", result.others, other)), sep="\n")
         if not result.identical:
             reason = "an estimator began before the recording, or an input is missing"
             print(f"Estimates differ where {reason}: docs/recordings.md")

@@ -185,6 +185,8 @@ def verify(session: SessionId, as_json: AsJson = False, config: Config = None) -
             f"{session}: {found.state}; its hash {said}; {found.messages:,} messages readable;"
             f" {found.damage}"
         )
+        if found.others:
+            print(f"  {found.others}")
         print(f"  curves for drawing: {found.curves}")
         for key, text in found.differing.items():
             print(f"  {key}: {text}")

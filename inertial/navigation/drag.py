@@ -86,24 +86,28 @@ class DragWatch:
         """
         if fix.withheld or fix.v_n is None:
             return fix
+        return self._look(fix, fix.filled())
+
+    def _look(self, given: Fix, fix: Fix) -> Fix:
+        """fix: as given, with numbers for what is unknown."""
         last = self._last
         if last is not None and fix.t <= last.t:
-            return fix  # late, or twice
+            return given  # late, or twice
         if last is None or fix.t - last.t > self.settings.longest_gap:
             self._begin(fix)
-            return fix
+            return given
         if self._step(last, fix):
             self._contradicted = 0
         else:
             self._contradicted += 1
             if self._contradicted >= self.settings.jumps:
                 self._begin(fix)
-            return self._raised(fix) if self.dragging else fix
+            return self._raised(given) if self.dragging else given
         if self.statistic < self._calm:
             self._calm_since, self.dragging = fix.t, False
         elif self.statistic > self._gate and fix.t - self._began >= self.settings.patience:
             self.dragging = True
-        return self._raised(fix) if self.dragging else fix
+        return self._raised(given) if self.dragging else given
 
     def _raised(self, fix: Fix) -> Fix:
         """The sigma that is honest while the position drags: by as much as it may have walked

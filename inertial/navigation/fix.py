@@ -2,7 +2,8 @@
 it.
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,11 @@ Array = NDArray[np.float64]
 NONE, AUTONOMOUS, DIFFERENTIAL, RTK_FLOAT, RTK_FIXED, DEAD_RECKONING = range(
     6
 )  # GnssFix.Quality of the bus
+
+# What stands for a height or a vertical speed that a receiver does not give, where the mathematics
+# wants a number: nothing in the air or on the ground is further from it.
+UNKNOWN_HEIGHT_SIGMA = 1e4  # m, about the ellipsoid
+UNKNOWN_CLIMB_SIGMA = 100.0  # m/s, about level
 
 # 1-sigma north, east, up (m) and of velocity (m/s) by quality, for receivers that do not give their
 # own
@@ -35,11 +41,14 @@ class Fix:
     arrival: float  # s, when its first byte came
     latitude: float  # rad
     longitude: float  # rad
-    height: float  # m above the ellipsoid
+    height: float  # m above the ellipsoid; NaN: unknown
     quality: int
     sigma_p: Array  # (3,) m, north east up
-    v_n: Array | None = None  # (3,) m/s
+    v_n: Array | None = None  # (3,) m/s; down may be NaN: unknown
     sigma_v: Array | None = None  # (3,) m/s, with v_n
+    # m, 1-sigma of an offset that all its heights have alike: they are above sea level, and how
+    # far that is from the ellipsoid nobody said
+    datum: float = 0.0
     withheld: bool = False  # only to score the filter with
     muted: bool = False  # withheld, because an operator asked for an outage
     key: int = 0  # whatever the caller needs to know it by
@@ -56,6 +65,25 @@ class Fix:
         """(6,) as fix_residual takes it."""
         v = self.v_n if self.v_n is not None else np.zeros(3)
         return np.array([self.latitude, self.longitude, self.height, *v])
+
+    @property
+    def has_height(self) -> bool:
+        """Whether the receiver gives a height at all."""
+        return math.isfinite(self.height)
+
+    def filled(self) -> "Fix":
+        """With numbers, and sigmas that say that they mean nothing, for what is unknown: for those
+        who cannot leave a component out.
+        """
+        height, sigma_p = self.height, np.array(self.sigma_p)
+        if not self.has_height:
+            height, sigma_p[2] = 0.0, UNKNOWN_HEIGHT_SIGMA
+        if self.v_n is None or self.sigma_v is None:
+            return replace(self, height=height, sigma_p=sigma_p)
+        v_n, sigma_v = np.array(self.v_n), np.array(self.sigma_v)
+        if not math.isfinite(v_n[2]):
+            v_n[2], sigma_v[2] = 0.0, UNKNOWN_CLIMB_SIGMA
+        return replace(self, height=height, sigma_p=sigma_p, v_n=v_n, sigma_v=sigma_v)
 
 
 @dataclass(frozen=True)
@@ -89,8 +117,9 @@ class FixSettings:
         """Why this fix must not be used, in words; empty when it may."""
         if fix.quality in (NONE, DEAD_RECKONING):
             return "the receiver has no satellite fix"
+        whole = fix.filled()
         numbers = np.concatenate(
-            [fix.vector(), fix.sigma_p, fix.sigma_v if fix.sigma_v is not None else []]
+            [whole.vector(), whole.sigma_p, whole.sigma_v if whole.sigma_v is not None else []]
         )
         if not np.isfinite(numbers).all() or abs(fix.latitude) > np.pi / 2.0:
             return "not a position"
@@ -114,11 +143,14 @@ def typical_sigma(quality: int) -> tuple[Array, Array]:
 
 
 def core_fix(fix: Fix, settings: FixSettings) -> Any:
-    """The fix as the core's filters take it, its sigmas floored (E-31)."""
+    """The fix as the core's filters take it, its sigmas floored (E-31). A height or a vertical
+    speed that is unknown stays NaN: its row is silent.
+    """
     given: dict[str, Any] = {}
     if fix.v_n is not None:
         given |= {"has_v": True, "v_n": fix.v_n}
-        given |= {"sigma_v": np.maximum(fix.sigma_v, settings.floor_v)}
+        sigma_v = np.nan_to_num(fix.sigma_v, nan=1.0)  # of what is silent
+        given |= {"sigma_v": np.maximum(sigma_v, settings.floor_v)}
     if fix.yaw is not None:
         given |= {"has_yaw": True, "yaw": fix.yaw}
         given |= {"sigma_yaw": max(fix.sigma_yaw, settings.floor_yaw)}
@@ -127,7 +159,7 @@ def core_fix(fix: Fix, settings: FixSettings) -> Any:
         latitude=fix.latitude,
         longitude=fix.longitude,
         height=fix.height,
-        sigma_p=np.maximum(fix.sigma_p, settings.floor_p),
+        sigma_p=np.maximum(np.nan_to_num(fix.sigma_p, nan=1.0), settings.floor_p),
         withheld=fix.withheld,
         timing=settings.timing,
         **given,

@@ -27,13 +27,16 @@ from inertial.navigation.fix import Fix, core_fix
 from inertial.navigation.settings import NavigatorConfig
 from inertial.navigation.solution import (
     INNOVATIONS,
+    WHEELS,
     WITHHELD,
     Correction,
     HorizonChoice,
     Mode,
     Solution,
+    Wheels,
     correction_of,
     nothing_compared,
+    without_height,
 )
 from inertial.navigation.start import HEIGHT_UP, Startup, first_leg
 from inertial.rotation import from_matrix
@@ -63,10 +66,12 @@ class Navigator:
         )
         self._startup = Startup(config.alignment, self._live)
         self._pending: list[Fix] = []
+        self.wheels = Wheels.NONE
         self._how = ""
         self._last_fix: Fix | None = None
         self._last_used = -math.inf
-        self._origin: tuple[float, float, float] | None = None
+        self._origin: tuple[float, float, float] | None = None  # its height may be NaN: unknown
+        self._datum = 0.0
 
     @property
     def nominal(self) -> Any:
@@ -169,6 +174,8 @@ class Navigator:
         self.counts["dragged"] += fix.drag > 0.0
         if self._origin is None:
             self._origin = (fix.latitude, fix.longitude, fix.height)
+        elif fix.has_height and not math.isfinite(self._origin[2]):
+            self._origin = (*self._origin[:2], fix.height)
         if not self._live.navigating:
             return self._start(fix)
         if self._live.too_late(fix.t):
@@ -177,6 +184,7 @@ class Navigator:
             return self._refuse(nothing_compared(fix), "late", late)
         result = self._live.take(core_fix(fix, self.config.fix))
         said = correction_of(fix, result)
+        self._tell_wheels(result)
         if not said.accepted:
             count = "rejected" if result.status == results.REJECTED else "withheld"
             return self._refuse(said, count, said.reason)
@@ -184,6 +192,20 @@ class Navigator:
         self.horizon = said.horizon
         self._took(fix)
         return said
+
+    def _tell_wheels(self, result: Any) -> None:
+        self.wheels = Wheels(result.wheels)
+        if result.switched:
+            log.info("%s", WHEELS[self.wheels])
+
+    @property
+    def text(self) -> str:
+        """For people: what the alignment does or waits for; while navigating how it was found, and
+        what is believed of the vehicle.
+        """
+        if not self._live.navigating:
+            return self._startup.align.text
+        return "; ".join(part for part in (self._how, WHEELS[self.wheels]) if part)
 
     def _count(self, status: int) -> None:
         if status == results.READMITTED:
@@ -197,6 +219,8 @@ class Navigator:
     def _took(self, fix: Fix) -> None:
         self._last_fix = fix
         self._last_used = fix.t
+        if fix.has_height:
+            self._datum = fix.datum
         self.counts["used"] += 1
 
     def _refuse(self, said: Correction, count: str, reason: str) -> Correction:
@@ -207,9 +231,6 @@ class Navigator:
         """Before navigation: watch the speed, and start once the alignment knows the heading."""
         if fix.withheld:
             return self._refuse(nothing_compared(fix), "withheld", WITHHELD)
-        if fix.v_n is None:
-            self._took(fix)
-            return replace(nothing_compared(fix), reason="aligning: no velocity in the fix")
         start = self._startup.fix(fix)
         if start is not None:
             self._begin(start, fix)
@@ -221,6 +242,7 @@ class Navigator:
         leg = first_leg(self.config, self.filter, start, fix)
         self._live.begin(leg, self.filter.memory(leg.P, self._startup.still_f))
         self._how = start.how
+        self.wheels = Wheels.ON_TRIAL if self._live.memory.trial.running else Wheels.NONE
         self.mode = Mode.NAVIGATING
 
     # -- output
@@ -233,11 +255,11 @@ class Navigator:
             return self._waiting_solution(t)
         x, P = self.nominal, self.covariance()
         place = (x.latitude, x.longitude, x.height)
-        return Solution(
+        solution = Solution(
             t,
             self.mode,
             *place,
-            np.array(ned_between(self._origin, place)),
+            np.array(ned_between(self._known_origin(), place)),
             x.v_n,
             from_matrix(x.C_nb),
             x.bias_accel,
@@ -247,8 +269,17 @@ class Navigator:
             self._origin,
             t - self._last_used,
             self.horizon,
-            self._how,
+            self._datum,
+            self.text,
         )
+        return without_height(solution)
+
+    def _known_origin(self) -> tuple[float, float, float]:
+        """The origin to count from; at height 0 as long as no fix had one."""
+        if self._origin is None:
+            return 0.0, 0.0, 0.0
+        north, east, height = self._origin
+        return north, east, height if math.isfinite(height) else 0.0
 
     def _waiting_solution(self, t: float) -> Solution:
         c, fix, align = self.config, self._last_fix, self._startup.align
@@ -256,6 +287,7 @@ class Navigator:
         v, where = np.zeros(3), (0.0, 0.0, 0.0)
         sigma_p, sigma_v = np.full(3, 1e7), np.full(3, 100.0)
         if fix is not None:
+            fix = fix.filled()
             where, sigma_p = (fix.latitude, fix.longitude, fix.height), fix.sigma_p
             if fix.v_n is not None:
                 # 2 m/s^2: how fast a car changes its mind
@@ -263,23 +295,24 @@ class Navigator:
             sigma_p = sigma_p + (np.abs(v) + 1.0) * age
         tilt = c.sigma_tilt if align.levelled else math.pi
         biases = [c.sigma_bias_accel] * 3 + [c.sigma_bias_gyro] * 3
-        origin = self._origin or (0.0, 0.0, 0.0)
-        return Solution(
+        solution = Solution(
             t,
             self.mode,
             *where,
-            np.array(ned_between(origin, where)),
+            np.array(ned_between(self._known_origin(), where)),
             v,
             from_matrix(align.C),
             np.zeros(3),
             align.gyro_bias,
             np.concatenate([[tilt, tilt, math.pi], sigma_v, sigma_p, biases]),
             np.diag(sigma_p**2),
-            origin,
+            self._origin or (0.0, 0.0, 0.0),
             age,
             None,
+            self._datum,
             align.text,
         )
+        return without_height(solution)
 
 
 def _maker(name: str) -> Callable[..., Navigator]:

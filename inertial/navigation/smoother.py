@@ -93,6 +93,7 @@ def smooth_drive(
         ]
     left = table["left"].copy()
     left[[fix.v_n is None for fix in used], 3:6] = np.nan
+    left[[not fix.has_height for fix in used], 2] = np.nan
     return SmoothRun(
         name,
         used,

@@ -1,7 +1,7 @@
 """What a navigation filter says: its solution at a sample, and its verdict on a fix."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Any
 
@@ -22,6 +22,8 @@ INNOVATIONS = (
     "velocity D m/s",
 )
 HEADING = "heading rad"
+HEIGHT_STATE = 8  # of sigma
+NO_HEIGHT_SIGMA = 1000.0  # m, from which on a height is none
 WITHHELD = "withheld to score the filter"
 MUTED = "muted by an operator"
 
@@ -33,6 +35,23 @@ class Mode(IntEnum):
     LEVELLING = 1
     COURSE = 2
     NAVIGATING = 3
+
+
+class Wheels(IntEnum):
+    """What a filter believes of a car's wheels, as Wheels of the core."""
+
+    NONE = 0
+    ON_TRIAL = 1
+    BELIEVED = 2
+    CONTRADICTED = 3
+
+
+WHEELS = {
+    Wheels.NONE: "",
+    Wheels.ON_TRIAL: "wheels on trial, not used: it may be no car",
+    Wheels.BELIEVED: "wheels believed: the fixes agree with a car that does not slide",
+    Wheels.CONTRADICTED: "wheels not used: the fixes contradict a car that does not slide",
+}
 
 
 @dataclass(frozen=True)
@@ -51,7 +70,8 @@ class Correction:
     """What one fix said, and what was done with it."""
 
     fix: Fix
-    # (m,) computed - measured: position NE and height m, v_n m/s, heading rad; empty: not compared
+    # (m,) computed - measured: position NE and height m, v_n m/s, heading rad; empty: not compared,
+    # NaN: the fix does not have it
     values: Array
     sigma: Array  # (m,) of values as the filter expects them
     nis: float
@@ -99,7 +119,8 @@ def correction_of(fix: Fix, said: Any) -> Correction:
     weight = float(said.weight.min())
     reason = ""
     if status == results.REJECTED:
-        reason, weight = f"NIS {said.nis:.0f} of {m}", 0.0
+        compared = int(np.isfinite(said.y[:m]).sum())
+        reason, weight = f"NIS {said.nis:.0f} of {compared}", 0.0
     elif status == results.WITHHELD:
         reason, weight = MUTED if fix.muted else WITHHELD, 0.0
     elif weight < 1.0:
@@ -110,6 +131,9 @@ def correction_of(fix: Fix, said: Any) -> Correction:
             f" {max(fix.sigma_p[:2]):.0f} m"
         )
         reason = f"{drag}; {reason}" if reason else drag
+    if said.switched:
+        now = WHEELS[Wheels(said.wheels)]
+        reason = f"{reason}; {now}" if reason else now
     horizon = None
     if said.horizon > 0:
         force, rate = said.inputs.tolist()
@@ -139,8 +163,8 @@ class Solution:
     mode: Mode
     latitude: float  # rad
     longitude: float  # rad
-    height: float  # m
-    p_ned: Array  # (3,) m from origin
+    height: float  # m; NaN: unknown, no fix had one
+    p_ned: Array  # (3,) m from origin; down NaN where the height is
     v_n: Array  # (3,) m/s
     q_nb: Array  # (4,)
     bias_f_b: Array  # (3,) m/s^2
@@ -150,4 +174,22 @@ class Solution:
     origin: tuple[float, float, float]  # rad, rad, m: the first fix
     fix_age: float  # s since the last fix used; infinite before the first
     horizon: HorizonChoice | None = None  # of the last fix; None for filters without one
+    # m, 1-sigma of the height of the ellipsoid against the sea level that height counts from; it is
+    # in sigma. 0: height is above the ellipsoid
+    datum: float = 0.0
     alignment: str = ""  # for people: what the alignment does or waits for, how it was found
+
+
+def without_height(solution: Solution) -> Solution:
+    """Says what is not known: a height whose sigma is that of not knowing is none, and one that
+    counts from sea level is no better than the geoid.
+    """
+    s = solution
+    if s.datum:
+        sigma, covariance = s.sigma.copy(), s.position_covariance.copy()
+        sigma[HEIGHT_STATE] = math.hypot(sigma[HEIGHT_STATE], s.datum)
+        covariance[2, 2] += s.datum**2
+        s = replace(s, sigma=sigma, position_covariance=covariance)
+    if s.sigma[HEIGHT_STATE] < NO_HEIGHT_SIGMA:
+        return s
+    return replace(s, height=math.nan, p_ned=np.array([s.p_ned[0], s.p_ned[1], math.nan]))

@@ -11,7 +11,9 @@ from typing import TypeVar
 
 from google.protobuf.message import DecodeError, Message
 
+from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import MESSAGE_BYTES, Refusal, check
+from messages.contract.header import first_field
 from messages.contract.topics import Address, Topic, TopicError, parse
 from messages.text import plain
 
@@ -60,6 +62,11 @@ class Door:
         with self._lock:
             return dict(self.refused)
 
+    def by_device(self) -> dict[str, dict[str, int]]:
+        """What was refused, by device and kind; OTHERS: of devices that are none."""
+        with self._lock:
+            return {device: dict(counts) for device, counts in self._by_device.items()}
+
     def address(self, key: str) -> Address | None:
         """A key taken apart; None, and counted, for one that may not be."""
         if key in self._addresses:
@@ -80,7 +87,7 @@ class Door:
         """Whether a message of so many bytes may be looked at: its size, and how many there are."""
         device, stream = address.device, (address.device, address.topic.name, address.estimator)
         if size > MESSAGE_BYTES:
-            refusal = Refusal("size", "message", f"{size} bytes long", f"at most {MESSAGE_BYTES}")
+            refusal = _size(size)
         elif stream in self._streams:
             return True
         elif device not in self._inside and len(self._inside) >= self._most_devices:
@@ -96,10 +103,23 @@ class Door:
         self.refuse(key, refusal, device)
         return False
 
+    def too_large(self, key: str, size: int) -> None:
+        """A message whose bytes were not even fetched."""
+        self.refuse(key, _size(size), device_of(key))
+
     def forget(self, device: str) -> None:
         """A device is gone: there is room for another."""
         self._inside.discard(device)
         self._streams = {stream for stream in self._streams if stream[0] != device}
+
+    def header(self, address: Address, payload: bytes, key: str) -> bool:
+        """Whether the header in front of a message may be believed; of the rest nothing is looked
+        at. One that cannot be read is passed on: whoever takes the message counts it.
+        """
+        refusal = wrong_header(address.topic, payload, address.device)
+        if refusal is not None:
+            self.refuse(key, refusal, address.device)
+        return refusal is None
 
     def message(self, address: Address, payload: bytes, key: str = "") -> Message | None:
         """The message in these bytes; None, and counted, for one that the contract does not allow,
@@ -111,11 +131,40 @@ class Door:
         return found
 
 
+def device_of(key: str) -> str:
+    """The device that a key is about; OTHERS where it names none."""
+    try:
+        return parse(key).device
+    except TopicError:
+        return OTHERS
+
+
+def _size(size: int) -> Refusal:
+    return Refusal("size", "message", f"{size} bytes long", f"at most {MESSAGE_BYTES}")
+
+
+def wrong_header(topic: Topic, payload: bytes, device: str) -> Refusal | None:
+    """What is wrong with the header in front of a message; None when nothing is, or nothing can be
+    read.
+    """
+    if "header" not in topic.type.DESCRIPTOR.fields_by_name:
+        return None
+    try:
+        header = pb.Header.FromString(first_field(payload))
+    except (DecodeError, ValueError):
+        return None
+    wrong = check(header)
+    if wrong:
+        return wrong[0]._replace(field=f"header.{wrong[0].field}")
+    if header.device and header.device != device:
+        return Refusal("device", "header.device", header.device, device)
+    return None
+
+
 def read(topic: Topic[M], payload: bytes, device: str = "") -> tuple[M | None, Refusal | None]:
     """The message in these bytes, or why it is not taken; `device`: of the key it came on."""
     if len(payload) > MESSAGE_BYTES:
-        found = f"{len(payload)} bytes long"
-        return None, Refusal("size", "message", found, f"at most {MESSAGE_BYTES}")
+        return None, _size(len(payload))
     message = topic.type()
     try:
         message.ParseFromString(payload)

@@ -14,12 +14,15 @@ import zenoh
 from google.protobuf.message import DecodeError
 
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import published_key
+from messages.contract.checks import check
+from messages.contract.topics import TopicError, published_key
 from messages.history.spool import REPLY_BYTES, Spool
 
 log = logging.getLogger(__name__)
 
 ANSWER_S = 10.0  # an answer is a MB from the disk; a busy machine takes its time
+MOST_BYTES = 8 << 20  # of messages in one reply that we give, however much is asked for
+MOST_REPLY_BYTES = 32 << 20  # of one reply that we read
 LEAST_BYTES = 1 << 15  # of an answer that a busier machine is asked for
 
 
@@ -35,22 +38,25 @@ def declare(
         asked = str(query.key_expr).split("/")
         about = device if device != "*" or len(asked) != 4 else asked[1]
         try:
+            key = mine
+            if device == "*":
+                key = published_key(prefix, about if about != "*" else source, source)
             question = pb.HistoryQuery.FromString(
                 query.payload.to_bytes() if query.payload is not None else b""
             )
-        except DecodeError:
-            query.reply_err(b"the payload is no HistoryQuery")
+        except (DecodeError, TopicError):
+            query.reply_err(b"want a HistoryQuery about a device")
             return
+        wrong = check(question)
+        if wrong:
+            query.reply_err(f"history: {wrong[0]}".encode())
+            return
+        question.max_bytes = min(question.max_bytes, MOST_BYTES)
         try:
             reply = spool.answer(question, about)
         except OSError as error:
             query.reply_err(f"history: {error}".encode())
             return
-        key = (
-            published_key(prefix, about if about != "*" else source, source)
-            if device == "*"
-            else mine
-        )
         query.reply(key, reply.SerializeToString())
 
     return session.declare_queryable(mine, on_query)
@@ -81,7 +87,10 @@ def ask(
                 reply.err.payload.to_bytes().decode(errors="replace")[:200],
             )
             continue
+        size = len(reply.ok.payload)
         try:
+            if size > MOST_REPLY_BYTES:
+                raise DecodeError(f"{size} bytes, want at most {MOST_REPLY_BYTES}")
             answer = pb.HistoryReply.FromString(reply.ok.payload.to_bytes())
         except DecodeError as error:
             log.warning("history of %s: %s", device, error)

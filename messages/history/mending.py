@@ -17,12 +17,25 @@ from collections import deque
 from collections.abc import Callable
 
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.checks import Refusal
 from messages.contract.topics import BY_NAME, REPLAY_SUFFIX, Topic
-from messages.history.mending_state import Arrival, KeyState, Question, Stream, header_of, take_out
+from messages.history.mending_state import (
+    FARTHEST,
+    MOST_REPLIES,
+    Arrival,
+    KeyState,
+    Question,
+    Stream,
+    header_of,
+    take_out,
+    wrong_item,
+)
 
 log = logging.getLogger(__name__)
 
 MAX_HELD = 60_000
+MAX_HELD_BYTES = 128 << 20  # of one stream
+MOST_WAITING = 1000  # questions of a stream, gaps of a topic
 REMEMBERED = 4096  # payloads without a header: the newest are recognised when they come again
 
 
@@ -40,10 +53,12 @@ class Mender:
         topics: tuple[Topic, ...] = (),
         sources: tuple[str, ...] = ("gateway", "estimator"),
         since_ns: int = 0,
+        refuse: Callable[[str, Refusal, str], None] | None = None,
     ) -> None:
         """`topics` limits what is asked for; none: everything. A run that began after `since_ns` is
-        wanted whole.
+        wanted whole. `refuse(key, why, device)` is told what of an answer is not taken.
         """
+        self._refuse = refuse or _say
         self._ask, self._hold, self._max_held = ask, hold, max_held
         self._topics, self._sources, self._since_ns = topics, sources, since_ns
         self._keys: dict[tuple[str, str], KeyState] = {}
@@ -84,14 +99,13 @@ class Mender:
             return [arrival]
         stream = self._streams.setdefault((arrival.device, arrival.topic.source), Stream())
         if self._hold and stream.asking:
-            if len(stream.held) < self._max_held:
-                stream.held.append(arrival)
+            if stream.hold(arrival, self._max_held, MAX_HELD_BYTES):
                 return []
             if not stream.full:
                 log.warning(
                     "%s: %d messages wait; newer ones are asked for later",
                     arrival.device,
-                    self._max_held,
+                    len(stream.held),
                 )
             stream.full = True
             return []
@@ -101,18 +115,23 @@ class Mender:
         """The publisher's answer (None: there is none); what can be given on now, in order."""
         stream = self._streams.setdefault(question.stream, Stream())
         out: list[Arrival] = []
+        about = "/".join(question.stream)
         for item in reply.items if reply is not None else ():
+            refusal = wrong_item(question.stream[0], item)
+            if refusal is not None:
+                self._refuse(f"answer about {about}", refusal, question.stream[0])
+                continue
             skipped = self._skipped(stream, question, item)
             if skipped is not None:
                 self._ask(skipped)
                 return out
             out += self._fill(question.stream[0], item)
         if reply is not None and reply.next:
-            query = pb.HistoryQuery()
-            query.CopyFrom(question.query)
-            query.position = reply.next
-            self._ask(Question(question.stream, query))
-            return out
+            refusal = question.goes_on(reply)
+            if refusal is None:
+                self._ask(question.more(reply.next))
+                return out
+            self._refuse(f"answer about {about}", refusal, question.stream[0])
         if stream.waiting:
             self._ask(Question(question.stream, stream.waiting.popleft()))
             return out
@@ -120,7 +139,7 @@ class Mender:
         stream.asking = stream.full = False
         stream.tried.clear()
         while stream.held and not stream.asking:
-            out += self._pass(stream, stream.held.popleft())
+            out += self._pass(stream, stream.let_go())
         return out
 
     def release(self) -> list[Arrival]:
@@ -136,7 +155,7 @@ class Mender:
         key = self._keys.get((arrival.device, arrival.name))
         if key is None:
             key = self._keys[arrival.device, arrival.name] = KeyState(header.run, header.sequence)
-            whole = 0 < self._since_ns < header.run and header.sequence > 1
+            whole = 0 < self._since_ns < header.run and 1 < header.sequence <= FARTHEST
             if not whole:
                 return [arrival]
             key.last = 0
@@ -157,15 +176,17 @@ class Mender:
                 header.sequence,
             )  # another recording, or a clock set back
             return [arrival]
-        self._notice(stream, arrival, key, header)
-        if self._hold:
-            stream.held.appendleft(arrival)
+        if header.sequence > FARTHEST + (key.last if header.run == key.run else 0):
+            key.run, key.last = header.run, header.sequence  # that is no gap: it began anew
+            return [arrival]
+        if self._notice(stream, arrival, key, header) and self._hold:
+            stream.hold_first(arrival)
             return []
         key.run, key.last = header.run, header.sequence
         return [arrival]
 
-    def _notice(self, stream: Stream, arrival: Arrival, key: KeyState, header: pb.Header) -> None:
-        """A gap lies before this message: ask for what is in it."""
+    def _notice(self, stream: Stream, arrival: Arrival, key: KeyState, header: pb.Header) -> bool:
+        """A gap lies before this message: ask for what is in it. False: there are too many."""
         query = pb.HistoryQuery(
             topics=self._wanted(arrival),
             of=arrival.name,
@@ -174,6 +195,10 @@ class Mender:
             until_run=header.run,
             until_sequence=header.sequence,
         )
+        if len(stream.waiting) >= MOST_WAITING or len(key.missing) >= MOST_WAITING:
+            missed = header.sequence - key.last - 1 if header.run == key.run else 0
+            key.lost += missed  # a publisher that jumps all the time is not asked all the time
+            return False
         if header.run == key.run:
             key.missing.append([key.run, key.last + 1, header.sequence - 1, 1])
         # how many there were at the end of the one run, and where the other began to count, only
@@ -186,6 +211,7 @@ class Mender:
         else:
             stream.asking = True
             self._ask(Question((arrival.device, arrival.topic.source), query))
+        return True
 
     def _wanted(self, arrival: Arrival) -> list[str]:
         if not self._topics:
@@ -206,14 +232,14 @@ class Mender:
         ):
             return None
         begin = item.topic, key.run, key.last
-        if begin in stream.tried:
+        if begin in stream.tried or question.replies >= MOST_REPLIES:
             return None  # it is gone
         stream.tried.add(begin)
         query = pb.HistoryQuery()
         query.CopyFrom(question.query)
         query.until_of, query.position = query.until_of or query.of, 0
         query.of, query.after_run, query.after_sequence = begin
-        return Question(question.stream, query)
+        return Question(question.stream, query, question.replies + 1)
 
     def _fill(self, device: str, item: pb.HistoryItem) -> list[Arrival]:
         name, _, estimator = item.topic.partition("/")
@@ -234,6 +260,8 @@ class Mender:
                     key.advance(item.run, item.sequence)
                 return [arrival]
         if (item.run, item.sequence) <= (key.run, key.last):
+            return []
+        if item.sequence > FARTHEST + (key.last if item.run == key.run else 0):
             return []
         key.lost += item.sequence - key.last - 1 if item.run == key.run else 0
         key.advance(item.run, item.sequence)
@@ -272,6 +300,7 @@ class Mender:
         """Let go what is held, gaps and all."""
         out, held = [], list(stream.held)
         stream.held.clear()
+        stream.held_bytes = 0
         stream.asking = False
         stream.waiting.clear()
         for arrival in held:
@@ -292,3 +321,7 @@ class Mender:
             return True
         self._seen.append(mark)
         return False
+
+
+def _say(key: str, refusal: Refusal, device: str) -> None:
+    log.warning("%s: refused: %s", key, refusal)

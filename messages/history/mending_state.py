@@ -7,8 +7,13 @@ from typing import NamedTuple
 from google.protobuf.message import DecodeError
 
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.checks import Refusal, check
+from messages.contract.door import wrong_header
 from messages.contract.header import first_field
-from messages.contract.topics import Topic
+from messages.contract.topics import BY_NAME, NAME, Topic
+
+MOST_REPLIES = 10_000  # of one answer; a reply has about a MB
+FARTHEST = 10_000_000  # messages; a sequence that jumps further has begun anew: a day at 100 Hz
 
 
 class Arrival(NamedTuple):
@@ -32,6 +37,27 @@ class Question(NamedTuple):
 
     stream: tuple[str, str]  # device, source
     query: pb.HistoryQuery
+    replies: int = 0  # parts of the answer that have come
+
+    def goes_on(self, reply: pb.HistoryReply) -> Refusal | None:
+        """Why a reply that says there is more is not asked for more: each part must bring
+        something and get ahead, and an answer has an end.
+        """
+        if not reply.items:
+            return Refusal("answer", "next", str(reply.next), "0 where a reply brings nothing")
+        if reply.next <= self.query.position:
+            wanted = f"more than {self.query.position}"
+            return Refusal("answer", "next", str(reply.next), wanted)
+        if self.replies >= MOST_REPLIES:
+            return Refusal("answer", "next", str(reply.next), f"an end after {MOST_REPLIES}")
+        return None
+
+    def more(self, position: int) -> "Question":
+        """The question for the next part."""
+        query = pb.HistoryQuery()
+        query.CopyFrom(self.query)
+        query.position = position
+        return Question(self.stream, query, self.replies + 1)
 
 
 @dataclass
@@ -59,8 +85,47 @@ class Stream:
     asking: bool = False
     full: bool = False  # holds max_held: the newest were not taken
     held: deque[Arrival] = field(default_factory=deque)
+    held_bytes: int = 0
     waiting: deque[pb.HistoryQuery] = field(default_factory=deque)
     tried: set[tuple[str, int, int]] = field(default_factory=set)  # beginnings that were asked for
+
+    def hold(self, arrival: Arrival, most: int, most_bytes: int) -> bool:
+        """Keep a live message until a gap is filled; False: there is no room."""
+        if len(self.held) >= most or self.held_bytes + len(arrival.payload) > most_bytes:
+            return False
+        self.held.append(arrival)
+        self.held_bytes += len(arrival.payload)
+        return True
+
+    def hold_first(self, arrival: Arrival) -> None:
+        """Keep one that comes before all that are held."""
+        self.held.appendleft(arrival)
+        self.held_bytes += len(arrival.payload)
+
+    def let_go(self) -> Arrival:
+        """The oldest that is held."""
+        arrival = self.held.popleft()
+        self.held_bytes -= len(arrival.payload)
+        return arrival
+
+
+def wrong_item(device: str, item: pb.HistoryItem) -> Refusal | None:
+    """What is wrong with one message of an answer about a device; None when nothing is."""
+    wrong = check(item)
+    if wrong:
+        return wrong[0]
+    name, _, estimator = item.topic.partition("/")
+    topic = BY_NAME.get(name)
+    if topic is None or topic.per_estimator != (NAME.fullmatch(estimator) is not None):
+        return Refusal("answer", "topic", repr(item.topic[:80]), "one of docs/topics.md")
+    refusal = wrong_header(topic, item.payload, device)
+    if refusal is not None:
+        return refusal
+    header = header_of(Arrival(topic, device, estimator, item.payload, 0))
+    if header is not None and (header.run, header.sequence) != (item.run, item.sequence):
+        found = f"{header.run}, {header.sequence}"
+        return Refusal("answer", "payload", found, f"{item.run}, {item.sequence}")
+    return None
 
 
 def take_out(missing: list[list[int]], gap: list[int], sequence: int) -> None:

@@ -83,8 +83,11 @@ class Spool:
     def append(
         self, topic: str, device: str, run: int, sequence: int, utc_ns: int, payload: bytes
     ) -> None:
-        """Keep one message."""
+        """Keep one message; one that no reader would take for a record is left out."""
         name, owner = topic.encode(), device.encode()
+        if HEAD.size + len(name) + len(owner) + len(payload) > MAX_BYTES:
+            log.error("%s/%s: %d bytes are too long to be kept", device, topic, len(payload))
+            return
         data = HEAD.pack(run, sequence, utc_ns, len(name), len(owner)) + name + owner + payload
         with self._lock:
             if not self.journal.append(PUBLISHED, data, time.monotonic_ns(), time.time_ns()):

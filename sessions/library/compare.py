@@ -192,6 +192,7 @@ def as_dict(found: Comparison) -> dict[str, Any]:
                 "line": one.lead,
                 "lines": list(one.curves.lines),
                 "tracks": list(one.curves.tracks),
+                "damage": list(one.curves.said),
                 "errors": errors(one.curves),
             }
         )

@@ -7,6 +7,7 @@ writes curves.npz beside the recording and prints the share done, a number per l
 
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,8 @@ from sessions.library.curves import Curves, Line, Mark, bin_for, bins_of, load, 
 from sessions.library.curves_bins import Binner, PulseLine, TrackLine
 from sessions.library.scan import Block, Extent, Progress, extent, scan
 from sessions.recording.manifest import SessionError, name_of, read_manifest
+from sessions.recording.mcap_damage import Damage
+from sessions.recording.mcap_log import say
 from sessions.recording.samples import Samples, decode, samples
 
 Array = NDArray[np.float64]
@@ -50,13 +53,15 @@ def build(path: Path, coarse: bool = False, on_progress: Progress = lambda _: No
     found = extent(path)
     stride = max(1, found.chunks // COARSE_CHUNKS) if coarse else 1
     reading = _Reading(path, found, stride)
-    for block in scan(path, tuple(WANTED), stride, on_progress):
+    damage = Damage()
+    for block in scan(path, tuple(WANTED), stride, on_progress, damage):
         reading.take(
             block
             if stride == 1
             else Block(block.key, block.log_ns[::COARSE_THIN], block.payloads[::COARSE_THIN])
         )
-    return reading.result()
+    say(path, damage)
+    return replace(reading.result(), said=tuple(damage.said()))
 
 
 def ensure(path: Path, on_progress: Progress = lambda _: None) -> Curves:

@@ -10,10 +10,13 @@ from google.protobuf.message import DecodeError
 from pydantic import BaseModel, ConfigDict
 
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.door import OTHERS
 from messages.contract.topics import BOARD, LINK, NAV, RATE, Address, TopicError, parse
 from sessions.recording.manifest import KeyCount
 from sessions.recording.samples import decode
 
+MOST_RUNS = 1000  # of a gateway, and calibration files of a device, that are told apart
+LONGEST_CARD = 200  # characters of a calibration file's id
 LOOK_EVERY = 200  # messages of an estimate between two looks at its calibration
 WIRE = (
     "good_frames",
@@ -44,17 +47,22 @@ class DeviceCertificate(BaseModel):
     model_config = ConfigDict(extra="ignore")
 
     complete: bool = (
-        True  # nothing lost or damaged on the bus, no sample lost on the line, never dark
+        True  # nothing lost, damaged or refused on the bus, no sample lost on the line, never dark
     )
     topics: dict[str, TopicCertificate] = {}
     wire: dict[str, int] = {}  # counters of LinkStatus over the session
+    refused: dict[str, int] = {}  # messages not recorded, by what was wrong with them
     dark_s: float = 0.0  # s, by the board's clock, that nobody read it between two gateways' runs
 
 
 def certify(
-    keys: dict[str, KeyCount], wire: dict[str, dict[str, int]]
+    keys: dict[str, KeyCount],
+    wire: dict[str, dict[str, int]],
+    refused: dict[str, dict[str, int]] | None = None,
 ) -> dict[str, DeviceCertificate]:
-    """Certificate per device from the counts per bus key and the lines' counters per device."""
+    """Certificate per device from the counts per bus key, the lines' counters per device, and what
+    was refused of each.
+    """
     found: dict[str, DeviceCertificate] = {}
     for key, count in sorted(keys.items()):
         try:
@@ -76,9 +84,14 @@ def certify(
         )
         if address.topic.source == LINK.source:
             device.dark_s = max(device.dark_s, count.dark_s)
+    for name, counts in (refused or {}).items():
+        if name != OTHERS:
+            found.setdefault(name, DeviceCertificate()).refused = counts
     for device in found.values():
         bad = any(topic.lost or topic.damaged for topic in device.topics.values())
-        device.complete = not (bad or device.wire.get("lost_samples") or device.dark_s)
+        device.complete = not (
+            bad or device.refused or device.wire.get("lost_samples") or device.dark_s
+        )
     return found
 
 
@@ -102,6 +115,8 @@ class Witness:
             elif topic is LINK:
                 status = pb.LinkStatus.FromString(payload)
                 runs = self._lines.setdefault(device, {})
+                if len(runs) >= MOST_RUNS and status.header.run not in runs:
+                    return
                 runs[status.header.run] = (runs.get(status.header.run, (status,))[0], status)
             elif topic is RATE or topic is NAV:
                 n = self._n[device, address.estimator] = (
@@ -109,7 +124,9 @@ class Witness:
                 )
                 if n % LOOK_EVERY == 0:
                     card = decode(topic, payload).calibration
-                    self._cards.setdefault(device, set()).update([card] if card else [])
+                    cards = self._cards.setdefault(device, set())
+                    if card and len(cards) < MOST_RUNS:
+                        cards.add(card[:LONGEST_CARD])
         except DecodeError:
             pass  # counted as unreadable elsewhere
 

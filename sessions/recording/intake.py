@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import Address, TopicError, parse
+from messages.contract.door import Door
 from messages.history.mending import Mender
 from messages.history.mending_state import Arrival, Question
 from sessions.recording.manifest import Manifest
@@ -29,14 +29,23 @@ class Entry(NamedTuple):
 class Intake:
     """Takes messages in the order of arrival, gives them in the order of publication."""
 
-    def __init__(self, prefix: str, ask: Callable[[Question], None] | None, since_ns: int) -> None:
+    def __init__(
+        self,
+        prefix: str,
+        ask: Callable[[Question], None] | None,
+        since_ns: int,
+        door: Door,
+        now_ns: Callable[[], int] = time.time_ns,
+    ) -> None:
         """Without `ask` nothing is repaired. Runs that began after since_ns (UTC) are wanted from
-        their beginning.
+        their beginning. What may not come in is refused at the `door`.
+        now_ns: the clock of the receive times.
         """
+        self._now_ns = now_ns
         self._prefix = prefix
-        self._mender = None if ask is None else Mender(ask, since_ns=since_ns)
+        self._door = door
+        self._mender = None if ask is None else Mender(ask, since_ns=since_ns, refuse=door.refuse)
         self._answers: deque[tuple[Question, pb.HistoryReply | None]] = deque()
-        self._addresses: dict[str, Address | None] = {}
         self._keys: dict[
             tuple[str, str, str], str
         ] = {}  # bus keys by topic, device, estimator: checked names cost
@@ -57,7 +66,7 @@ class Intake:
     def resume(self, manifest: Manifest) -> None:
         """Go on where a session ended that a crash cut off: what came in between is asked for."""
         for key, count in manifest.keys.items():
-            address = self._address(key)
+            address = self._door.address(key)
             if self._mender is not None and address is not None and count.last_sequence:
                 name = (
                     f"{address.topic.name}/{address.estimator}"
@@ -77,8 +86,14 @@ class Intake:
 
     def take(self, received_ns: int, key: str, payload: bytes) -> Iterator[Entry]:
         """One message from the bus."""
-        address = self._address(key)
-        if self._mender is None or address is None or not address.topic.recorded:
+        address = self._door.address(key)
+        if address is None or not address.topic.recorded:
+            return
+        if not self._door.admit(key, address, len(payload)):
+            return
+        if not self._door.header(address, payload, key):
+            return
+        if self._mender is None:
             yield Entry(received_ns, key, payload, False)
             return
         arrival = Arrival(address.topic, address.device, address.estimator, payload, received_ns)
@@ -89,23 +104,12 @@ class Intake:
         if self._mender is not None:
             yield from self._entries(self._mender.release())
 
-    def _address(self, key: str) -> Address | None:
-        if key not in self._addresses:
-            if len(self._addresses) > 4096:  # a foreign publisher with ever new keys
-                self._addresses.clear()
-                self._keys.clear()
-            try:
-                self._addresses[key] = parse(key)
-            except TopicError:
-                self._addresses[key] = None
-        return self._addresses[key]
-
     def _entries(self, arrivals: list[Arrival]) -> Iterator[Entry]:
         for arrival in arrivals:
             stream = arrival.device, arrival.topic.source
             at_ns = arrival.at_ns
             if arrival.late:  # the publisher's clock may differ from ours; the order must not
-                at_ns = min(at_ns, time.time_ns())
+                at_ns = min(at_ns, self._now_ns())
             at_ns = self._last_ns[stream] = max(at_ns, self._last_ns.get(stream, 0))
             name = arrival.topic.name, arrival.device, arrival.estimator
             key = self._keys.get(name)

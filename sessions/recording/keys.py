@@ -7,6 +7,7 @@ from google.protobuf.message import DecodeError
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.header import first_field
 from messages.contract.topics import Address
+from messages.history.mending_state import FARTHEST
 from sessions.recording.manifest import KeyCount
 
 
@@ -73,7 +74,8 @@ class KeyState:
         self.repaired += late
         try:
             if self.foreign is not None:
-                return self.foreign.FromString(payload).timestamp.ToNanoseconds()
+                at = self.foreign.FromString(payload).timestamp
+                return at.seconds * 1_000_000_000 + at.nanos  # what is no time, the store sees
             header = pb.Header.FromString(first_field(payload))
         except (DecodeError, ValueError):
             self.unreadable += 1
@@ -81,7 +83,7 @@ class KeyState:
         sequence, run = header.sequence, header.run
         if self.last_run is not None:
             jump = sequence - self.last_sequence
-            if run != self.last_run or jump < 0:
+            if run != self.last_run or not 0 <= jump <= FARTHEST:
                 self.restarts += 1
                 # The same boot: the board's own clock says how long nobody spoke. One that took the
                 # port over as it was goes on at the usual step.

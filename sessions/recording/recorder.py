@@ -9,7 +9,7 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import zenoh
 
@@ -17,10 +17,15 @@ from messages import text
 from messages.bus import orders
 from messages.bus.session import BusSettings
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.checks import MESSAGE_BYTES, Refusal
+from messages.contract.door import Door, device_of
 from messages.contract.topics import RECORDER
 from messages.history.mending_state import Question
-from sessions.recording.intake import Intake
-from sessions.recording.manifest import SESSION_NAME, Manifest
+from messages.text import plain
+from sessions.library.annotations import give_title
+from sessions.recording.intake import Entry, Intake
+from sessions.recording.manifest import Manifest, SessionError, name_fault, slug
+from sessions.recording.session_clock import SessionClock
 from sessions.recording.settings import RecorderSettings
 from sessions.recording.store import SessionStore, start
 
@@ -56,7 +61,10 @@ class Recorder:
         self._orders: deque[Order] = deque()
         self._ask = ask
         self._fresh = True
-        self._intake = Intake(bus.prefix, None, 0)
+        self._clock = SessionClock()
+        self._bytes_in = self._bytes_out = 0  # of the inbox: counted each by one thread
+        self._door = self._new_door()
+        self._intake = Intake(bus.prefix, None, 0, self._door)
         self._overflow = 0
         self._store: SessionStore | None = None
         self._recording = False  # read by Zenoh's thread
@@ -69,10 +77,18 @@ class Recorder:
         """Zenoh's thread: note the receive time and leave."""
         if not self._recording:
             return
-        if len(self._inbox) >= self.settings.max_inbox:
+        size, waiting = len(sample.payload), self._bytes_in - self._bytes_out
+        if size > MESSAGE_BYTES:
+            self._door.too_large(str(sample.key_expr), size)
+            return
+        if (
+            len(self._inbox) >= self.settings.max_inbox
+            or waiting + size > self.settings.max_inbox_bytes
+        ):
             self._overflow += 1
             return
-        self._inbox.append((time.time_ns(), str(sample.key_expr), sample.payload.to_bytes()))
+        self._bytes_in += size
+        self._inbox.append((self._clock.now_ns(), str(sample.key_expr), sample.payload.to_bytes()))
 
     def on_order(self, order: Order) -> None:
         """Zenoh's thread: keep the order for the loop."""
@@ -101,6 +117,7 @@ class Recorder:
     def step(self) -> None:
         """Write what came in, answer orders, close a chunk when it is time."""
         self.wake.clear()
+        self._clock.look(self._store.manifest if self._store is not None else None)
         self._auto_start()
         self._drain()
         while self._orders:
@@ -117,11 +134,13 @@ class Recorder:
         if store is None:
             return
         intake = self._intake
-        for entry in intake.answers():
-            store.add(*entry)
+        self._add(store, "an answer", intake.answers())
         for _ in range(len(inbox)):  # what comes in meanwhile waits for the next step
-            for entry in intake.take(*inbox.popleft()):
-                store.add(*entry)
+            received_ns, key, payload = inbox.popleft()
+            self._bytes_out += len(payload)
+            self._add(store, key, intake.take(received_ns, key, payload))
+        store.manifest.refused = self._door.by_device()
+        store.manifest.unknown = self._door.refused["key"]
         if self._overflow:
             log.error(
                 "%s: %d messages came faster than they can be written",
@@ -130,6 +149,19 @@ class Recorder:
             )
             store.manifest.overflow += self._overflow
             self._overflow = 0
+
+    def _add(self, store: SessionStore, key: str, entries: Iterable[Entry]) -> None:
+        """Write what is ready. A fault of ours costs a message and is counted, not the session."""
+        try:
+            for entry in entries:
+                store.add(*entry)
+        except Exception as error:
+            log.exception("%s: a message could not be recorded", plain(key))
+            failure = Refusal("failure", "message", type(error).__name__, "to be recorded")
+            self._door.refuse(key, failure, device_of(key))
+
+    def _new_door(self) -> Door:
+        return Door("recorder", most_devices=self.settings.max_devices)
 
     def _auto_start(self) -> None:
         if (
@@ -145,9 +177,12 @@ class Recorder:
         """Start a session; on refusal say why in the status and, with auto_start, try again
         later.
         """
+        if self._fresh and not self._inbox:
+            self._clock.begin()
         try:
             store = start(
                 self.settings,
+                self._clock.now_ns(),
                 name=name,
                 note=note,
                 user=user,
@@ -166,7 +201,14 @@ class Recorder:
             return False
         self._message, self._retry_at = "", None
         if self._fresh:  # a file that only goes on keeps what is known of the streams
-            self._intake = Intake(self.bus.prefix, self._ask, store.manifest.start_utc_ns)
+            self._door = self._new_door()
+            self._intake = Intake(
+                self.bus.prefix,
+                self._ask,
+                store.manifest.start_utc_ns,
+                self._door,
+                self._clock.now_ns,
+            )
         self._fresh = True
         self._store, self._recording = store, True
         self._last_flush = time.monotonic()
@@ -232,19 +274,16 @@ class Recorder:
         if command.action == pb.RecorderCommand.ACTION_START:
             if self._store is not None:
                 return f"already recording {self._store.manifest.id}: stop it first"
-            if command.name and not SESSION_NAME.fullmatch(command.name):
-                return (
-                    f"name {command.name[:80]!r}: want a letter or digit, then a-z, 0-9, _ and -,"
-                    " at most 32"
-                )
+            if fault := name_fault(command.name):
+                return fault
             if fault := text.check(command.note, lines=True) or text.check(command.user):
                 return f"note or user: {fault}"
             log.info("start ordered by %s", command.user or "an unnamed user")
-            return (
-                ""
-                if self._begin(name=command.name, note=command.note, user=command.user)
-                else self._message
-            )
+            name = slug(command.name)
+            if not self._begin(name=name, note=command.note, user=command.user):
+                return self._message
+            self._keep_title(command.name)
+            return ""
         if command.action == pb.RecorderCommand.ACTION_STOP:
             if self._store is None:
                 return "not recording: nothing to stop"
@@ -254,14 +293,25 @@ class Recorder:
             return self._message
         return ""
 
+    def _keep_title(self, name: str) -> None:
+        if self._store is not None:
+            try:
+                give_title(self._store.folder, name)
+            except (SessionError, OSError) as error:
+                log.warning("%s: its title is not kept: %s", self._store.folder, error)
+
     def status(self) -> pb.RecorderStatus:
         """The state of now."""
         status = pb.RecorderStatus()
         status.CopyFrom(self._describe(self._store) if self._store else self._last)
         status.recording = self._store is not None
         status.header.device = RECORDER
-        status.header.utc_ns = time.time_ns()
+        status.header.utc_ns = self._clock.now_ns()
         status.message = (self._store.error if self._store else "") or self._message
+        if self._store is not None:
+            steps = self._store.manifest.clock_steps
+            status.clock_steps = len(steps)
+            status.clock_offset_s = sum(step.step_s for step in steps)
         return status
 
     def _describe(self, store: SessionStore) -> pb.RecorderStatus:
@@ -275,4 +325,5 @@ class Recorder:
             lost={key: lost for key, lost in store.lost().items() if lost},
             repaired=store.repaired(),
             repairing=self._intake.held,
+            refused=self._door.counts(),
         )

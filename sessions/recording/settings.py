@@ -31,6 +31,10 @@ class RecorderSettings(BaseModel):
     max_inbox: int = Field(
         default=200_000, ge=1000
     )  # messages waiting to be written; more are counted as overflow
+    max_inbox_bytes: int = Field(default=256 * 1024**2, ge=1024**2)  # likewise, bytes
+    max_devices: int = Field(
+        default=256, ge=1, le=4096
+    )  # recorded in one session, those that come first; messages of more are counted as refused
     keep_days: float = Field(
         default=0.0, ge=0
     )  # older sessions are deleted at the start, unless tagged `keep`; 0: never

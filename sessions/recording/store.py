@@ -22,12 +22,19 @@ from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import Address, TopicError, parse
 from sessions.recording.certificate import Witness, certify
 from sessions.recording.keys import KeyState
-from sessions.recording.manifest import RECORDING, Manifest, sync_folder, write_manifest
-from sessions.recording.mcap_log import McapLog
+from sessions.recording.manifest import (
+    RECORDING,
+    Manifest,
+    next_number,
+    sync_folder,
+    write_manifest,
+)
+from sessions.recording.mcap_append import McapLog
 from sessions.recording.settings import RecorderSettings
 
 log = logging.getLogger(__name__)
 
+LATEST_NS = (1 << 63) - 1
 MANIFEST_EVERY_S = 5.0  # counts in session.json of an open session are at most this old
 
 
@@ -62,7 +69,7 @@ class SessionStore:
         self.durable_messages = 0
         self._write_error = self._sync_error = ""
         self._settings = settings
-        self._keys: dict[str, KeyState | None] = {}
+        self._keys: dict[str, KeyState] = {}
         self._witness = Witness()
         self._addresses: dict[str, Address] = {}
         self._accepted = self._pushed = (
@@ -110,15 +117,11 @@ class SessionStore:
 
     def lost(self) -> dict[str, int]:
         """Messages missing so far by jumps of header.sequence, per key."""
-        return {key: state.lost for key, state in self._keys.items() if state is not None}
+        return {key: state.lost for key, state in self._keys.items()}
 
     def repaired(self) -> dict[str, int]:
         """Messages filled in so far, per key."""
-        return {
-            key: state.repaired
-            for key, state in self._keys.items()
-            if state is not None and state.repaired
-        }
+        return {key: state.repaired for key, state in self._keys.items() if state.repaired}
 
     def add(self, received_ns: int, key: str, payload: bytes, late: bool = False) -> None:
         """Record one message; `late`: it was filled in.
@@ -132,6 +135,9 @@ class SessionStore:
             self.manifest.overflow += 1
             return
         publish_ns = state.publish_time(payload, late) or received_ns
+        if not (0 < received_ns < LATEST_NS and 0 < publish_ns < LATEST_NS):
+            received_ns = min(max(received_ns, 0), LATEST_NS)  # what the file's format can hold
+            publish_ns = received_ns
         self._log.add(state.channel, received_ns, publish_ns, payload, state.last_sequence)
         self._witness.look(self._addresses[key], payload)
         self._accepted += 1
@@ -142,16 +148,16 @@ class SessionStore:
             try:
                 address = parse(key)
             except TopicError as error:
-                log.warning("%s: not recorded: %s", self.manifest.id, error)
-                self._keys[key] = None
+                self.manifest.unknown += 1
+                if self.manifest.unknown == 1:
+                    log.warning("%s: not recorded: %s", self.manifest.id, error)
+                return None
             else:
                 if not address.topic.recorded:
                     return None
                 self._addresses[key] = address
                 self._keys[key] = KeyState(self._log.open_channel(key, address.topic), address)
-        state = self._keys[key]
-        self.manifest.unknown += state is None
-        return state
+        return self._keys[key]
 
     def flush(self) -> None:
         """Close the running chunk and hand it to the operating system; a refusal is kept in
@@ -179,7 +185,7 @@ class SessionStore:
 
     def _snapshot(self) -> Manifest:
         """session.json as it should stand now."""
-        known = {key: state for key, state in self._keys.copy().items() if state is not None}
+        known = self._keys.copy()
         self.manifest.end_utc_ns = self._last_ns
         self.manifest.keys = {key: state.count for key, state in known.items()}
         self.manifest.channels = {state.channel: key for key, state in known.items()}
@@ -191,7 +197,9 @@ class SessionStore:
         self.manifest.provenance = self._witness.provenance()
         self.manifest.certificate = {
             device: found.model_dump()
-            for device, found in certify(self.manifest.keys, self._witness.wire()).items()
+            for device, found in certify(
+                self.manifest.keys, self._witness.wire(), self.manifest.refused
+            ).items()
         }
         return self.manifest.model_copy()
 
@@ -247,6 +255,7 @@ _SOURCES = frozenset(pb.Source.values())
 
 def start(
     settings: RecorderSettings,
+    now_ns: int | None = None,
     *,
     name: str = "",
     note: str = "",
@@ -254,10 +263,10 @@ def start(
     continues: str = "",
     configuration: dict[str, object] | None = None,
 ) -> SessionStore:
-    """Begin a session now; its id is the UTC time and the name. Raises OSError when the root cannot
-    be written.
+    """Begin a session now; its id is the UTC time and the name. now_ns: by the clock of its receive
+    times. Raises OSError when the root cannot be written.
     """
-    now = time.time_ns()
+    now = time.time_ns() if now_ns is None else now_ns
     stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime(now // 1_000_000_000))
     base = f"{stamp}-{name}" if name else stamp
     for attempt in range(100):
@@ -267,6 +276,7 @@ def start(
             note=note,
             user=user,
             continues=continues,
+            number=next_number(settings.root),
             start_utc_ns=now,
             end_utc_ns=now,
             versions=versions(),

@@ -2,7 +2,7 @@
 of the run.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from messages.contract.topics import ACCEL, GNSS, INNOVATION, LINK, NAV, RATE, TACHO, parse
 from sessions.export.table import Progress, Selection, Table, silent, tables
+from sessions.recording.mcap_damage import Damage
 
 Array = NDArray[np.float64]
 XYZ = ("x", "y", "z")
@@ -95,6 +96,8 @@ class Run:
         default_factory=lambda: np.zeros((0, 4))
     )  # t, latitude rad, longitude rad, height m
     link: dict[str, float] = field(default_factory=dict)  # last ledger of the line
+    said: tuple[str, ...] = ()  # sentences about damage of the recording
+    whole: bool = True  # nothing of the recording is missing or unreadable
 
 
 WANTED = frozenset(topic.name for topic in (ACCEL, TACHO, RATE, NAV, INNOVATION, GNSS, LINK))
@@ -108,7 +111,8 @@ def load_run(
 
     Raises ReportError when there is no such device or boot, or no estimate at all; OSError.
     """
-    found = tables(path, Selection(WANTED), progress)
+    damage = Damage()
+    found = tables(path, Selection(WANTED), progress, damage)
     devices: dict[str, int] = {}
     for key, table in found.items():
         address = parse(key)
@@ -129,7 +133,8 @@ def load_run(
             f"{path}: no boot {boot} of {device}; there are {', '.join(map(str, sorted(lengths)))}"
         )
     epoch = boot if boot is not None else max(sorted(lengths), key=lambda b: round(lengths[b], 1))
-    return _run(mine, device, epoch, tuple(sorted(lengths)))
+    run = _run(mine, device, epoch, tuple(sorted(lengths)))
+    return replace(run, said=tuple(damage.said()), whole=damage.whole)
 
 
 def _boots(timed: list[Table]) -> dict[int, float]:

@@ -12,7 +12,8 @@ from support.estimator_drive import DT, drive, exact, fix_at
 
 from inertial.earth import ned_between
 from inertial.navigation.error_model import ImuNoise
-from inertial.navigation.navigation import Mode, Navigator
+from inertial.navigation.fix import Fix
+from inertial.navigation.navigation import NAVIGATORS, Mode, Navigator
 from inertial.rotation import euler_angles, rotation_vector
 from tests.inertial.twins.strapdown import State
 
@@ -108,10 +109,57 @@ def test_no_satellites_no_number_no_use(perfect: tuple[list[State], Array]) -> N
     truth, imu = perfect
     navigator = Navigator()
     fix = drive(truth, imu).fixes[0]
-    bad = [replace(fix, quality=0), replace(fix, t=2.0, arrival=2.0, height=math.nan)]
+    bad = [replace(fix, quality=0), replace(fix, t=2.0, arrival=2.0, longitude=math.nan)]
     corrections = play(navigator, imu[:500], bad)
     assert [c.accepted for c in corrections] == [False, False]
     assert navigator.solution().fix_age == math.inf
+
+
+def flat(fix: Fix) -> Fix:
+    """The fix of a receiver that gives neither height nor vertical speed."""
+    v, sigma_v = fix.v_n.copy(), fix.sigma_v.copy()
+    v[2] = sigma_v[2] = math.nan
+    return replace(fix, height=math.nan, v_n=v, sigma_v=sigma_v)
+
+
+@pytest.mark.parametrize("name", ["kf", "huber-nhc", "fpe-fuzzy", "mhe-robust"])
+def test_fixes_without_height_give_the_place_and_claim_no_height(
+    perfect: tuple[list[State], Array], name: str
+) -> None:
+    truth, imu = perfect
+    navigator = NAVIGATORS[name]()
+    said = play(navigator, imu, [flat(f) for f in drive(truth, imu).fixes])
+    s, end = navigator.solution(), truth[-1]
+    assert s.mode == Mode.NAVIGATING and navigator.counts["rejected"] == 0
+    error = np.abs(s.p_ned - truth_ned(end, (*s.origin[:2], 0.0)))
+    assert error[:2].max() < 0.3
+    assert math.isnan(s.height) and math.isnan(s.p_ned[2]) and s.sigma[8] > 1000.0
+    last = said[-1]
+    known = np.isfinite(last.values[:6]).tolist()
+    assert known == np.isfinite(last.sigma[:6]).tolist() == [True, True, False, True, True, False]
+    assert math.isfinite(last.nis) and np.isfinite(last.error_ned[:2]).all()
+
+
+def test_a_height_that_comes_later_is_taken(perfect: tuple[list[State], Array]) -> None:
+    truth, imu = perfect
+    fixes = [flat(f) if f.t < 50.0 else f for f in drive(truth, imu).fixes]
+    navigator = Navigator()
+    play(navigator, imu, fixes)
+    s = navigator.solution()
+    assert abs(s.height - truth[-1].height) < 0.1 and s.sigma[8] < 5.0
+    assert np.abs(s.p_ned - truth_ned(truth[-1], s.origin)).max() < 0.1
+    assert navigator.counts["rejected"] == 0
+
+
+def test_sea_level_is_no_better_known_than_the_geoid(perfect: tuple[list[State], Array]) -> None:
+    """All heights have one offset: no number of them makes it smaller."""
+    truth, imu = perfect
+    fixes = [replace(f, height=f.height - 47.0, datum=110.0) for f in drive(truth, imu).fixes]
+    navigator = Navigator()
+    play(navigator, imu, fixes)
+    s = navigator.solution()
+    assert s.sigma[8] >= 110.0 and s.position_covariance[2, 2] >= 110.0**2
+    assert s.datum == 110.0 and abs(s.height + 47.0 - truth[-1].height) < 0.1
 
 
 def test_a_gap_asks_for_the_heading_again(

@@ -103,6 +103,15 @@ Measurement compared(const Leg& leg, const Model& model, const Vector3& rate_b, 
   return z;
 }
 
+// A row that the fix does not have says nothing: no difference, no sensitivity, a noise of its own.
+void silence(Measurement& z, int row) {
+  z.y(row) = 0.0;
+  z.H.row(row).setZero();
+  z.R.row(row).setZero();
+  z.R.col(row).setZero();
+  z.R(row, row) = 1.0;
+}
+
 Measurement chosen(const Measurement& all, const Fix& fix) {
   const int kept = fix.has_v ? HEADING_ROW : VELOCITY_ROW;
   const int rows = kept + (fix.has_yaw ? 1 : 0);
@@ -112,7 +121,8 @@ Measurement chosen(const Measurement& all, const Fix& fix) {
   z.R.diagonal().segment<3>(POSITION_ROW) = fix.sigma_p.cwiseProduct(fix.sigma_p);
   if (fix.has_v) {
     z.R.diagonal().segment<3>(VELOCITY_ROW) = fix.sigma_v.cwiseProduct(fix.sigma_v);
-    const Vector3 way = upward(fix.v_n) * fix.timing;  // what its own timing costs (E-31)
+    Vector3 way = upward(fix.v_n) * fix.timing;  // what its own timing costs (E-31)
+    if (!std::isfinite(way[HEIGHT])) way[HEIGHT] = 0.0;
     z.R.block<3, 3>(POSITION_ROW, POSITION_ROW) += way * way.transpose();
   }
   if (fix.has_yaw) {
@@ -120,7 +130,17 @@ Measurement chosen(const Measurement& all, const Fix& fix) {
     z.H.row(kept) = all.H.row(HEADING_ROW);
     z.R(kept, kept) = fix.sigma_yaw * fix.sigma_yaw;
   }
+  if (!std::isfinite(fix.height)) silence(z, POSITION_ROW + HEIGHT);
+  if (fix.has_v && !std::isfinite(fix.v_n[DOWN])) silence(z, VELOCITY_ROW + DOWN);
   return z;
+}
+
+bool is_silent(const Measurement& z, int row) { return (z.H.row(row).array() == 0.0).all(); }
+
+int said_rows(const Measurement& z) {
+  int said = 0;
+  for (int r = 0; r < z.rows(); ++r) said += is_silent(z, r) ? 0 : 1;
+  return said;
 }
 
 // H is mostly zeros, which cost nothing here.
@@ -182,7 +202,7 @@ void inflate(RowMatrix& S, RowMatrix& R, const Weights& weight) {
 double make_consistent(Covariance& P, const Measurement& z) {
   double total = 1.0;
   while (total < MOST_DOUBLING) {
-    if (whiten(innovate(P, z).S, z.y).nis <= z.rows()) break;
+    if (whiten(innovate(P, z).S, z.y).nis <= said_rows(z)) break;
     total *= 2.0;
     P *= 2.0;
   }

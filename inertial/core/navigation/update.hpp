@@ -24,8 +24,8 @@ struct Fix {
   double t = 0.0;                      // s
   double latitude = 0.0;               // rad
   double longitude = 0.0;              // rad
-  double height = 0.0;                 // m
-  Vector3 v_n = Vector3::Zero();       // m/s
+  double height = 0.0;                 // m; no number: unknown
+  Vector3 v_n = Vector3::Zero();       // m/s; no number for down: unknown
   double yaw = 0.0;                    // rad
   Vector3 sigma_p = Vector3::Ones();   // m, north east up
   Vector3 sigma_v = Vector3::Ones();   // m/s
@@ -81,8 +81,11 @@ Blocks blocks_of(int rows);  // 3, 4, 6 or 7
 // the IMU (E-30, E-38). R stays zero.
 Measurement compared(const Leg& leg, const Model& model, const Vector3& rate_b, const Vector3& lever_b,
                      const Fix& fix);
-// Of them those that the fix has, with R (E-31).
+// Of them those that the fix has, with R (E-31). Where a height or a vertical speed is unknown, its row
+// stays and is silent.
 Measurement chosen(const Measurement& all, const Fix& fix);
+bool is_silent(const Measurement& z, int row);
+int said_rows(const Measurement& z);  // those that are not
 
 // P H^T and S = H P H^T + R (E-32).
 struct Innovation {
@@ -106,7 +109,7 @@ StateVector absorb(Covariance& P, const Innovation& innovation, const Whitened& 
 Weights huber_weights(const RowMatrix& S, const RowVector& y, double limit);
 // Raises R so that each group of S grows by 1 / weight: the gain is then Huber's (E-39).
 void inflate(RowMatrix& S, RowMatrix& R, const Weights& weight);
-// Multiplies P by the smallest power of 2 that brings NIS down to the number of rows; returns it.
+// Multiplies P by the smallest power of 2 that brings NIS down to the rows that say anything; returns it.
 double make_consistent(Covariance& P, const Measurement& z);
 
 }  // namespace gyrofree::navigation
