@@ -43,7 +43,7 @@ void swing_biases(Filter& f, const Sensor& s, const Tuning& t, double seconds) {
   Vector<MOST_AXES> size = Vector<MOST_AXES>::Zero();
   for (int i = 0; i < s.n; ++i) {
     const double along = dot(Vector3(s.theta_b.row(i).transpose()), axis);
-    size(i) = 0.35 * t.scale * across * (1.0 - along * along);
+    size(i) = 0.15 * t.scale * across * (1.0 - along * along);
   }
   Matrix<MEASURED, MOST_AXES> W = s.W;
   for (int i = 0; i < s.n; ++i) W.col(i) *= std::sqrt(size(i));
