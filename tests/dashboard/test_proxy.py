@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 import viser._messages
 import zstandard
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from support.front_door import CAMERA, Door, message, open_door, wait_for
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
@@ -353,3 +355,43 @@ def test_scene_that_is_gone_is_said_and_does_not_hang(tmp_path):
         with pytest.raises(InvalidStatus):
             door.scene(client)
         assert client.get("/api/me").status_code == 200
+
+
+JUNK = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.floats()
+    | st.integers(-(2**63), 2**64 - 1)
+    | st.text(max_size=9),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner),
+    max_leaves=6,
+)
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+@given(
+    st.sampled_from(sorted(OPERATOR_MAY)), st.dictionaries(st.text(max_size=6), JUNK), JUNK, JUNK
+)
+def test_no_message_ends_the_scene(door: Door, kind, more, value, other):
+    uuids = list(door.viser.gui._gui_input_handle_from_uuid)
+    box = door.viser.gui.add_checkbox("Sw", False)
+    try:
+        with door.client("anna") as client, door.scene(client) as scene:
+            scene.recv(timeout=20.0)
+            for fields in (
+                more,
+                CAMERA | {"position": value},
+                dict.fromkeys(OPERATOR_MAY[kind], value) | {"name": other},
+                {"uuid": box._impl.uuid, "updates": {"value": value}},
+                {"uuid": (uuids or [""])[0], "updates": {"value": other, "label": value}},
+            ):
+                scene.send(message(kind, **{k: v for k, v in fields.items() if k != "type"}))
+            update = {"uuid": box._impl.uuid, "updates": {"value": not box.value}}
+            was = box.value
+            wait_for(
+                lambda: scene.send(message("GuiUpdateMessage", **update)) or box.value != was,
+                "the good message arrived",
+            )
+            assert box.label == "Sw"
+    finally:
+        box.remove()
