@@ -46,6 +46,7 @@ log = logging.getLogger(__name__)
 JOIN_WAIT_S = 0.01  # samples held back for joining wait no longer than this for the next frame
 FAILURES_SHOWN = 20  # faults of ours that stand in the log with all that is known of them
 STATUS_EVERY_S = 1.0
+STOPPED_S = 1.5  # longer than any wait below: this process was stopped, or got no processor
 
 
 class DeviceLink:
@@ -62,6 +63,7 @@ class DeviceLink:
         self.name, self.device, self._keeper = name, device, keeper or Keeper()
         self._next_put: Put | None = None  # None: there is no bus yet
         self._live = False
+        self._looked = time.monotonic()
         self.journal = Journal(
             folder, settings.journal_bytes, settings.segment_bytes, settings.sync_s
         )
@@ -98,6 +100,7 @@ class DeviceLink:
             self.journal,
             self.spool,
             self.door,
+            self.wall,
         )
 
     def run(self, stop: threading.Event) -> None:
@@ -132,9 +135,9 @@ class DeviceLink:
         self.report.message(self.readers, 0)  # rates and latency from here on
 
     def _loop(self, stop: threading.Event) -> None:
-        due = time.monotonic()
+        due = self._looked = time.monotonic()
         while not stop.is_set():
-            left = due - time.monotonic()
+            left = due - self._look()
             if left <= 0:
                 self._each_second()
                 due = max(due + STATUS_EVERY_S, time.monotonic())
@@ -154,6 +157,16 @@ class DeviceLink:
                 self._live = True
                 self.out.direct(self._next_put)
                 due = time.monotonic()  # the first status at once: it says that samples follow
+
+    def _look(self) -> float:
+        """Now, s; notices when this process was stopped meanwhile."""
+        now, before = time.monotonic(), self._looked
+        self._looked = now
+        if now - before > STOPPED_S:
+            self.watch.stopped(now - before)
+            self.report.stopped(now - before)
+            log.warning("%s: this process was stopped for %.1f s", self.name, now - before)
+        return now
 
     def _each_second(self) -> None:
         try:
@@ -176,7 +189,7 @@ class DeviceLink:
         self.watch.look(self.readers[0].connected, time.monotonic_ns())
         if self.out.live:
             status = self.report.message(self.readers, self.queue.qsize())
-            self.out.publish(LINK, status, 0, time.time_ns())
+            self.out.publish(LINK, status, 0, self.wall.now_ns())
 
     def go_live(self, put: Put) -> None:
         """Publish from now on what is read from now on: put(topic, device, message), which must not
@@ -215,12 +228,13 @@ class DeviceLink:
                 self._fail(error, "bytes of the receiver")
                 self.gnss.restart()
         else:
-            self._take_frames(self.decoder.feed(chunk.data, chunk.monotonic_ns), chunk.monotonic_ns)
+            frames = self.decoder.feed(chunk.data, chunk.monotonic_ns)
+            self._take_frames(frames, chunk.monotonic_ns, chunk.late)
 
-    def _take_frames(self, frames: Iterator[Frame], at_ns: int) -> None:
+    def _take_frames(self, frames: Iterator[Frame], at_ns: int, late: bool = False) -> None:
         for frame in frames:
             try:
-                self.frames.take(frame, self.decoder.ledger.reboots, at_ns)
+                self.frames.take(frame, self.decoder.ledger.reboots, at_ns, late)
             except Exception as error:
                 self._fail(error, f"frame of type {frame.type}")
                 self.frames.begin_anew(frame.epoch)

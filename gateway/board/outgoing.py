@@ -62,7 +62,8 @@ class Outgoing:
         if utc_ns is None:
             utc_ns = self._wall.utc_ns(self._clock.host_ns(device_us))
         header.utc_ns = min(max(utc_ns, -FULL), FULL)
-        header.utc_sigma_s = self._clock.sigma_s
+        # once the wall clock was set, which of its times was UTC is not known
+        header.utc_sigma_s = self._clock.sigma_s + abs(self._wall.offset_s)
         header.source = self._state.source
         header.run = self._run
         wrong = check(message)

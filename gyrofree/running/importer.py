@@ -101,11 +101,16 @@ def _fixes(source: BoardLog) -> Iterator[Item]:
             latitude_deg=math.degrees(fix.latitude),
             longitude_deg=math.degrees(fix.longitude),
             height_m=fix.height,
+            height_msl_m=math.nan,  # a log does not say
+            height_reference=pb.HEIGHT_REFERENCE_ELLIPSOID
+            if fix.has_height
+            else pb.HEIGHT_REFERENCE_UNKNOWN,
             device_time_s=fix.t,
             quality=QUALITY.get(fix.quality, pb.GnssFix.QUALITY_NONE),
             fix_utc_ns=LOG_EPOCH_S * 1_000_000_000 + round((fix.t - zero_s) * 1e9),
         )
-        message.position_sigma_ned_m.extend(fix.sigma_p.tolist())
+        sigma_p = fix.sigma_p.tolist() if fix.has_height else [*fix.sigma_p[:2].tolist(), math.nan]
+        message.position_sigma_ned_m.extend(sigma_p)
         if fix.v_n is not None:
             message.v_n_mps.extend(fix.v_n.tolist())
         yield fix.t, GNSS, message

@@ -8,8 +8,6 @@ import heapq
 import math
 from collections.abc import Iterator
 
-import numpy as np
-
 from gateway.gnss.ubx import Epoch, ubx_bytes
 from gateway.virtual.pulses import table_pulses
 from gateway.virtual.virtual_board import BoardAccel, BoardBytes, BoardImu, Item
@@ -53,7 +51,6 @@ def _gnss(log: BoardLog) -> Iterator[Item]:
 
 def epoch_of(fix: Fix) -> Epoch:
     """A fix as a receiver's epoch."""
-    velocity = np.zeros(3) if fix.v_n is None else fix.v_n
     return Epoch(
         LOG_EPOCH_S,
         fix.t,
@@ -62,5 +59,5 @@ def epoch_of(fix: Fix) -> Epoch:
         fix.height,
         RTKLIB.get(fix.quality, 0),
         tuple(fix.sigma_p.tolist()),
-        tuple(velocity.tolist()),
+        None if fix.v_n is None else tuple(fix.v_n.tolist()),
     )

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from messages.contract.topics import Topic, parse
 from sessions.export.columns import TIME, Column, Columns
 from sessions.recording.mcap_damage import Damage
-from sessions.recording.mcap_log import Recorded, read, say
+from sessions.recording.mcap_log import Recorded, say
 from sessions.recording.samples import Gathering, decode
+from sessions.recording.timeline import straight
 
 Progress = Callable[[float, str], None]  # share done 0 to 1, what is being done
 
@@ -55,7 +56,7 @@ def messages(
     cannot be read is counted in `damage`, or logged where none is given. Raises OSError.
     """
     start, found = None, Damage() if damage is None else damage
-    for row in read(path, found):
+    for row in straight(path, found):
         start = row.log_ns if start is None else start
         if not selection.start_s <= (row.log_ns - start) / 1e9 <= selection.end_s:
             continue

@@ -16,8 +16,8 @@ from mcap.summary import Summary
 
 from messages.contract.topics import Topic, parse
 from sessions.recording.mcap_damage import Damage
-from sessions.recording.mcap_index import keys_of, summary_of
-from sessions.recording.mcap_log import read, say
+from sessions.recording.mcap_index import keys_of, ordered_summary_of
+from sessions.recording.mcap_log import say
 from sessions.recording.mcap_records import (
     MESSAGE,
     RECORD,
@@ -26,6 +26,7 @@ from sessions.recording.mcap_records import (
     content,
     records,
 )
+from sessions.recording.timeline import straight
 
 Progress = Callable[[float], None]
 
@@ -49,7 +50,7 @@ def extent(path: Path) -> Extent:
     """Times and counts of a recording. Raises OSError, and ValueError for a file without any
     message.
     """
-    found = summary_of(path)
+    found = ordered_summary_of(path)
     if found is not None:
         counts = found.statistics.channel_message_counts
         names = {key: counts.get(number, 0) for number, key in keys_of(found).items()}
@@ -61,7 +62,7 @@ def extent(path: Path) -> Extent:
         )
     damage = Damage()
     first = last = 0
-    for row in read(path, damage):
+    for row in straight(path, damage):
         first = min(first or row.log_ns, row.log_ns)
         last = max(last, row.log_ns)
     if not first:
@@ -92,9 +93,9 @@ def scan(
     first look; a file without an index is read whole. Raises OSError.
     """
     account = Damage() if damage is None else damage
-    found = summary_of(path)
+    found = ordered_summary_of(path)
     if found is None:
-        for row in read(path, account):
+        for row in straight(path, account):
             if _wanted(row.key, topics):
                 yield Block(row.key, [row.log_ns], [row.payload])
     else:

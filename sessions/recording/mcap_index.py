@@ -3,16 +3,24 @@
 import functools
 import os
 import struct
+from collections.abc import Iterable
+from itertools import pairwise
 from pathlib import Path
 
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
+from mcap.records import ChunkIndex
 from mcap.summary import Summary
 
 from sessions.recording.mcap_records import RECORD, SUMMARY_CRC, Names, crc_of
 from sessions.recording.mcap_writer import MAGIC
 
+BACK_S, PAUSE_S = (
+    1.0,
+    60.0,
+)  # receive times that go back, or jump further: a clock may have been set
+STILL_CHUNKS = 8  # one after another that end at one time: likewise
 FOOTER = struct.Struct("<QQI")  # begin of the summary, of its offsets, CRC
 
 
@@ -20,6 +28,33 @@ def summary_of(path: Path) -> Summary | None:
     """The file's own index; None where it has none that leads to every message. Raises OSError."""
     found = path.stat()
     return _summary(path, found.st_size, found.st_mtime_ns)
+
+
+def ordered_summary_of(path: Path) -> Summary | None:
+    """The same, where receive times can be gone by as well: a file whose clock was set while it was
+    recorded has to be read whole, by timeline.straight. Raises OSError.
+    """
+    found = summary_of(path)
+    return None if found is None or stepped(found.chunk_indexes) else found
+
+
+def stepped(chunks: Iterable[ChunkIndex]) -> bool:
+    """Do the receive times of a file go back, jump or stand still, as far as its index tells? Then
+    the index cannot be gone by, and the file has to be read by `straight`.
+    """
+    ordered = sorted(chunks, key=lambda chunk: chunk.chunk_start_offset)
+    pause_ns, back_ns = PAUSE_S * 1e9, BACK_S * 1e9
+    if any(one.message_end_time - one.message_start_time > pause_ns for one in ordered):
+        return True
+    still = 0
+    for before, one in pairwise(ordered):
+        jump = one.message_start_time - before.message_end_time
+        if jump < -back_ns or jump > pause_ns:
+            return True
+        still = still + 1 if one.message_end_time <= before.message_end_time else 0
+        if still >= STILL_CHUNKS:
+            return True
+    return False
 
 
 @functools.lru_cache(maxsize=2)  # that of an hour takes longer to read than a first look at it

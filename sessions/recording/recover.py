@@ -11,6 +11,7 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from messages.clock import Moment
 from messages.contract.topics import Address, parse
 from sessions.recording.certificate import Witness, certify
 from sessions.recording.keys import KeyState
@@ -143,6 +144,14 @@ def recover_session(folder: Path) -> Manifest | None:
     return manifest
 
 
+def _order(folder: Path) -> tuple[int, str]:
+    """Sessions by their numbers; their names are of a clock that may have been set."""
+    try:
+        return read_manifest(folder).number, folder.name
+    except SessionError:
+        return 0, folder.name
+
+
 def cut_off(root: Path, within_s: float, max_bytes: int) -> Path | None:
     """Folder of the newest session, when it is open, was written to within that time, and nobody
     writes it now.
@@ -150,13 +159,18 @@ def cut_off(root: Path, within_s: float, max_bytes: int) -> Path | None:
     try:
         newest = max(
             (f for f in root.iterdir() if (f / RECORDING).exists()),
-            key=lambda f: f.name,
+            key=_order,
             default=None,
         )
-        if newest is None or read_manifest(newest).state != "open":
+        if newest is None:
+            return None
+        manifest = read_manifest(newest)
+        if manifest.state != "open":
             return None
         state = (newest / RECORDING).stat()
-        if time.time() - state.st_mtime > within_s or state.st_size > max_bytes:
+        written = Moment.of(manifest.written)
+        age_s = written.age_s if written is not None else time.time() - state.st_mtime
+        if age_s > within_s or state.st_size > max_bytes:
             return None
         fd = os.open(newest / RECORDING, os.O_RDONLY | os.O_CLOEXEC)
     except (SessionError, OSError):

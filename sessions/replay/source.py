@@ -9,9 +9,10 @@ from google.protobuf.message import DecodeError
 from messages.contract.topics import Topic, TopicError, parse
 from sessions.library.scan import rows_of
 from sessions.recording.mcap_damage import Damage
-from sessions.recording.mcap_index import keys_of, summary_of
-from sessions.recording.mcap_log import read, say
+from sessions.recording.mcap_index import keys_of, ordered_summary_of
+from sessions.recording.mcap_log import say
 from sessions.recording.samples import decode
+from sessions.recording.timeline import straight
 from sessions.replay.replay import Input
 
 
@@ -27,18 +28,18 @@ class Source:
         self.length_s = (end_ns - self.start_ns) / 1e9
 
     def _bounds(self) -> tuple[int, int]:
-        self._index = summary_of(self._path)
+        self._index = ordered_summary_of(self._path)
         if self._index is not None:
             found = self._index.statistics
             return found.message_start_time, found.message_end_time
         damage = Damage()
-        times = [
-            row.log_ns for row in read(self._path, damage)
-        ]  # without an index: as far as it can be read
+        first = last = 0
+        for row in straight(self._path, damage):  # without an index: as far as it can be read
+            first, last = min(first or row.log_ns, row.log_ns), max(last, row.log_ns)
         say(self._path, damage)
-        if not times:
+        if not first:
             raise ValueError(f"{self._path}: no message in it, {damage}: want an MCAP recording")
-        return min(times), max(times)
+        return first, last
 
     def items(self, from_ns: int = 0) -> Iterator[Input]:
         """Decoded messages from this log time on, in its order."""
@@ -53,7 +54,7 @@ class Source:
     def _rows(self, from_ns: int) -> Iterator[tuple[int, str, bytes]]:
         """Of all keys, in the order of their times as far as the file has an index."""
         if self._index is None:
-            rows = ((r.log_ns, r.key, r.payload) for r in read(self._path))
+            rows = ((r.log_ns, r.key, r.payload) for r in straight(self._path))
             yield from (row for row in rows if row[0] >= from_ns)
             return
         chunks = [c for c in self._index.chunk_indexes if c.message_end_time >= from_ns]
