@@ -1,7 +1,7 @@
 """What waits for the pipeline: a lane for each device, taken in turn, so that one that sends too
 much waits for itself, and the others do not wait for it.
 
-In a lane the order is that of arrival. When there is no room the newest message of the longest lane
+In a lane the order is that of arrival. When there is no room the newest message of the largest lane
 goes; its gap is noticed and asked for (messages/history/mending.py). Orders, answers and the order
 to end are never dropped.
 """
@@ -22,6 +22,7 @@ class Inbox:
         self._lanes: dict[str, deque[Any]] = {}
         self._turns: deque[str] = deque()  # lanes that hold something, the next first
         self._count = self._bytes = 0  # of arrivals
+        self._sizes: dict[str, int] = {}  # bytes of the arrivals in each lane
         self._ended = False
         self._news = threading.Condition()
         self.dropped = 0
@@ -32,10 +33,10 @@ class Inbox:
     def offer(self, lane: str, arrival: Arrival) -> bool:
         """A message from the bus; False when one, this or another, was dropped for it."""
         with self._news:
-            room = self._make_room(lane, len(arrival.payload))
-            if room:
+            before = self.dropped
+            if self._make_room(lane, len(arrival.payload)):
                 self._append(lane, arrival)
-            return room and not self._fell
+            return self.dropped == before
 
     def put(self, lane: str, item: object) -> None:
         """What must not be lost: an order, an answer."""
@@ -64,12 +65,12 @@ class Inbox:
             lane = self._turns.popleft()
             items = self._lanes[lane]
             item = items.popleft()
-            if isinstance(item, Arrival):
-                self._count, self._bytes = self._count - 1, self._bytes - len(item.payload)
+            self._count_item(lane, item, -1)
             if items:
                 self._turns.append(lane)
             else:
                 del self._lanes[lane]
+                self._sizes.pop(lane, None)
             return lane, item
 
     def _append(self, lane: str, item: Any, first: bool = False) -> None:
@@ -77,22 +78,36 @@ class Inbox:
         if not items:
             self._turns.append(lane)
         items.appendleft(item) if first else items.append(item)
-        if isinstance(item, Arrival):
-            self._count, self._bytes = self._count + 1, self._bytes + len(item.payload)
+        self._count_item(lane, item, 1)
         self._news.notify()
 
+    def _count_item(self, lane: str, item: Any, sign: int) -> None:
+        if isinstance(item, Arrival):
+            self._count += sign
+            size = sign * len(item.payload)
+            self._bytes += size
+            self._sizes[lane] = self._sizes.get(lane, 0) + size
+
+    def _has_room(self, size: int) -> bool:
+        return self._count < self._most and self._bytes + size <= self._most_bytes
+
     def _make_room(self, lane: str, size: int) -> bool:
-        """Drop the newest of the longest lane as long as there is no room; False when that is this
+        """Drop the newest of the largest lane as long as there is no room; False when that is this
         lane.
         """
-        self._fell = False
-        while self._count >= self._most or self._bytes + size > self._most_bytes:
-            self._fell = True
+        while not self._has_room(size):
             self.dropped += 1
-            longest = max(self._lanes, key=lambda name: len(self._lanes[name]), default=lane)
-            items = self._lanes.get(longest, deque())
-            if longest == lane or len(items) < 2 or not isinstance(items[-1], Arrival):
+            largest = max(self._sizes, key=lambda name: self._sizes[name], default=lane)
+            items = self._lanes.get(largest, ())
+            newest = next(
+                (k for k in reversed(range(len(items))) if isinstance(items[k], Arrival)), None
+            )
+            if largest == lane or newest is None:
                 return False
-            gone = items.pop()
-            self._count, self._bytes = self._count - 1, self._bytes - len(gone.payload)
+            gone = items[newest]
+            del items[newest]
+            self._count_item(largest, gone, -1)
+            if not items:
+                del self._lanes[largest], self._sizes[largest]
+                self._turns.remove(largest)
         return True
