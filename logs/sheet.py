@@ -23,17 +23,21 @@ from numpy.typing import NDArray
 from logs.sheet_form import (
     COMMENTS,
     FIRST_LOOK,
+    LINE,
     MISSING,
     SEPARATORS,
+    Lines,
     LogError,
     count,
     decimal_of,
     decoded,
+    first_bytes,
     header_line,
     is_number,
+    long_line,
+    opened,
     printable,
 )
-from logs.sheet_source import LINE, Lines, first_bytes, long_line, opened
 
 Array = NDArray[np.float64]
 
