@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from gateway.gnss.nmea import NONE, RTK_FIXED, Sentence
-from gateway.gnss.ubx_read import Nav, Three
+from gateway.gnss.ubx_read import MOST_SPEED_ACCURACY_MPS, Nav, Three
 
 NMEA_SPEED_SIGMA = 0.5  # m/s; NMEA has no word for it: a cautious figure for a code receiver
 WALKING_MPS = 1.0  # faster than this without a course has no direction, and is no velocity
@@ -163,6 +163,8 @@ def _with_velocity(fix: Fix, parts: Mapping[str, Nav]) -> Fix:
     cov, sigma = parts.get("NAV-COV"), source.v_sigma
     if cov is not None and cov.v_sigma is not None:
         sigma = cov.v_sigma
+    if sigma is not None and sigma[2] >= MOST_SPEED_ACCURACY_MPS:
+        down, sigma = NAN, (*sigma[:2], NAN)
     return replace(
         fix,
         v_n=(north, east, down),

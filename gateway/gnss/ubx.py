@@ -16,8 +16,10 @@ LEAP_SECONDS = 18  # GPS - UTC since 2017
 WEEK_MS = 7 * 86400 * 1000
 SPEED_ACCURACY = 0.05  # m/s per axis, where the log has none
 NO_ACCURACY = 0xFFFFFFFF
+NO_VARIANCE = 1e8  # m^2/s^2
 NO_HEIGHT_MM = -(2**31)
 PVT = struct.Struct("<IHBBBBBBIiBBBBiiiiIIiiiiiIIHH4xihH")
+COV = struct.Struct("<IBBB9x12f")
 HPPOSLLH = struct.Struct("<B2xBIiiiibbbbII")
 
 
@@ -32,11 +34,11 @@ class Epoch:
     height_m: float  # above the ellipsoid; NaN: unknown
     quality: int
     sigma_ned_m: tuple[float, float, float]
-    v_n: tuple[float, float, float] | None  # m/s; None: unknown
+    v_n: tuple[float, float, float] | None  # m/s; None: unknown, NaN: its down alone
 
 
 def ubx_bytes(epoch: Epoch) -> bytes:
-    """The two messages. What a log does not know is marked as a receiver marks it, by an accuracy
+    """Its messages. What a log does not know is marked as a receiver marks it, by an accuracy
     that is none: a velocity, a height (then the fix is of two dimensions), and always sea level,
     which has no accuracy of its own, by a height that cannot be.
     """
@@ -47,7 +49,16 @@ def ubx_bytes(epoch: Epoch) -> bytes:
     )
     pvt = UBXMessage("NAV", "NAV-PVT", GET, payload=_pvt(epoch, utc, i_tow))
     hppos = UBXMessage("NAV", "NAV-HPPOSLLH", GET, payload=_hpposllh(epoch, i_tow))
-    return pvt.serialize() + hppos.serialize()
+    data = pvt.serialize() + hppos.serialize()
+    if epoch.v_n is not None and not math.isfinite(epoch.v_n[2]):
+        data += UBXMessage("NAV", "NAV-COV", GET, payload=_cov(i_tow)).serialize()
+    return data
+
+
+def _cov(i_tow: int) -> bytes:
+    """Velocities known north and east only: one variance that is none."""
+    level = SPEED_ACCURACY**2
+    return COV.pack(i_tow, 0, 0, 1, *[0.0] * 6, level, 0.0, 0.0, level, 0.0, NO_VARIANCE)
 
 
 def _pvt(epoch: Epoch, utc: datetime, i_tow: int) -> bytes:
@@ -55,7 +66,7 @@ def _pvt(epoch: Epoch, utc: datetime, i_tow: int) -> bytes:
     if epoch.quality in (1, 2, 3, 4):
         flags |= 0x02  # differential corrections
     flags |= {1: 2, 2: 1}.get(epoch.quality, 0) << 6
-    vn, ve, vd = epoch.v_n or (0.0, 0.0, 0.0)
+    vn, ve, vd = (v if math.isfinite(v) else 0.0 for v in epoch.v_n or (0.0, 0.0, 0.0))
     speed_accuracy = round(SPEED_ACCURACY * math.sqrt(3.0) * 1e3) if epoch.v_n else NO_ACCURACY
     high = math.isfinite(epoch.height_m)
     s_n, s_e, s_d = epoch.sigma_ned_m

@@ -72,7 +72,7 @@ def nav_of(data: bytes) -> Nav | None:
     name, form, read = reader
     payload = data[6:-2]
     if len(payload) < form.size:
-        raise Refused(name, f"length {len(payload)}")
+        raise Refused(name, "length")
     nav = read(name, form.unpack_from(payload))
     within(name, "time of week", nav.tow_ms, 0, WEEK_MS)
     return nav

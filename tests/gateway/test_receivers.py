@@ -195,7 +195,7 @@ def test_a_ubx_message_that_cannot_be_is_refused_by_name():
         (nav_pvt(T0, lat=91.0), "NAV-PVT latitude"),
         (nav_pvt(T0, month=13), "NAV-PVT date"),
         (nav_pvt(T0, v=(9e4, 0.0, 0.0)), "NAV-PVT velocity"),
-        (frame(1, 7, b"\x00" * 20), "NAV-PVT length 20"),
+        (frame(1, 7, b"\x00" * 20), "NAV-PVT length"),
         (
             frame(1, 0x36, struct.pack("<IBBB9x12f", 5, 0, 1, 1, *[math.nan] * 12)),
             "NAV-COV variance",
@@ -370,4 +370,8 @@ def test_a_played_fix_keeps_what_it_does_not_know():
         fix = one(ubx_bytes(epoch))
         assert (fix.height_m is None) == math.isnan(height) and (fix.v_n is None) == (v_n is None)
         assert fix.height_msl_m is None
+    level = one(
+        ubx_bytes(Epoch(T0, 1.0, 49.0, 11.0, 1.0, 5, (1.0, 1.0, 2.0), (3.0, 4.0, math.nan)))
+    )
+    assert level.v_n[:2] == (3.0, 4.0) and math.isnan(level.v_n[2])
     assert one(ubx_bytes(whole)).height_m == pytest.approx(357.6)
