@@ -46,7 +46,7 @@ class BoardLog:
     index: NDArray[np.int64]  # (n,) sample numbers; what is missing was lost
     f_b: Array | None  # (n, 3) m/s^2 of a six-axis unit
     omega_b: Array | None  # (n, 3) rad/s
-    counts: NDArray[np.int64] | None  # (n, 12) of a cube
+    counts: NDArray[np.int16] | None  # (n, 12) of a cube
     tacho: Array | None  # (n,) rad/s
     fixes: tuple[Fix, ...]
     timing: Timing
@@ -101,18 +101,19 @@ def _imu(path: Path, sheet: Sheet, gnss: Path | None, as_named: bool) -> BoardLo
 
 def _cube(path: Path, as_named: bool, lsb_mg: float) -> BoardLog:
     log = read_log(path, CUBE_AXES, lsb_mg)
-    if log.counts is None:
+    counts = log.counts
+    if counts is None:
         raise LogError(
             f"{path}: a board sends counts, and this log has m/s^2: want columns a11_counts ..."
             " (gyrofree run takes the log as it is)"
         )
     low, high = COUNTS_16
-    bad = np.argwhere((log.counts < low) | (log.counts > high))
+    bad = np.argwhere((counts < low) | (counts > high))
     if len(bad):
         row, column = bad[0]
         raise LogError(
             f"{path}: column '{CUBE_AXES[column]}_counts' at {log.t_s[row]:.3f} s:"
-            f" {log.counts[row, column]}; want a whole number of 16 bits"
+            f" {counts[row, column]}; want a whole number of 16 bits"
         )
     doubt = doubt_of_gravity(centre_force(log.f_axis), lsb_mg)
     notes = refuse(path, [doubt], as_named) + said_of(path, log.timing, log.cut_off)
@@ -123,7 +124,7 @@ def _cube(path: Path, as_named: bool, lsb_mg: float) -> BoardLog:
         log.index,
         None,
         None,
-        log.counts,
+        counts.astype(np.int16),
         log.tacho,
         (),
         log.timing,

@@ -138,7 +138,7 @@ def import_log(
         source = read_board_log(log, gnss, units_as_named)
         for note in source.notes:
             print(f"note: {note}", file=sys.stderr)
-        rows = list(importer.rows_of(source, settings.bus.prefix, device))
+        rows = importer.rows_of(source, settings.bus.prefix, device)
         folder = _estimated(
             settings,
             rows,

@@ -63,9 +63,8 @@ def origin_of(source: BoardLog) -> float:
 
 def _samples(source: BoardLog) -> Iterator[Item]:
     period_s = source.timing.period_s
-    for row, (t_s, index) in enumerate(
-        zip(source.t_s.tolist(), source.index.tolist(), strict=True)
-    ):
+    for row, (t_s, index) in enumerate(zip(source.t_s, source.index, strict=True)):
+        t_s, index = float(t_s), int(index)
         if source.kind == "imu":
             imu = pb.ImuBatch(first_index=index, period_s=period_s)
             imu.f_b_mps2.extend(source.f_b[row].tolist())
@@ -85,12 +84,14 @@ def _tacho(source: BoardLog) -> Iterator[Item]:
     """
     if source.tacho is None:
         return
-    for t_s, rate in zip(source.t_s.tolist(), source.tacho.tolist(), strict=True):
+    for t_s, rate in zip(source.t_s, source.tacho, strict=True):
         if rate != 0.0:
             yield (
-                t_s,
+                float(t_s),
                 TACHO_TOPIC,
-                pb.TachoRate(omega_radps=rate, sigma_radps=TACHO_SIGMA, direction_known=True),
+                pb.TachoRate(
+                    omega_radps=float(rate), sigma_radps=TACHO_SIGMA, direction_known=True
+                ),
             )
 
 

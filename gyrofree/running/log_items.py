@@ -5,6 +5,7 @@ as a receiver would send. A log has no date: its t_s counts from LOG_EPOCH_S.
 """
 
 import heapq
+import itertools
 import math
 from collections.abc import Iterator
 
@@ -25,18 +26,16 @@ def items_of(log: BoardLog, pulses_per_rev: int = 360) -> Iterator[Item]:
 
 
 def _imu(log: BoardLog) -> Iterator[Item]:
-    rows = zip(
-        log.t_s.tolist(), log.index.tolist(), log.f_b.tolist(), log.omega_b.tolist(), strict=True
-    )
-    for t_s, index, f_b, omega_b in rows:
-        yield BoardImu(t_s, tuple(f_b), tuple(omega_b), index)
+    rows = zip(log.t_s, log.index, log.f_b, log.omega_b, strict=True)
+    for t_s, index, f_b, omega_b in rows:  # one by one: lists of a long log would be large
+        yield BoardImu(float(t_s), tuple(f_b.tolist()), tuple(omega_b.tolist()), int(index))
 
 
 def _cube(log: BoardLog, pitch: float) -> Iterator[Item]:
     angle, before_s = 0.0, float(log.t_s[0])
-    rates = [0.0] * len(log.t_s) if log.tacho is None else log.tacho.tolist()
-    rows = zip(log.t_s.tolist(), log.index.tolist(), log.counts.tolist(), rates, strict=True)
-    for t_s, index, counts, rate in rows:
+    rates = itertools.repeat(0.0) if log.tacho is None else log.tacho
+    for row, rate in zip(zip(log.t_s, log.index, log.counts, strict=True), rates, strict=False):
+        t_s, index, counts, rate = float(row[0]), int(row[1]), row[2].tolist(), float(rate)
         yield from table_pulses(angle, rate, before_s, t_s, pitch)
         angle, before_s = angle + rate * (t_s - before_s), t_s
         yield BoardAccel(t_s, tuple(counts), index)
