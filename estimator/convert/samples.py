@@ -16,6 +16,7 @@ from messages.contract.fixes import complete
 Array = NDArray[np.float64]
 
 MICRO = 1e-6
+LEAST_PERIOD_S = 1e-5
 
 
 class BadMessage(ValueError):
@@ -39,8 +40,8 @@ def _rows(
         problem = f"{flat.size} values do not fill rows of {columns}"
     elif not finite(flat):
         problem = "not all values are finite"
-    elif not 0.0 < period_s < 10.0:
-        problem = f"period {period_s} s, want 0 to 10 s"
+    elif not LEAST_PERIOD_S <= period_s < 10.0:
+        problem = f"period {period_s} s, want {LEAST_PERIOD_S:g} to 10 s"
     if problem:
         raise BadMessage(f"{what} {header.sequence} of {header.device}: {problem}")
     n, start = flat.size // columns, header.device_us * MICRO
