@@ -41,6 +41,7 @@ from inertial.rotation import rotate
 
 ARROW_PER_RADPS = 0.55  # half sides per rad/s; 180 deg/s gives 1.7
 ARROW_LONGEST = 2.2
+MOST = 12  # estimators drawn of one device; the tables have them all
 
 LAYERS = ("truth", "estimates", "sensors", "rate", "trajectory", "fixes", "ellipsoid", "grid")
 
@@ -98,7 +99,7 @@ class SceneView:
     def update(self, device: Device) -> None:
         """Poses from the newest messages. Call under the store's lock, 20 to 30 times a second."""
         body = device.body
-        estimators = device.estimators(body)
+        estimators = device.estimators(body)[:MOST]
         truth = device.get("truth") is not None
         built = (device.name, device.generation, body, tuple(estimators), truth, self._choice.dark)
         if built != self._built:

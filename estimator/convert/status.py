@@ -9,8 +9,8 @@ from messages.contract import gyrofree_pb2 as pb
 
 STATES = {
     Mode.WAITING: "waiting for samples",
-    Mode.LEVELLING: "levelling: stand still for 10 s",
-    Mode.COURSE: "finding heading: drive faster than 4 m/s",
+    Mode.LEVELLING: "levelling",
+    Mode.COURSE: "finding heading",
     Mode.NAVIGATING: "navigating",
 }
 
@@ -33,9 +33,8 @@ def status_message(
 def navigator_state(status: pb.EstimatorStatus, navigator: Any) -> pb.EstimatorStatus:
     """The status with what a navigator does and has counted."""
     status.state = STATES[navigator.mode]
-    status.message = ", ".join(
-        f"fixes {what} {count}" for what, count in navigator.counts.items() if count
-    )
+    counted = [f"fixes {what} {count}" for what, count in navigator.counts.items() if count]
+    status.message = ", ".join([part for part in (navigator.text, *counted) if part])
     return status
 
 

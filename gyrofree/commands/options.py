@@ -62,6 +62,15 @@ def file_of(settings: Settings, session: str) -> Path:
         raise fail(str(error)) from None
 
 
+def session_name(name: str) -> str:
+    """A name that a person gives a session; one that cannot be ends the command."""
+    from sessions.recording.manifest import name_fault  # here: help should not wait for it
+
+    if fault := name_fault(name):
+        raise typer.BadParameter(fault)
+    return name
+
+
 def console_of(width: int = 160) -> Console:
     """Standard output; `width` characters where that is a file or a pipe, which has no width of its
     own.

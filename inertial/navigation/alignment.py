@@ -6,45 +6,20 @@ docs/equations-ins.md (inmotion-alignment, section 10).
 """
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.constants import GRAVITY
 from inertial.core import native
-from inertial.elementary import atan2, norm
-from inertial.navigation.alignment_motion import MotionSettings, MotionWindow
+from inertial.elementary import atan2, norm, product
+from inertial.navigation.alignment_motion import Level, MotionStart, MotionWindow
+from inertial.navigation.standstill import AlignmentSettings, Standstill
 from inertial.rotation import euler_angles, euler_matrix, roll_pitch
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class AlignmentSettings:
-    """When a vehicle counts as standing, and as moving fast enough for its course to be its
-    heading.
-    """
-
-    standstill: float = 10.0  # s of it, at least
-    block: float = 1.0  # s, judged as a whole
-    still_f: float = (
-        0.35  # m/s^2, largest standard deviation of an axis in a block: idling engine passes
-    )
-    still_w: float = math.radians(6.0)  # rad/s, the same for rates
-    turn_w: float = math.radians(
-        0.5
-    )  # rad/s, largest change of a block's mean rate: slow turns are no standstill
-    tilt_f: float = 0.15  # m/s^2, largest change of a block's mean force
-    bias_w: float = math.radians(
-        8.0
-    )  # rad/s, largest rate that can be a gyro's bias: more is a steady turn
-    # m/s^2, largest difference from 1 g that can be an accelerometer's: more is acceleration
-    bias_f: float = 0.6
-    still_speed: float = 0.5  # m/s by GNSS, above which nothing is a standstill
-    course_speed: float = 4.0  # m/s, the course is the heading above it
-    longest_gap: float = 0.3  # s without samples, after which the standstill starts again
-    in_motion: bool = True  # a vehicle that never stands is aligned under way
-    motion: MotionSettings = field(default_factory=MotionSettings)
 
 
 @dataclass(frozen=True)
@@ -58,6 +33,10 @@ class Start:
         Array | None
     )  # (9, 9) psi_n, accelerometer bias, gyro bias; None: as configured for a levelled start
     how: str  # for people
+    sigma_yaw: float | None = None  # rad, with P None; None: as configured
+    # (3,) m/s and its sigma at the fix, where the fix itself has none
+    v_n: Array | None = None
+    sigma_v: Array | None = None
 
 
 class Alignment:
@@ -74,33 +53,46 @@ class Alignment:
         self.C = np.eye(3)  # C_nb with heading counted from an arbitrary start
         self.gyro_bias = np.zeros(3)  # rad/s, contains the Earth's rate, which a MEMS gyro hides
         self.mean_f = np.array([0.0, 0.0, -9.8])
-        self.still_s = 0.0  # s of the standstill that lasts now
-        self._disturbed = ""  # what ended the last standstill, for people
         self._way = "waiting for samples"
-        self._window = MotionWindow(settings.motion)
+        self._window = MotionWindow(settings.motion)  # fixes above course_speed
+        self._felt = MotionWindow(replace(settings.motion, sigma_slip=math.inf))  # all of them
+        self._C_still = np.eye(3)  # C at the last standstill
+        self._f_still = self.mean_f  # m/s^2, what was felt there
+        self._moving_since: float | None = None
+        self._sigma_v = 0.0  # m/s, level, of the newest velocity
+        self._now = 0.0  # s, of it
+        self._felt_yaw = math.pi  # rad, sigma of the heading felt in motion
         self._t: float | None = None
-        self._block: list[tuple[Array, Array]] = []
-        self._block_start = 0.0
-        self._sum_f = np.zeros(3)
-        self._sum_w = np.zeros(3)
-        self._count = 0
+        self._standstill = Standstill(settings)
 
     def imu(self, t: float, f: Array, w: Array) -> None:
         """One sample: time s, specific force (3,) m/s^2, rate (3,) rad/s."""
         if self._t is not None and t - self._t > self.settings.longest_gap:
             self._interrupt(f"{t - self._t:.1f} s without samples")
-            self._window.clear()
+            self._forget()
             self._t = None  # how it turned meanwhile nobody saw: one rate must not stand for it
         if self._t is not None and self.levelled:
             self.C = native.rotation.turned(self.C, (w - self.gyro_bias) * (t - self._t))
         self._t = t
-        if self.settings.in_motion and not self.levelled:
-            self._window.imu(t, f, w)
-        if not self._block:
-            self._block_start = t
-        self._block.append((f, w))
-        if t - self._block_start >= self.settings.block:
-            self._judge(t - self._block_start)
+        if self.settings.in_motion:
+            self._felt.imu(t, f, w)
+            if not self.levelled:
+                self._window.imu(t, f, w)
+        told = self._standstill.imu(t, f, w)
+        if told is not None:
+            self.mean_f, self.gyro_bias = told
+            self.C = euler_matrix(*roll_pitch(self.mean_f), euler_angles(self.C)[2])
+            self.levelled = True
+            self._C_still, self._f_still = self.C, self.mean_f
+            self._window.clear()
+
+    @property
+    def still_s(self) -> float:
+        """s of the standstill that lasts now."""
+        return self._standstill.seconds
+
+    def _interrupt(self, why: str) -> None:
+        self._standstill.interrupt(why, tell=not self.levelled)
 
     def resume(self, C_nb: Array, gyro_bias: Array) -> None:
         """Go on from an attitude and a gyro bias that a filter knew before samples went missing.
@@ -108,8 +100,9 @@ class Alignment:
         The time since then is not this attitude's to turn by.
         """
         self.C, self.gyro_bias, self.levelled = C_nb, gyro_bias, True
+        self._C_still, self._f_still = np.eye(3), np.array([0.0, 0.0, -GRAVITY])  # as if level
         self._interrupt("samples were missing")
-        self._window.clear()
+        self._forget()
         self._t = None
 
     def speed(self, speed: float) -> None:
@@ -122,42 +115,115 @@ class Alignment:
         start under way.
         """
         speed = float(norm(v_n[:2]))
-        self.speed(speed)
-        if not self.settings.in_motion or self.levelled:
+        self._sigma_v = float(norm(np.asarray(sigma_v)[:2])) / math.sqrt(2.0)
+        self.speed(speed - self._sigma_v)
+        if speed < self.settings.still_speed + self._sigma_v:
+            self._moving_since = None
+        elif self._moving_since is None:
+            self._moving_since = t
+        self._now = t
+        if not self.settings.in_motion:
+            return
+        self._felt.fix(t, v_n, sigma_v)
+        if self.levelled:
             return
         if speed < self.settings.course_speed:
             self._window.drop_fixes()
         else:
             self._window.fix(t, v_n, sigma_v)
 
-    def start(self, C_then: Array, v_n: Array) -> Start | None:
-        """The start at the fix given last, C_then being C at its time; None as long as `text`
-        says.
+    def start(
+        self, C_then: Array, v_n: Array, turned_back: Callable[[float], Array] | None = None
+    ) -> Start | None:
+        """The start at the fix given last, C_then being C at its time, turned_back(t) C at t; None
+        as long as `text` says.
         """
+        if not self.settings.in_motion:
+            return self._start_by_course(C_then, v_n, None) if self.levelled else None
+        felt = self._feel(turned_back)
         if self.levelled:
-            C_nb = self.heading(C_then, v_n)
-            if C_nb is None:
-                self._way = (
-                    f"level; drive faster than {self.settings.course_speed:g} m/s to find the"
-                    " heading"
-                )
+            by_course = self._start_by_course(C_then, v_n, felt)
+            return by_course if by_course is not None else self._start_by_feeling(felt, v_n)
+        return self._start_in_motion() or self._start_by_feeling(felt, v_n)
+
+    def _feel(self, turned_back: Callable[[float], Array] | None) -> MotionStart | None:
+        """The heading without the course: what the accelerometers felt against the velocities'
+        changes. None where they do not tell.
+        """
+        if self._moving_since is None or self._felt.first == math.inf:
+            return None
+        level = None
+        if self.levelled:
+            if turned_back is None:
                 return None
-            return Start(
-                C_nb,
-                self.gyro_bias,
-                np.zeros(3),
-                None,
-                "levelled at standstill, heading from the course",
+            level = Level(
+                turned_back(self._felt.first), self._C_still, self._f_still, self.gyro_bias
             )
-        return self._start_in_motion() if self.settings.in_motion else None
+        found = self._felt.solve(level)
+        return found if found is not None and self._good(found) else None
+
+    def _good(self, found: MotionStart) -> bool:
+        m = self.settings.motion
+        self._felt_yaw = found.sigma_yaw
+        return (
+            found.chi2_per_dof <= m.worst_chi2
+            and found.sigma_tilt <= m.good_tilt
+            and found.sigma_yaw <= m.good_yaw
+        )
+
+    def _start_by_course(self, C_then: Array, v_n: Array, felt: MotionStart | None) -> Start | None:
+        s = self.settings
+        speed = float(norm(v_n[:2]))
+        C_nb = self.heading(C_then, v_n)
+        sigma = math.hypot(s.sigma_course, self._sigma_v / max(speed, 1e-3))
+        if C_nb is None or sigma > s.motion.good_yaw:
+            known = math.degrees(min(self._felt_yaw, math.pi))
+            self._way = (
+                f"level; moving at {speed:.1f} m/s, heading known to {known:.0f} of"
+                f" {math.degrees(s.motion.good_yaw):.0f} deg: drive faster than"
+                f" {s.course_speed:g} m/s, or speed up, brake and turn"
+                if self._moving_since is not None
+                else f"level; drive faster than {s.course_speed:g} m/s to find the heading"
+            )
+            return None
+        if felt is not None:
+            turn = product(C_nb, felt.C_nb.T)
+            apart = abs(float(atan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1])))
+            if apart > s.disagree * math.hypot(felt.sigma_yaw, sigma):
+                return self._from_feeling(
+                    felt, f"; the course is {math.degrees(apart):.0f} deg off it: no car's"
+                )
+        how = "levelled at standstill, heading from the course"
+        if felt is None and s.in_motion:
+            how += ", not tested yet"
+        noisy = self._sigma_v / speed > 0.5 * s.sigma_course
+        return Start(
+            C_nb, self.gyro_bias, np.zeros(3), None, how, sigma_yaw=sigma if noisy else None
+        )
+
+    def _start_by_feeling(self, felt: MotionStart | None, v_n: Array) -> Start | None:
+        """For what never comes up to course_speed: a walker, a boat."""
+        s = self.settings
+        if self._moving_since is None or self._now - self._moving_since < s.patience:
+            return None
+        if felt is None or norm(v_n[:2]) >= s.course_speed:
+            return None
+        return self._from_feeling(felt, "")
+
+    def _from_feeling(self, felt: MotionStart, more: str) -> Start:
+        tilt, yaw = math.degrees(felt.sigma_tilt), math.degrees(felt.sigma_yaw)
+        how = f"heading from what was felt in motion, to {yaw:.1f} deg, tilt to {tilt:.1f} deg"
+        return Start(felt.C_nb, felt.bias_gyro, felt.bias_accel, felt.P, how + more)
 
     def _start_in_motion(self) -> Start | None:
         m = self.settings.motion
         found = self._window.solve()
         if found is None:
+            known = math.degrees(min(self._felt_yaw, math.pi))
             self._way = (
                 f"moving: {self._window.span:.0f} of {m.shortest:g} s above"
-                f" {self.settings.course_speed:g} m/s"
+                f" {self.settings.course_speed:g} m/s; heading known to {known:.0f} of"
+                f" {math.degrees(m.good_yaw):.0f} deg without them"
             )
             return None
         tilt, yaw = math.degrees(found.sigma_tilt), math.degrees(found.sigma_yaw)
@@ -178,6 +244,12 @@ class Alignment:
         )
         return Start(found.C_nb, found.bias_gyro, found.bias_accel, found.P, how)
 
+    def _forget(self) -> None:
+        self._window.clear()
+        self._felt.clear()
+        self._moving_since = None
+        self._felt_yaw = math.pi
+
     @property
     def text(self) -> str:
         """For people: what the alignment does or waits for."""
@@ -191,9 +263,10 @@ class Alignment:
         still = f"levelling: still for {self.still_s:.0f} of {s.standstill:g} s"
         if self.still_s == 0.0:
             still = f"stand still for {s.standstill:g} s"
-        if self._disturbed:
-            still += f"; begun again: {self._disturbed}"
-        return self._way if self._way.startswith("moving") and self._window.span > 0.0 else still
+        if self._standstill.disturbed:
+            still += f"; begun again: {self._standstill.disturbed}"
+        moving = self._moving_since is not None
+        return self._way if self._way.startswith("moving") and moving else still
 
     def heading(self, C_then: Array, v_n: Array) -> Array | None:
         """C_nb (3, 3) with the heading of the course v_n (3,); C_then is C at that time. None: too
@@ -203,58 +276,3 @@ class Alignment:
             return None
         roll, pitch, _ = euler_angles(C_then)
         return euler_matrix(roll, pitch, atan2(v_n[1], v_n[0]))
-
-    def _judge(self, length: float) -> None:
-        f = np.array([sample[0] for sample in self._block])
-        w = np.array([sample[1] for sample in self._block])
-        self._block = []
-        s = self.settings
-        moved = self._movement(f, w)
-        if moved:
-            self._interrupt(moved)
-            return
-        self._sum_f += f.sum(axis=0)
-        self._sum_w += w.sum(axis=0)
-        self._count += len(f)
-        self.still_s += length
-        if self.still_s >= s.standstill:
-            self.mean_f = self._sum_f / self._count
-            self.gyro_bias = self._sum_w / self._count
-            self.C = euler_matrix(*roll_pitch(self.mean_f), euler_angles(self.C)[2])
-            self.levelled = True
-            self._disturbed = ""
-            self._window.clear()
-
-    def _movement(self, f: Array, w: Array) -> str:
-        """What speaks against a standstill in a block of samples (n, 3), in words; empty when
-        nothing does.
-        """
-        s = self.settings
-        if f.std(axis=0).max() >= s.still_f:
-            return f"the board shakes by {f.std(axis=0).max():.2f} m/s^2"
-        if w.std(axis=0).max() >= s.still_w:
-            return f"the board shakes by {math.degrees(w.std(axis=0).max()):.1f} deg/s"
-        size = float(norm(f.mean(axis=0)))
-        if abs(size - 9.81) > s.bias_f:
-            return f"the board feels {size:.2f} m/s^2, which is not 1 g"
-        if np.abs(w.mean(axis=0)).max() > s.bias_w:
-            return (
-                f"the board turns steadily ({math.degrees(np.abs(w.mean(axis=0)).max()):.1f} deg/s)"
-            )
-        if self._count:
-            tilted = np.abs(f.mean(axis=0) - self._sum_f / self._count).max()
-            turned = np.abs(w.mean(axis=0) - self._sum_w / self._count).max()
-            if tilted >= s.tilt_f:
-                return f"the board tilted or was pushed ({tilted:.2f} m/s^2)"
-            if turned >= s.turn_w:
-                return f"the board turned ({math.degrees(turned):.1f} deg/s)"
-        return ""
-
-    def _interrupt(self, why: str) -> None:
-        if self.still_s > 0.0 and not self.levelled:
-            self._disturbed = f"{why} after {self.still_s:.0f} s"
-        self._block = []
-        self._sum_f = np.zeros(3)
-        self._sum_w = np.zeros(3)
-        self._count = 0
-        self.still_s = 0.0

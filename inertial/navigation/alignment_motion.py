@@ -51,6 +51,20 @@ class MotionSettings:
 
 
 @dataclass(frozen=True)
+class Level:
+    """What a standstill told: the attitude of the window's first fix but for its heading, and the
+    biases.
+    """
+
+    C_l0: Array  # (3, 3), body at the first fix to level axes l of any heading
+    C_ls: Array  # (3, 3), body at the standstill to l
+    mean_f: Array  # (3,) m/s^2 at the standstill
+    bias_gyro: Array  # (3,) rad/s
+    sigma_f: float = 0.1  # m/s^2, of gravity across the vertical: 0.6 deg, what gyros lose in turns
+    sigma_gyro: float = math.radians(0.08)  # rad/s
+
+
+@dataclass(frozen=True)
 class MotionFix:
     """Velocity at one instant."""
 
@@ -125,9 +139,14 @@ class MotionWindow:
         """
         self._fixes = []
 
-    def solve(self) -> MotionStart | None:
+    @property
+    def first(self) -> float:
+        """s, time of the oldest fix kept; infinite before any."""
+        return self._fixes[0].t if self._fixes else math.inf
+
+    def solve(self, level: Level | None = None) -> MotionStart | None:
         """Attitude and biases at the newest fix (E-81 to E-84); None while the window is too
-        short.
+        short. `level` is what a standstill before it told.
         """
         s = self.settings
         if (
@@ -136,7 +155,7 @@ class MotionWindow:
             or self._samples[-1][0] < self._fixes[-1].t
         ):
             return None
-        problem = _Problem(s, self._down, self._samples, self._fixes)
+        problem = _Problem(s, self._down, self._samples, self._fixes, level)
         C0, theta = problem.first_guess()
         for _ in range(6):
             r, J = problem.residuals(C0, theta), problem.jacobian(C0, theta)
@@ -187,9 +206,14 @@ class _Problem:
     """
 
     def __init__(
-        self, s: MotionSettings, down: Array, samples: list, fixes: list[MotionFix]
+        self,
+        s: MotionSettings,
+        down: Array,
+        samples: list,
+        fixes: list[MotionFix],
+        level: Level | None,
     ) -> None:
-        self._s, self._down = s, down
+        self._s, self._down, self._level = s, down, level
         keep = [x for x in samples if x[0] > fixes[0].t]
         self._t = np.array([x[0] for x in keep])
         self._f, self._w = np.array([x[1] for x in keep]), np.array([x[2] for x in keep])
@@ -212,7 +236,11 @@ class _Problem:
         """C_n0 with heading along the mean course and tilt from the mean force; no biases."""
         theta = np.zeros(UNKNOWNS)
         theta[V0] = self._v[0]
+        if self._level is not None:
+            theta[BG] = self._level.bias_gyro
         C, u = self.motion(theta)
+        if self._level is not None:
+            return self._turned_to_fit(self._level.C_l0, u), theta
         felt = (self._v[-1] - self._v[0]) - self._down * self._passed[-1]  # what u must be in n
         level = euler_matrix(0.0, 0.0, float(atan2(self._v[0, 1], self._v[0, 0])))
         a, b = _unit(applied(level.T, felt)), _unit(u[-1])
@@ -223,6 +251,26 @@ class _Problem:
             tilt = turn_matrix(_unit(axis) * atan2(norm(axis), cosine))
         return product(level, tilt), theta
 
+    def _turned_to_fit(self, C_l0: Array, u: Array) -> Array:
+        """C_n0 of level axes turned so that what was felt, u (m, 3), fits the velocities best."""
+        felt = applied(C_l0, u) + self._passed[:, None] * self._down
+        a, b = felt - felt.mean(axis=0), self._v - self._v.mean(axis=0)
+        sine = float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
+        cosine = float((a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1]).sum())
+        return product(euler_matrix(0.0, 0.0, float(atan2(sine, cosine))), C_l0)
+
+    def _prior(self, C0: Array, theta: Array) -> list[Array]:
+        """What is known before the window (E-83): the biases, and gravity across the vertical."""
+        s, known = self._s, self._level
+        if known is None:
+            return [theta[BA] / s.sigma_accel, theta[BG] / s.sigma_gyro]
+        f_n = applied(C0, applied(product(known.C_l0.T, known.C_ls), known.mean_f - theta[BA]))
+        return [
+            theta[BA] / s.sigma_accel,
+            (theta[BG] - known.bias_gyro) / known.sigma_gyro,
+            f_n[:2] / known.sigma_f,
+        ]
+
     def residuals(self, C0: Array, theta: Array) -> Array:
         """Velocities, courses and what is known of the biases, each over its sigma (E-81 to
         E-83).
@@ -230,11 +278,7 @@ class _Problem:
         s = self._s
         C, u = self.motion(theta)
         v = theta[V0] + self._passed[:, None] * self._down + applied(C0, u)
-        rows = [
-            ((v - self._v) / self._sigma_v).ravel(),
-            theta[BA] / s.sigma_accel,
-            theta[BG] / s.sigma_gyro,
-        ]
+        rows = [((v - self._v) / self._sigma_v).ravel(), *self._prior(C0, theta)]
         if math.isfinite(s.sigma_slip):
             speed = norm(self._v[:, :2])
             x_n = applied(C0, C[:, :, 0])

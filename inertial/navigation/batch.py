@@ -240,7 +240,7 @@ class Drive:
             k = end
             while j < len(self.fixes) and self.due[j] <= self.t[k - 1]:
                 fix, j = self.fixes[j], j + 1
-                start = None if fix.withheld or fix.v_n is None else startup.fix(fix)
+                start = None if fix.withheld else startup.fix(fix)
                 if start is not None:
                     return Found(startup, start, fix, j)
         return None

@@ -3,7 +3,7 @@ compares them.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -19,6 +19,26 @@ Array = NDArray[np.float64]
 # values of enums of the core, inertial/core/navigation/window.hpp and filter.hpp
 ARRIVALS = {"p0": 0, "mean": 1, "kf": 2}
 WINDOWS = {"none": 0, "predictive": 1, "robust": 2}
+
+
+@dataclass(frozen=True)
+class Trial:
+    """When the data agree with the wheels: a filter with their constraint and one without differ by
+    no more than they may (E-54 to E-56).
+    """
+
+    memory: float = 10.0  # s of motion over which the difference is averaged
+    contradicted: float = 3.0  # mean squared difference, in variances, that ends belief
+    agreed: float = 1.5  # below it counts as agreement
+    proof: float = 15.0  # s of agreement in motion until the wheels are believed
+    again: float = 60.0  # s of it after they were contradicted
+    turn: float = math.radians(30.0)  # rad of headings that the agreement must have gone through
+    heading: float = math.radians(3.0)  # rad, sigma above which the one without cannot tell
+    strain: float = 4.0  # mean NIS per row of the constraint itself that ends belief
+
+    def core(self) -> Any:
+        """The core's TrialSettings."""
+        return core.TrialSettings(**asdict(self))
 
 
 @dataclass(frozen=True)
@@ -41,6 +61,8 @@ class Constraints:
     sigma_mount: float = math.radians(4.0)  # rad, of both mounting angles at the start
     axle: float = 1.0  # m, the rear axle behind the IMU, at the start
     sigma_axle: float = 1.0  # m
+    tried: bool = True  # the wheels are believed only while the data agree
+    trial: Trial = Trial()
 
     def core(self) -> Any:
         """The core's Rules."""
@@ -116,6 +138,8 @@ class FilterConfig:
             literal=self.literal,
             fuzzy=self.rules.core(),
             rules=self.constraints.core(),
+            tries=self.constraints.car and self.constraints.tried,
+            trial=self.constraints.trial.core(),
             lever_b=lever_arm_b,
         )
 

@@ -27,11 +27,13 @@ from inertial.navigation.fix import Fix, core_fix
 from inertial.navigation.settings import NavigatorConfig
 from inertial.navigation.solution import (
     INNOVATIONS,
+    WHEELS,
     WITHHELD,
     Correction,
     HorizonChoice,
     Mode,
     Solution,
+    Wheels,
     correction_of,
     nothing_compared,
     without_height,
@@ -64,6 +66,7 @@ class Navigator:
         )
         self._startup = Startup(config.alignment, self._live)
         self._pending: list[Fix] = []
+        self.wheels = Wheels.NONE
         self._how = ""
         self._last_fix: Fix | None = None
         self._last_used = -math.inf
@@ -181,6 +184,7 @@ class Navigator:
             return self._refuse(nothing_compared(fix), "late", late)
         result = self._live.take(core_fix(fix, self.config.fix))
         said = correction_of(fix, result)
+        self._tell_wheels(result)
         if not said.accepted:
             count = "rejected" if result.status == results.REJECTED else "withheld"
             return self._refuse(said, count, said.reason)
@@ -188,6 +192,20 @@ class Navigator:
         self.horizon = said.horizon
         self._took(fix)
         return said
+
+    def _tell_wheels(self, result: Any) -> None:
+        self.wheels = Wheels(result.wheels)
+        if result.switched:
+            log.info("%s", WHEELS[self.wheels])
+
+    @property
+    def text(self) -> str:
+        """For people: what the alignment does or waits for; while navigating how it was found, and
+        what is believed of the vehicle.
+        """
+        if not self._live.navigating:
+            return self._startup.align.text
+        return "; ".join(part for part in (self._how, WHEELS[self.wheels]) if part)
 
     def _count(self, status: int) -> None:
         if status == results.READMITTED:
@@ -213,9 +231,6 @@ class Navigator:
         """Before navigation: watch the speed, and start once the alignment knows the heading."""
         if fix.withheld:
             return self._refuse(nothing_compared(fix), "withheld", WITHHELD)
-        if fix.v_n is None:
-            self._took(fix)
-            return replace(nothing_compared(fix), reason="aligning: no velocity in the fix")
         start = self._startup.fix(fix)
         if start is not None:
             self._begin(start, fix)
@@ -227,6 +242,7 @@ class Navigator:
         leg = first_leg(self.config, self.filter, start, fix)
         self._live.begin(leg, self.filter.memory(leg.P, self._startup.still_f))
         self._how = start.how
+        self.wheels = Wheels.ON_TRIAL if self._live.memory.trial.running else Wheels.NONE
         self.mode = Mode.NAVIGATING
 
     # -- output
@@ -254,7 +270,7 @@ class Navigator:
             t - self._last_used,
             self.horizon,
             self._datum,
-            self._how,
+            self.text,
         )
         return without_height(solution)
 

@@ -37,6 +37,23 @@ class Mode(IntEnum):
     NAVIGATING = 3
 
 
+class Wheels(IntEnum):
+    """What a filter believes of a car's wheels, as Wheels of the core."""
+
+    NONE = 0
+    ON_TRIAL = 1
+    BELIEVED = 2
+    CONTRADICTED = 3
+
+
+WHEELS = {
+    Wheels.NONE: "",
+    Wheels.ON_TRIAL: "wheels on trial, not used: it may be no car",
+    Wheels.BELIEVED: "wheels believed: the fixes agree with a car that does not slide",
+    Wheels.CONTRADICTED: "wheels not used: the fixes contradict a car that does not slide",
+}
+
+
 @dataclass(frozen=True)
 class HorizonChoice:
     """How many fixes a moving horizon looked back at its last fix, and why."""
@@ -114,6 +131,9 @@ def correction_of(fix: Fix, said: Any) -> Correction:
             f" {max(fix.sigma_p[:2]):.0f} m"
         )
         reason = f"{drag}; {reason}" if reason else drag
+    if said.switched:
+        now = WHEELS[Wheels(said.wheels)]
+        reason = f"{reason}; {now}" if reason else now
     horizon = None
     if said.horizon > 0:
         force, rate = said.inputs.tolist()

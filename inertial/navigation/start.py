@@ -3,6 +3,7 @@
 Live navigation and the run over a whole drive step the same object, so that they start alike.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,9 @@ from numpy.typing import NDArray
 
 from inertial.constants import GRAVITY
 from inertial.core import navigation as core
-from inertial.elementary import dot, norm
+from inertial.elementary import dot, norm, product
 from inertial.navigation.alignment import Alignment, AlignmentSettings, Start
+from inertial.navigation.alignment_positions import Positions
 from inertial.navigation.error_model import DP
 from inertial.navigation.filters import FilterConfig
 from inertial.navigation.fix import UNKNOWN_HEIGHT_SIGMA, Fix
@@ -19,6 +21,7 @@ from inertial.navigation.settings import NavigatorConfig
 
 Array = NDArray[np.float64]
 
+CHANGE = 1.0  # m/s^2, by which a velocity may have changed since
 HEIGHT_UP = np.array([1.0, 1.0, -1.0])  # the error state counts height up
 
 
@@ -31,6 +34,7 @@ class Startup:
         """`history` is the core's Live of the filter that is to start."""
         self.align = Alignment(settings)
         self.history = history
+        self._positions = Positions()
 
     @property
     def still_f(self) -> float:
@@ -44,14 +48,35 @@ class Startup:
         self.history.feed(imu)
 
     def fix(self, fix: Fix) -> Start | None:
-        """Take a fix with a velocity; the start, when the alignment knows enough at its time."""
+        """Take a fix; the start at its time, when the alignment knows enough. A receiver without
+        velocities is asked for the way between its positions.
+        """
         fix = fix.filled()
-        self.align.fix(fix.t, fix.v_n, fix.sigma_v)
-        if not self.history.reaches(fix.t):
+        if fix.v_n is not None:
+            return self._ask(fix.t, fix.v_n, fix.sigma_v)
+        walked = self._positions.take(fix)
+        if walked is None:
+            return None
+        start = self._ask(walked.t, walked.v_n, walked.sigma_v)
+        if start is None:
+            return None
+        # from the middle of the way to the fix, by the gyros; the velocity may have changed
+        bias = start.bias_gyro
+        then, now = (self.history.turned_back(np.eye(3), bias, t) for t in (walked.t, fix.t))
+        C_nb = product(start.C_nb, product(then.T, now))
+        sigma_v = walked.sigma_v + CHANGE * (fix.t - walked.t)
+        return replace(start, C_nb=C_nb, v_n=walked.v_n, sigma_v=sigma_v)
+
+    def _ask(self, t: float, v_n: Array, sigma_v: Array) -> Start | None:
+        self.align.fix(t, v_n, sigma_v)
+        if not self.history.reaches(t):
             return None
         a = self.align
-        then = self.history.turned_back(a.C, a.gyro_bias, fix.t)
-        return a.start(then, fix.v_n)
+
+        def turned_back(then: float) -> Array:
+            return self.history.turned_back(a.C, a.gyro_bias, then)
+
+        return a.start(turned_back(t), v_n, turned_back)
 
     def after_gap(self, nominal: Any | None) -> None:
         """Begin again after samples were missing; nominal is the core's state of the filter that
@@ -71,7 +96,7 @@ def first_leg(config: NavigatorConfig, chosen: FilterConfig, start: Start, fix: 
     leg = core.new_leg(model.states)
     x = leg.x
     x.latitude, x.longitude, x.height = fix.latitude, fix.longitude, fix.height
-    x.v_n, x.C_nb = fix.v_n, start.C_nb
+    x.v_n, x.C_nb = fix.v_n if start.v_n is None else start.v_n, start.C_nb
     x.bias_gyro, x.bias_accel = start.bias_gyro, start.bias_accel
     if chosen.constraints.car:
         x.axle = chosen.constraints.axle
@@ -91,8 +116,9 @@ def first_covariance(
     sigma_p = np.minimum(c.sigma_p, np.maximum(3.0 * fix.sigma_p, 0.1))
     if fix.sigma_p[2] >= UNKNOWN_HEIGHT_SIGMA:
         sigma_p[2] = fix.sigma_p[2]
-    sigma_v = np.maximum(c.sigma_v, fix.sigma_v)
-    attitude = [c.sigma_tilt, c.sigma_tilt, c.sigma_yaw]
+    sigma_v = np.maximum(c.sigma_v, fix.sigma_v if start.sigma_v is None else start.sigma_v)
+    sigma_yaw = c.sigma_yaw if start.sigma_yaw is None else max(c.sigma_yaw, start.sigma_yaw)
+    attitude = [c.sigma_tilt, c.sigma_tilt, sigma_yaw]
     biases = [c.sigma_bias_accel] * 3 + [c.sigma_bias_gyro] * 3
     sigma = np.concatenate([attitude, sigma_v, sigma_p, biases, chosen.extra_sigma()])
     P = np.diag(np.square(sigma))

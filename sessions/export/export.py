@@ -27,6 +27,7 @@ from scipy.io import savemat
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
 from messages.contract.topics import GNSS, LOG, NAV, RATE, Topic, parse
+from messages.text import cell
 from sessions.export.columns import Column
 from sessions.export.table import (
     Block,
@@ -82,8 +83,12 @@ def to_csv(
 
 
 def _cells(column: Column, values: NDArray[Any]) -> list[float | int | str]:
-    """A column for CSV: nothing for NaN, whole numbers without a point."""
+    """A column for CSV: nothing for NaN, whole numbers without a point, no text that a spreadsheet
+    executes.
+    """
     cells: list[float | int | str] = values.tolist()
+    if column.text:
+        return [cell(text) for text in cells]
     if values.dtype.kind != "f":
         return cells
     return ["" if v != v else int(v) if column.whole else v for v in cells]

@@ -7,11 +7,13 @@ to trust the file: open (being recorded, or cut off), closed (complete, with its
 
 import os
 import re
+import unicodedata
 from pathlib import Path
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from messages import text
 from messages.clock import Moment
 
 MANIFEST = "session.json"
@@ -20,6 +22,27 @@ RECOVERED = "recovered.mcap"
 NUMBER = "number"  # file of a folder of sessions: the newest one's number
 SESSION_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,31}")  # what a person may add to an id
 SESSION_ID = re.compile(r"[0-9]{8}-[0-9]{6}(-[a-z0-9][a-z0-9_-]{0,40})?")
+
+
+NAME_LENGTH = 100  # characters that a person may call a session
+GERMAN = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})  # the usual way to write them
+
+
+def name_fault(name: str) -> str:
+    """Why a session may not be called so, or "". Its id takes of the name what it can: slug."""
+    if len(name) > NAME_LENGTH:
+        return f"name of {len(name)} characters: want at most {NAME_LENGTH}"
+    fault = text.check(name)
+    return f"name: {fault}" if fault else ""
+
+
+def slug(name: str, longest: int = 32) -> str:
+    """What a person calls a session, as it may stand in an id: "Messung Prüfstand (2)" ->
+    "messung-pruefstand-2"; empty when no letter of it can.
+    """
+    small = unicodedata.normalize("NFC", name).lower().translate(GERMAN)
+    ascii_only = unicodedata.normalize("NFKD", small).encode("ascii", "ignore").decode()
+    return re.sub(r"[^a-z0-9_-]+", "-", ascii_only)[:longest].strip("-_")
 
 
 class SessionError(ValueError):

@@ -22,8 +22,9 @@ from messages.contract.door import Door, device_of
 from messages.contract.topics import RECORDER
 from messages.history.mending_state import Question
 from messages.text import plain
+from sessions.library.annotations import give_title
 from sessions.recording.intake import Entry, Intake
-from sessions.recording.manifest import SESSION_NAME, Manifest
+from sessions.recording.manifest import Manifest, SessionError, name_fault, slug
 from sessions.recording.session_clock import SessionClock
 from sessions.recording.settings import RecorderSettings
 from sessions.recording.store import SessionStore, start
@@ -273,19 +274,16 @@ class Recorder:
         if command.action == pb.RecorderCommand.ACTION_START:
             if self._store is not None:
                 return f"already recording {self._store.manifest.id}: stop it first"
-            if command.name and not SESSION_NAME.fullmatch(command.name):
-                return (
-                    f"name {command.name[:80]!r}: want a letter or digit, then a-z, 0-9, _ and -,"
-                    " at most 32"
-                )
+            if fault := name_fault(command.name):
+                return fault
             if fault := text.check(command.note, lines=True) or text.check(command.user):
                 return f"note or user: {fault}"
             log.info("start ordered by %s", command.user or "an unnamed user")
-            return (
-                ""
-                if self._begin(name=command.name, note=command.note, user=command.user)
-                else self._message
-            )
+            name = slug(command.name)
+            if not self._begin(name=name, note=command.note, user=command.user):
+                return self._message
+            self._keep_title(command.name)
+            return ""
         if command.action == pb.RecorderCommand.ACTION_STOP:
             if self._store is None:
                 return "not recording: nothing to stop"
@@ -294,6 +292,13 @@ class Recorder:
             self._end()
             return self._message
         return ""
+
+    def _keep_title(self, name: str) -> None:
+        if self._store is not None:
+            try:
+                give_title(self._store.folder, name)
+            except (SessionError, OSError) as error:
+                log.warning("%s: its title is not kept: %s", self._store.folder, error)
 
     def status(self) -> pb.RecorderStatus:
         """The state of now."""

@@ -11,9 +11,11 @@ from dashboard.data.device import Device
 from dashboard.data.store import Store
 from dashboard.desk import Desk
 from dashboard.scene.drawing.chart import Chart, Curve, Shade
+from dashboard.scene.drawing.page import Markup, html
 from dashboard.scene.drawing.palette import estimator_colour, estimator_title
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
+from messages.text import plain
 
 log = logging.getLogger(__name__)
 
@@ -69,7 +71,7 @@ class Panel:
             text, good = str(error), False
         title = title if good else "The estimator did not do it"
         self.client.add_notification(
-            title, text, color="teal" if good else "red", auto_close_seconds=8.0
+            title, plain(text), color="teal" if good else "red", auto_close_seconds=8.0
         )
 
     def chart(self, key: str, title: str, unit: str, height: int = 170, digits: int = 1) -> Chart:
@@ -102,8 +104,11 @@ class Panel:
             shades=shades,
         )
 
-    def html(self, content: str, handle: viser.GuiHtmlHandle | None) -> viser.GuiHtmlHandle:
-        """Set an HTML element's content when it changed; make it at first use."""
+    def html(self, content: Markup, handle: viser.GuiHtmlHandle | None) -> viser.GuiHtmlHandle:
+        """Set an HTML element's content when it changed; make it at first use. What is no Markup is
+        shown as text.
+        """
+        content = str(html(content))
         if handle is None:
             with self.folder:
                 return self.client.gui.add_html(content, order=1.0)  # above the charts

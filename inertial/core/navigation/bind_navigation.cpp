@@ -64,6 +64,8 @@ void bind_structs(nb::module_& m) {
   bind_fields<Fix>(m, "Fix", "a fix as the filters take it");
   bind_fields<Measurement>(m, "Measurement", "y, H, R");
   bind_fields<Rules>(m, "Rules", "what a car's wheels say, and when");
+  bind_fields<TrialSettings>(m, "TrialSettings", "when the wheels are believed");
+  bind_fields<Trial>(m, "Trial", "the filter beside it, and the verdict on the wheels");
   bind_fields<FuzzyRules>(m, "FuzzyRules", "sets and consequents of the fuzzy horizon");
   bind_fields<Settings>(m, "Settings", "a filter's choices");
   bind_fields<Epoch>(m, "Epoch", "a fix of the horizon, and what a pass makes of it");

@@ -1,5 +1,7 @@
 #include "navigation/constraints.hpp"
 
+#include <algorithm>
+
 #include "navigation/leg.hpp"
 
 namespace gyrofree::navigation {
@@ -9,6 +11,8 @@ constexpr int FORWARD = 0, SIDE = 1, BELOW = 2;  // of the body
 constexpr int SIDEWAYS = 0, VERTICAL = 1, WHEEL_ROWS = 2;
 constexpr int ZERO_V = 0, ZERO_W = 3, STILL_ROWS = 6;
 
+constexpr double STRAIN_SHARE = 0.05;  // of the newest look in the mean: 10 s at two looks a second
+constexpr double MOST_STRAIN = 25.0;   // of one look
 constexpr int LEAST_TICKS = 8;         // of them, to judge a standstill
 constexpr double LEAST_TICK_S = 0.05;  // shorter ones are too noisy
 constexpr double STILL_BIAS = 3.0;     // times still_w_change: more is a turn
@@ -104,7 +108,7 @@ bool standing(const Leg& leg, const Rules& rules) {
 Measurement constraint(const Leg& leg, const Model& model, const Rules& rules) {
   if (leg.ticks.back().length <= 0.0) return {};
   if (standing(leg, rules)) return standstill(leg, model, rules);
-  return model.has_car() ? wheels(leg, model, rules) : Measurement();
+  return model.has_car() && leg.wheels ? wheels(leg, model, rules) : Measurement();
 }
 
 bool constrain(Leg& leg, const Model& model, const Rules& rules, StateVector& error) {
@@ -117,7 +121,8 @@ bool constrain(Leg& leg, const Model& model, const Rules& rules, StateVector& er
   Innovation innovation = innovate(P, z);
   Whitened white = whiten(innovation.S, z.y);
   if (!(white.nis >= 0.0)) return false;
-  const double d = std::sqrt(white.nis / z.rows());
+  const double square = white.nis / z.rows(), d = std::sqrt(square);
+  if (z.rows() == WHEEL_ROWS) leg.strain += STRAIN_SHARE * (std::min(square, MOST_STRAIN) - leg.strain);
   if (d > rules.huber) {  // wheels slip and ground shakes: less weight, never none
     innovation.S *= d / rules.huber;
     white = whiten(innovation.S, z.y);

@@ -176,28 +176,73 @@ Vector<2> motion(const Leg& leg, bool literal, double still_f) {
   return {earth::STANDARD_GRAVITY + std::fabs(size - still_f), norm_of(omega / T - leg.x.bias_gyro)};
 }
 
+void begin_trial(Leg& leg, const Settings& settings, Memory& memory) {
+  if (settings.tries && !memory.trial.running) begin_trial(memory.trial, leg, settings.trial);
+}
+
+std::size_t run_both(Leg& leg, const Model& model, const Settings& settings, Memory& memory, Samples samples,
+                     std::size_t start, std::size_t stop) {
+  if (memory.trial.running) run_to(memory.trial.other, model, settings.rules, samples, start, stop, FOREVER);
+  return run_to(leg, model, settings.rules, samples, start, stop, FOREVER);
+}
+
+namespace {
+
+// Sample k is the one that reaches over the fix.
+FixResult take_one(Leg& leg, const Model& model, const Settings& settings, Memory& memory, Samples samples,
+                   std::size_t k, std::size_t stop, const Fix& fix) {
+  Leg trial = leg;
+  run_to(trial, model, settings.rules, samples, k, std::min(k + 1, stop), fix.t);
+  FixResult out = take(trial, model, settings, memory, fix, samples[std::min(k, stop - 1)].omega_b);
+  if (was_used(out.status)) leg = trial;
+  return out;
+}
+
+State state_of(const FixResult& said) { return {said.x, said.P, said.nis / std::max(said.dof, 1)}; }
+
+// The same of the filter beside it, which counts its own refusals.
+FixResult take_other(const Model& model, const Settings& settings, Memory& memory, Samples samples,
+                     std::size_t k, std::size_t stop, const Fix& fix) {
+  Trial& trial = memory.trial;
+  std::swap(memory.refused, trial.refused), std::swap(memory.doubted, trial.doubted);
+  FixResult out = take_one(trial.other, model, settings, memory, samples, k, stop, fix);
+  std::swap(memory.refused, trial.refused), std::swap(memory.doubted, trial.doubted);
+  return out;
+}
+
+}  // namespace
+
 FixResult take_at(Leg& leg, const Model& model, const Settings& settings, Memory& memory, Samples samples,
                   std::size_t& k, std::size_t stop, const Fix& fix) {
   std::size_t end = k;
   while (end < stop && samples[end].t <= fix.t) ++end;
-  k = run_to(leg, model, settings.rules, samples, k, end, FOREVER);
-  Leg trial = leg;
-  run_to(trial, model, settings.rules, samples, k, std::min(k + 1, stop), fix.t);
-  const Vector3& rate_b = samples[std::min(k, stop - 1)].omega_b;
-  FixResult out = take(trial, model, settings, memory, fix, rate_b);
-  if (was_used(out.status)) leg = trial;
+  k = run_both(leg, model, settings, memory, samples, k, end);
+  Trial& trial = memory.trial;
+  FixResult other;
+  if (trial.running) other = take_other(model, settings, memory, samples, k, stop, fix);
+  FixResult out = take_one(leg, model, settings, memory, samples, k, stop, fix);
+  if (!trial.running) return out;
+  const FixResult& without = leg.wheels ? other : out;
+  if (was_used(without.status) && judge_wheels(trial, leg, settings.trial, fix.t, state_of(out), state_of(other))) {
+    std::swap(memory.refused, trial.refused), std::swap(memory.doubted, trial.doubted);
+    out = other;
+    out.switched = 1;
+  }
+  out.wheels = wheels_of(trial, leg);
+  out.difference = trial.difference;
   return out;
 }
 
 std::vector<FixResult> run(Leg& leg, const Model& model, const Settings& settings, Memory& memory,
                            Samples samples, std::size_t start, std::size_t stop, std::span<const Fix> fixes) {
+  begin_trial(leg, settings, memory);
   std::vector<FixResult> out(fixes.size());
   std::size_t k = start;
   for (std::size_t j = 0; j < fixes.size(); ++j) {
     if (fixes[j].t < leg.time - SAME_TIME_S) continue;  // late
     out[j] = take_at(leg, model, settings, memory, samples, k, stop, fixes[j]);
   }
-  run_to(leg, model, settings.rules, samples, k, stop, FOREVER);
+  run_both(leg, model, settings, memory, samples, k, stop);
   return out;
 }
 

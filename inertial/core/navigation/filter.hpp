@@ -7,6 +7,7 @@
 #include "navigation/constraints.hpp"
 #include "navigation/fuzzy.hpp"
 #include "navigation/leg.hpp"
+#include "navigation/trial.hpp"
 #include "navigation/update.hpp"
 #include "navigation/window.hpp"
 
@@ -35,6 +36,8 @@ struct Settings {
   bool literal = false;     // fuzzy inputs as read, not conditioned
   FuzzyRules fuzzy;
   Rules rules;
+  bool tries = false;       // wheels are believed only while the data agree
+  TrialSettings trial;
   Vector3 lever_b = Vector3::Zero();  // m, IMU to antenna
 
   template <class Self, class Visitor>
@@ -42,7 +45,8 @@ struct Settings {
     v("gates", s.gates), v("readmit", s.readmit), v("fading", s.fading), v("huber", s.huber);
     v("low_weight", s.low_weight), v("window", s.window), v("horizon", s.horizon);
     v("arrival", s.arrival), v("kappa", s.kappa), v("passes", s.passes), v("literal", s.literal);
-    v("fuzzy", s.fuzzy), v("rules", s.rules), v("lever_b", s.lever_b);
+    v("fuzzy", s.fuzzy), v("rules", s.rules), v("tries", s.tries), v("trial", s.trial);
+    v("lever_b", s.lever_b);
   }
 };
 
@@ -53,13 +57,15 @@ struct Memory {
   int doubted = 0;       // low weights in a row
   double still_f = 0.0;  // |mean f| at standstill, m/s^2
   StateVector estimate;  // the error that the last fix used was answered with
+  Trial trial;           // of the wheels
 
-  explicit Memory(int n = CORE, int capacity = 0) : window(n, capacity), estimate(StateVector::Zero(n)) {}
+  explicit Memory(int n = CORE, int capacity = 0)
+      : window(n, capacity), estimate(StateVector::Zero(n)), trial(n) {}
 
   template <class Self, class Visitor>
   static void visit(Self& s, Visitor& v) {
     v("window", s.window), v("refused", s.refused), v("doubted", s.doubted);
-    v("still_f", s.still_f), v("estimate", s.estimate);
+    v("still_f", s.still_f), v("estimate", s.estimate), v("trial", s.trial);
   }
 };
 
@@ -68,6 +74,9 @@ struct FixResult {
   Status status = Status::LATE;
   int dof = 0;                 // rows compared
   int horizon = 0;             // fixes looked back
+  Wheels wheels = Wheels::NONE;  // what is believed of them after it
+  int switched = 0;            // 1: since this fix
+  double difference = 0.0;     // of the filters with and without wheels (E-55)
   double nis = 0.0;
   double crisp = 0.0;          // the horizon before rounding
   Vector<2> inputs;            // of the fuzzy rules, m/s^2 and rad/s
@@ -84,7 +93,8 @@ struct FixResult {
 
   template <class Self, class Visitor>
   static void visit(Self& s, Visitor& v) {
-    v("status", s.status), v("dof", s.dof), v("horizon", s.horizon), v("nis", s.nis);
+    v("status", s.status), v("dof", s.dof), v("horizon", s.horizon);
+    v("wheels", s.wheels), v("switched", s.switched), v("difference", s.difference), v("nis", s.nis);
     v("crisp", s.crisp), v("inputs", s.inputs), v("y", s.y), v("sigma", s.sigma);
     v("weight", s.weight), v("error_ned", s.error_ned), v("yaw", s.yaw), v("left", s.left);
     v("x", s.x), v("P", s.P);
@@ -103,8 +113,16 @@ FixResult take(Leg& leg, const Model& model, const Settings& settings, Memory& m
 // The two inputs of the fuzzy rules (E-48): |f^b| in m/s^2 and |omega^b| in rad/s.
 Vector<2> motion(const Leg& leg, bool literal, double still_f);
 
-// Goes from `leg` to the time of a fix and takes it there: used, `leg` becomes the corrected one.
-// `k` is the first sample after the leg's time, and on return that of the fix's.
+// Starts the trial of the wheels, where the settings ask for one and none runs.
+void begin_trial(Leg& leg, const Settings& settings, Memory& memory);
+
+// `run_to` for a filter and, while wheels are on trial, for the other one beside it.
+std::size_t run_both(Leg& leg, const Model& model, const Settings& settings, Memory& memory, Samples samples,
+                     std::size_t start, std::size_t stop);
+
+// Goes from `leg` to the time of a fix and takes it there: used, `leg` becomes the corrected one. Where
+// the wheels' trial ends another way, `leg` becomes the other filter's. `k` is the first sample after
+// the leg's time, and on return that of the fix's.
 FixResult take_at(Leg& leg, const Model& model, const Settings& settings, Memory& memory, Samples samples,
                   std::size_t& k, std::size_t stop, const Fix& fix);
 

@@ -25,7 +25,7 @@ void Live::feed(Samples samples) {
 void Live::follow() {
   const double until = history.back().t - LATEST_S;
   if (anchor.time >= until - ANCHOR_STEP_S) return;
-  anchor_next = run_to(anchor, model, settings.rules, history, anchor_next, after(until), FOREVER);
+  anchor_next = run_both(anchor, model, settings, memory, history, anchor_next, after(until));
 }
 
 void Live::keep(const Sample& sample) {
@@ -41,8 +41,10 @@ void Live::drop(std::size_t count) {
 }
 
 void Live::begin(const Leg& leg, const Memory& start) {
-  anchor = head = leg;
+  anchor = leg;
   memory = start;
+  begin_trial(anchor, settings, memory);
+  head = anchor;
   navigating = true;
   anchor_next = head_next = after(leg.time);
   head_next = run_to(head, model, settings.rules, history, head_next, history.size(), FOREVER);
@@ -56,13 +58,12 @@ void Live::stop() {
 
 bool Live::too_late(double t) const { return t < anchor.time - SAME_TIME_S; }
 
+// A fix that is not used moves the anchor too, up to it; the head is then as it was.
 FixResult Live::take(const Fix& fix) {
-  Leg trial = anchor;
-  std::size_t k = anchor_next;
-  FixResult out = take_at(trial, model, settings, memory, history, k, history.size(), fix);
-  if (!was_used(out.status)) return out;
-  anchor = head = trial;
-  anchor_next = k;
+  FixResult out = take_at(anchor, model, settings, memory, history, anchor_next, history.size(), fix);
+  if (!was_used(out.status) && out.switched == 0) return out;
+  head = anchor;
+  const std::size_t k = anchor_next;
   head_next = run_to(head, model, settings.rules, history, k, history.size(), FOREVER);
   return out;
 }

@@ -28,6 +28,34 @@ struct Compared {
   Measurement z;
 };
 
+// Where the wheels may be used.
+struct Span {
+  double begin, end;  // s
+};
+
+constexpr double UNTOLD_S = 20.0;  // of a contradiction, before it is found: not used either
+
+// The spans in which a filter that tries the wheels believes them, from where their trial began: what
+// was found later to hold, held then. Without a trial: always.
+std::vector<Span> believed(Leg leg, const Model& model, const Settings& settings, Memory memory, Samples samples,
+                           std::size_t start, std::size_t stop, std::span<const Fix> fixes) {
+  if (!settings.tries) return {{-FOREVER, FOREVER}};
+  std::vector<Span> out;
+  begin_trial(leg, settings, memory);
+  std::size_t k = start;
+  for (const Fix& fix : fixes) {
+    if (fix.t < leg.time - SAME_TIME_S) continue;  // late
+    const double begun = memory.trial.begun;
+    const FixResult said = take_at(leg, model, settings, memory, samples, k, stop, fix);
+    if (said.switched == 0) continue;
+    if (said.wheels == Wheels::BELIEVED)
+      out.push_back({begun, FOREVER});
+    else
+      out.back().end = fix.t - UNTOLD_S;
+  }
+  return out;
+}
+
 struct Forward {
   Leg& leg;
   const Model& model;
@@ -35,6 +63,7 @@ struct Forward {
   Memory& memory;
   Samples samples;
   std::size_t stop;
+  std::vector<Span> wheels;
   std::vector<Event> events;
   std::vector<Compared> fixes;
 
@@ -42,6 +71,9 @@ struct Forward {
   void constraint_due() {
     close(leg, model);
     Event event(leg, model);
+    leg.wheels = std::any_of(wheels.begin(), wheels.end(), [this](const Span& span) {
+      return leg.time >= span.begin && leg.time <= span.end;
+    });
     if (!constrain(leg, model, settings.rules, event.applied)) return;
     event.after = leg.P;
     event.x = leg.x;
@@ -95,7 +127,8 @@ void backward(std::vector<Event>& events, const Model& model) {
 
 std::vector<Smoothed> smooth(Leg leg, const Model& model, const Settings& settings, Memory memory,
                              Samples samples, std::size_t start, std::size_t stop, std::span<const Fix> fixes) {
-  Forward pass{leg, model, settings, memory, samples, stop, {}, {}};
+  const auto wheels = believed(leg, model, settings, memory, samples, start, stop, fixes);
+  Forward pass{leg, model, settings, memory, samples, stop, wheels, {}, {}};
   std::size_t k = start;
   for (const Fix& fix : fixes) {
     k = pass.run_to_fix(k, fix.t);

@@ -206,6 +206,8 @@ struct Leg {
   Nominal x;
   double time = 0.0;            // s, of x
   double since_constraint = 0.0;  // s
+  bool wheels = true;           // whether the wheels' constraint, where the model has it, is applied
+  double strain = 0.0;          // NIS per row of the wheels' constraint, mean over the last looks (E-56)
   Covariance P;                 // just after the last measurement
   Transition Phi;               // since then, closed intervals
   Covariance Q;
@@ -222,6 +224,7 @@ struct Leg {
   template <class Self, class Visitor>
   static void visit(Self& s, Visitor& v) {
     v("x", s.x), v("time", s.time), v("since_constraint", s.since_constraint);
+    v("wheels", s.wheels), v("strain", s.strain);
     v("P", s.P), v("Phi", s.Phi), v("Q", s.Q), v("tick", s.tick), v("interval", s.interval);
     v("earth", s.earth), v("shake", s.shake), v("ticks", s.ticks);
   }

@@ -4,7 +4,8 @@ import numpy as np
 
 from dashboard.scene.drawing.chart import Curve
 from dashboard.scene.drawing.geometry import MODES
-from dashboard.scene.drawing.palette import FIX, escape, number, rows
+from dashboard.scene.drawing.page import Markup, note, rows
+from dashboard.scene.drawing.palette import FIX, number
 from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
 from messages.contract import rates
 
@@ -40,7 +41,7 @@ class Position(Panel):
             self.show(axis, axis, "m", curves, s, height=150, digits=2)
 
     @staticmethod
-    def _numbers(s: Snapshot) -> str:
+    def _numbers(s: Snapshot) -> Markup:
         names = s.device.estimators("nav")
         if not names:
             return rows([("solution", "none yet")], stale=True)
@@ -56,7 +57,7 @@ class Position(Panel):
         course = float(np.degrees(np.arctan2(v[1], v[0]))) % 360
         items = [
             ("mode", MODES.get(m.mode, "unknown")),
-            ("alignment", escape(m.alignment) or "–"),
+            ("alignment", m.alignment or "–"),
             (
                 "latitude, longitude",
                 f"{number(m.latitude_deg, 7, '°')}, {number(m.longitude_deg, 7, '°')}",
@@ -72,14 +73,12 @@ class Position(Panel):
         return rows(items, s.stale("nav", names[0]))
 
 
-def _cube_note(s: Snapshot) -> str:
+def _cube_note(s: Snapshot) -> Markup:
     names = s.device.estimators("rate")
     items = []
     for name in names:
         m = rates.row(s.device.get("rate", name).message, -1)
         if len(m.p_n_m) == 3:
             items.append((f"distance, {name}", number(float(np.linalg.norm(m.p_n_m)), 1, "m")))
-    return (
-        '<p class="gf-note">Inertial navigation from the start without any aid: it drifts by'
-        " nature.</p>" + rows(items)
-    )
+    text = "Inertial navigation from the start without any aid: it drifts by nature."
+    return note(text) + rows(items)
