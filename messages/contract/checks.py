@@ -36,6 +36,8 @@ KINDS = (  # what a refusal can be counted as
     "value",  # not one of those that there are
     "many",  # more devices or streams than there is room for
     "answer",  # of a publisher: not what was asked for
+    "stale",  # of a publisher whose place another has taken
+    "repeated",  # it has come before, byte for byte
     "failure",  # we could not take it: a fault of ours
 )
 FLOATS = (FieldDescriptor.CPPTYPE_DOUBLE, FieldDescriptor.CPPTYPE_FLOAT)

@@ -33,6 +33,7 @@ from messages.history.mending_state import (
 
 log = logging.getLogger(__name__)
 
+CLOCKS_NS = 5_000_000_000  # two clocks that are set by one another differ by less
 MAX_HELD = 60_000
 MAX_HELD_BYTES = 128 << 20  # of one stream
 MOST_WAITING = 1000  # questions of a stream, gaps of a topic
@@ -54,11 +55,14 @@ class Mender:
         sources: tuple[str, ...] = ("gateway", "estimator"),
         since_ns: int = 0,
         refuse: Callable[[str, Refusal, str], None] | None = None,
+        now_ns: Callable[[], int] | None = None,
     ) -> None:
         """`topics` limits what is asked for; none: everything. A run that began after `since_ns` is
         wanted whole. `refuse(key, why, device)` is told what of an answer is not taken.
+        `now_ns()` is the clock of `since_ns`.
         """
         self._refuse = refuse or _say
+        self._now_ns = now_ns
         self._ask, self._hold, self._max_held = ask, hold, max_held
         self._topics, self._sources, self._since_ns = topics, sources, since_ns
         self._keys: dict[tuple[str, str], KeyState] = {}
@@ -155,8 +159,7 @@ class Mender:
         key = self._keys.get((arrival.device, arrival.name))
         if key is None:
             key = self._keys[arrival.device, arrival.name] = KeyState(header.run, header.sequence)
-            whole = 0 < self._since_ns < header.run and 1 < header.sequence <= FARTHEST
-            if not whole:
+            if not self._is_whole(header):
                 return [arrival]
             key.last = 0
         if header.run == key.run and header.sequence == key.last + 1:
@@ -184,6 +187,15 @@ class Mender:
             return []
         key.run, key.last = header.run, header.sequence
         return [arrival]
+
+    def _is_whole(self, header: pb.Header) -> bool:
+        """Is this run, heard for the first time, wanted from its beginning? It began after
+        `since_ns`, and by the publisher's own clock no longer ago than that.
+        """
+        if not (0 < self._since_ns < header.run and 1 < header.sequence <= FARTHEST):
+            return False
+        age_ns = header.utc_ns - header.run
+        return self._now_ns is None or age_ns <= self._now_ns() - self._since_ns + CLOCKS_NS
 
     def _notice(self, stream: Stream, arrival: Arrival, key: KeyState, header: pb.Header) -> bool:
         """A gap lies before this message: ask for what is in it. False: there are too many."""

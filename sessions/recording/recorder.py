@@ -15,6 +15,7 @@ import zenoh
 
 from messages import text
 from messages.bus import orders
+from messages.bus.fencing import Fence
 from messages.bus.session import BusSettings
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import MESSAGE_BYTES, Refusal
@@ -64,6 +65,7 @@ class Recorder:
         self._clock = SessionClock()
         self._bytes_in = self._bytes_out = 0  # of the inbox: counted each by one thread
         self._door = self._new_door()
+        self.fence = Fence(lambda *refusal: self._door.refuse(*refusal))
         self._intake = Intake(bus.prefix, None, 0, self._door)
         self._overflow = 0
         self._store: SessionStore | None = None
@@ -76,6 +78,8 @@ class Recorder:
     def on_sample(self, sample: zenoh.Sample) -> None:
         """Zenoh's thread: note the receive time and leave."""
         if not self._recording:
+            return
+        if not self.fence.admit(str(sample.key_expr), sample.attachment):
             return
         size, waiting = len(sample.payload), self._bytes_in - self._bytes_out
         if size > MESSAGE_BYTES:
