@@ -21,7 +21,7 @@ from messages.bus import orders
 from messages.bus.fencing import Claim, Fence, claim, heard_of
 from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client
 from messages.contract.door import Door
-from messages.contract.topics import ESTIMATES, PIPELINE_INPUTS, REPLAY_SUFFIX, TopicError, parse
+from messages.contract.topics import ESTIMATES, PIPELINE_INPUTS, REPLAY_SUFFIX
 from messages.history.answers import Asker, declare
 from messages.history.journal_folder import JournalBusy
 from messages.history.mending_state import Arrival
@@ -92,12 +92,12 @@ def _serve(
         publishers.number = spool.journal.run
     asker = Asker(session, bus.prefix, lambda question, reply: worker.answered(question, reply))
     saved = SavedState(settings.journal, settings, version()) if spool is not None else None
-    worker = _worker(Pipeline(settings), publishers, asker, saved)
+    worker = _worker(Pipeline(settings), publishers, asker, saved, settings)
     failed = threading.Event()
     thread = threading.Thread(target=worker.work, args=(failed,), name="estimator", daemon=True)
     thread.start()
     answering = [declare(session, bus.prefix, "*", ESTIMATES, spool)] if spool is not None else []
-    fence = Fence(Door("estimator").refuse)
+    fence = Fence(worker.door.refuse)
     # One subscriber for all topics: each has a thread of its own, and a fix must not overtake
     # its samples.
     subscriber = session.declare_subscriber(f"{bus.prefix}/*/*", _on(worker, fence))
@@ -139,7 +139,11 @@ def _serve(
 
 
 def _worker(
-    pipeline: Pipeline, publishers: Publishers, asker: Asker, saved: SavedState | None
+    pipeline: Pipeline,
+    publishers: Publishers,
+    asker: Asker,
+    saved: SavedState | None,
+    settings: EstimatorSettings,
 ) -> Worker:
     """A worker that goes on from the saved state when there is one."""
     found = saved.load() if saved is not None else None
@@ -156,6 +160,7 @@ def _worker(
         put,
         lambda question: asker.ask(question, *question.stream, question.query),
         None if saved is None else lambda worker: saved.save(worker, publishers),
+        Door("estimator", most_devices=settings.max_devices),
     )
     if found is not None:
         for (device, name), (run_, last) in found[1].items():
@@ -176,14 +181,16 @@ def _open_spool(settings: EstimatorSettings) -> Spool | None:
 
 def _on(worker: Worker, fence: Fence) -> Callable[[Any], None]:
     def on_sample(sample: Any) -> None:
-        try:
-            address = parse(str(sample.key_expr))
-        except TopicError:
-            return
+        key = str(sample.key_expr)
+        address = worker.door.address(key)
         # a replay makes its own estimates
-        if address.topic in PIPELINE_INPUTS and not address.device.endswith(REPLAY_SUFFIX):
-            if not fence.admit(str(sample.key_expr), sample.attachment):
-                return
+        if address is None or address.device.endswith(REPLAY_SUFFIX):
+            return
+        if (
+            address.topic in PIPELINE_INPUTS
+            and worker.door.admit(key, address, len(sample.payload))
+            and fence.admit(key, sample.attachment)
+        ):
             payload = sample.payload.to_bytes()
             worker.offer(
                 Arrival(address.topic, address.device, address.estimator, payload, time.time_ns())

@@ -17,6 +17,7 @@ from gyrofree.commands.options import (
     UnitsAsNamed,
     catalogue_of,
     file_of,
+    say,
     session_name,
     settings_of,
 )
@@ -63,7 +64,7 @@ def export(
         raise fail(str(error), EXIT_CONFIG) from None
     except OSError as error:
         raise fail(str(error)) from None
-    print(
+    say(
         json.dumps([str(file) for file in files], indent=2)
         if as_json
         else "\n".join(map(str, files))
@@ -99,11 +100,11 @@ def report(
         with progress_bar() as progress:
             made = build(path, load_spec(spec), device, boot, progress)
         if as_json:
-            print(made.json, end="")
+            say(made.json, end="")
         else:
             for file in made.write(out or Path(f"report-{name_of(path)}")):
-                print(file)
-            print(f"verdict: {made.verdict}")
+                say(file)
+            say(f"verdict: {made.verdict}")
     except (ValueError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
     if made.verdict == "fail":
@@ -137,8 +138,8 @@ def import_log(
         check_name(device)
         source = read_board_log(log, gnss, units_as_named)
         for note in source.notes:
-            print(f"note: {note}", file=sys.stderr)
-        rows = list(importer.rows_of(source, settings.bus.prefix, device))
+            say(f"note: {note}", file=sys.stderr)
+        rows = importer.rows_of(source, settings.bus.prefix, device)
         folder = _estimated(
             settings,
             rows,
@@ -149,7 +150,7 @@ def import_log(
         give_title(folder, name)
     except (LogError, TopicError, SessionError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
-    print(json.dumps({"session": folder.name}) if as_json else folder.name)
+    say(json.dumps({"session": folder.name}) if as_json else folder.name)
 
 
 def _estimated(settings, rows, session: str, note: str, root: Path) -> Path:
@@ -234,7 +235,7 @@ def rerun(
         give_title(folder, name)
     except (UnknownEstimator, SessionError, ValueError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
-    print(json.dumps({"session": folder.name}) if as_json else folder.name)
+    say(json.dumps({"session": folder.name}) if as_json else folder.name)
 
 
 def reprocess(
@@ -287,9 +288,9 @@ def reprocess(
         raise fail(str(error), EXIT_CONFIG) from None
     bad = sum(bool(row.get("problem")) for row in rows)
     if as_json:
-        print(json.dumps(rows, indent=2))
+        say(json.dumps(rows, indent=2))
     else:
-        print(f"{out}: {len(rows)} rows of {len(paths)} sessions, {bad} with a problem")
+        say(f"{out}: {len(rows)} rows of {len(paths)} sessions, {bad} with a problem")
 
 
 def mount(app: typer.Typer) -> None:

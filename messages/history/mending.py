@@ -27,13 +27,14 @@ from messages.history.mending_state import (
     Question,
     Stream,
     header_of,
+    say,
     take_out,
+    wanted_whole,
     wrong_item,
 )
 
 log = logging.getLogger(__name__)
 
-CLOCKS_NS = 5_000_000_000  # two clocks that are set by one another differ by less
 MAX_HELD = 60_000
 MAX_HELD_BYTES = 128 << 20  # of one stream
 MOST_WAITING = 1000  # questions of a stream, gaps of a topic
@@ -58,11 +59,9 @@ class Mender:
         now_ns: Callable[[], int] | None = None,
     ) -> None:
         """`topics` limits what is asked for; none: everything. A run that began after `since_ns` is
-        wanted whole. `refuse(key, why, device)` is told what of an answer is not taken.
-        `now_ns()` is the clock of `since_ns`.
+        wanted whole, `now_ns()` is its clock. `refuse(key, why, device)` is told what is not taken.
         """
-        self._refuse = refuse or _say
-        self._now_ns = now_ns
+        self._refuse, self._now_ns = refuse or say, now_ns
         self._ask, self._hold, self._max_held = ask, hold, max_held
         self._topics, self._sources, self._since_ns = topics, sources, since_ns
         self._keys: dict[tuple[str, str], KeyState] = {}
@@ -90,6 +89,12 @@ class Mender:
     def seed(self, device: str, name: str, run: int, last: int) -> None:
         """The consumer has everything of this topic up to here, from an earlier life."""
         self._keys[device, name] = KeyState(run, last)
+
+    def forget(self, device: str) -> None:
+        """A device is gone; what waits for it is let go."""
+        for table in (self._keys, self._streams):
+            for name in [name for name in table if name[0] == device]:
+                del table[name]
 
     def taken(self) -> dict[tuple[str, str], tuple[int, int]]:
         """Run and sequence of the newest message given on, by device and topic: for `seed` in a
@@ -119,11 +124,10 @@ class Mender:
         """The publisher's answer (None: there is none); what can be given on now, in order."""
         stream = self._streams.setdefault(question.stream, Stream())
         out: list[Arrival] = []
-        about = "/".join(question.stream)
         for item in reply.items if reply is not None else ():
             refusal = wrong_item(question.stream[0], item)
             if refusal is not None:
-                self._refuse(f"answer about {about}", refusal, question.stream[0])
+                self._refuse(question.about, refusal, question.stream[0])
                 continue
             skipped = self._skipped(stream, question, item)
             if skipped is not None:
@@ -135,7 +139,7 @@ class Mender:
             if refusal is None:
                 self._ask(question.more(reply.next))
                 return out
-            self._refuse(f"answer about {about}", refusal, question.stream[0])
+            self._refuse(question.about, refusal, question.stream[0])
         if stream.waiting:
             self._ask(Question(question.stream, stream.waiting.popleft()))
             return out
@@ -147,7 +151,7 @@ class Mender:
         return out
 
     def release(self) -> list[Arrival]:
-        """Everything that is held, without waiting any longer: the end."""
+        """All that is held, without waiting: the end."""
         return [arrival for stream in self._streams.values() for arrival in self._release(stream)]
 
     # --- one message
@@ -159,7 +163,7 @@ class Mender:
         key = self._keys.get((arrival.device, arrival.name))
         if key is None:
             key = self._keys[arrival.device, arrival.name] = KeyState(header.run, header.sequence)
-            if not self._is_whole(header):
+            if not wanted_whole(header, self._since_ns, self._now_ns):
                 return [arrival]
             key.last = 0
         if header.run == key.run and header.sequence == key.last + 1:
@@ -187,15 +191,6 @@ class Mender:
             return []
         key.run, key.last = header.run, header.sequence
         return [arrival]
-
-    def _is_whole(self, header: pb.Header) -> bool:
-        """Is this run, heard for the first time, wanted from its beginning? It began after
-        `since_ns`, and by the publisher's own clock no longer ago than that.
-        """
-        if not (0 < self._since_ns < header.run and 1 < header.sequence <= FARTHEST):
-            return False
-        age_ns = header.utc_ns - header.run
-        return self._now_ns is None or age_ns <= self._now_ns() - self._since_ns + CLOCKS_NS
 
     def _notice(self, stream: Stream, arrival: Arrival, key: KeyState, header: pb.Header) -> bool:
         """A gap lies before this message: ask for what is in it. False: there are too many."""
@@ -333,7 +328,3 @@ class Mender:
             return True
         self._seen.append(mark)
         return False
-
-
-def _say(key: str, refusal: Refusal, device: str) -> None:
-    log.warning("%s: refused: %s", key, refusal)

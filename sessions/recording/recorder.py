@@ -77,22 +77,19 @@ class Recorder:
 
     def on_sample(self, sample: zenoh.Sample) -> None:
         """Zenoh's thread: note the receive time and leave."""
-        if not self._recording:
-            return
-        if not self.fence.admit(str(sample.key_expr), sample.attachment):
+        key = str(sample.key_expr)
+        if not self.fence.admit(key, sample.attachment) or not self._recording:
             return
         size, waiting = len(sample.payload), self._bytes_in - self._bytes_out
         if size > MESSAGE_BYTES:
-            self._door.too_large(str(sample.key_expr), size)
+            self._door.too_large(key, size)
             return
-        if (
-            len(self._inbox) >= self.settings.max_inbox
-            or waiting + size > self.settings.max_inbox_bytes
-        ):
+        room = self.settings.max_inbox_bytes - waiting
+        if len(self._inbox) >= self.settings.max_inbox or size > room:
             self._overflow += 1
             return
         self._bytes_in += size
-        self._inbox.append((self._clock.now_ns(), str(sample.key_expr), sample.payload.to_bytes()))
+        self._inbox.append((self._clock.now_ns(), key, sample.payload.to_bytes()))
 
     def on_order(self, order: Order) -> None:
         """Zenoh's thread: keep the order for the loop."""
