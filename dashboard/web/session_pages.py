@@ -114,7 +114,7 @@ def _report(front: Front, session: str) -> dict | None:
                 encoding="utf-8"
             )
         )
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return None
     return found if isinstance(found, dict) and "device" in found else None
 
