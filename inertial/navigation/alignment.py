@@ -60,7 +60,9 @@ class Alignment:
         self._f_still = self.mean_f  # m/s^2, what was felt there
         self._moving_since: float | None = None
         self._sigma_v = 0.0  # m/s, level, of the newest velocity
+        self._speed = 0.0  # m/s, likewise
         self._now = 0.0  # s, of it
+        self._felt_at = -math.inf  # s, when the felt heading was looked for last
         self._felt_yaw = math.pi  # rad, sigma of the heading felt in motion
         self._t: float | None = None
         self._standstill = Standstill(settings)
@@ -121,7 +123,7 @@ class Alignment:
             self._moving_since = None
         elif self._moving_since is None:
             self._moving_since = t
-        self._now = t
+        self._now, self._speed = t, speed
         if not self.settings.in_motion:
             return
         self._felt.fix(t, v_n, sigma_v)
@@ -152,6 +154,10 @@ class Alignment:
         """
         if self._moving_since is None or self._felt.first == math.inf:
             return None
+        slow = self._speed < self.settings.course_speed
+        if slow and self._now < self._felt_at + self.settings.look:
+            return None  # a look costs as much as seconds of navigation
+        self._felt_at = self._now
         level = None
         if self.levelled:
             if turned_back is None:
