@@ -38,7 +38,7 @@ class ImuNoise:
     tau: float = 300.0  # s, of both
     # share of the readings' shaking from sample to sample that is noise to navigation (E-51)
     shake: float = 1.0
-    turn: float = 0.01  # of 1, scale and cross-axis errors of the gyros (E-59)
+    turn: float = 0.007  # of 1, scale and cross-axis errors of the gyros (E-59)
     turn_length: float = 5.0  # s, over which a turn keeps its direction
     position: float = 1e-3  # m/sqrt(s), keeps the position covariance from closing completely
 

@@ -128,6 +128,19 @@ def backing_car(seed: int, seconds: float = 300.0, still: float = 20.0) -> Motio
     return Motion(t, v_n, Rotation.from_euler("ZYX", np.column_stack([heading, 0 * t, 0 * t])))
 
 
+def car_on_ice(seed: int, seconds: float = 300.0, still: float = 20.0) -> Motion:
+    """A car that holds its way for 150 s, and from then on drifts through every curve."""
+    draw, t, moving = _start(seed, 47, seconds, still, 1.5)
+    speed = moving * (9.0 + 2.0 * np.sin(2.0 * np.pi * t / 37.0))
+    turns = DEG * moving * smooth(random_steps(draw, t, (4.0, 12.0), [-12.0, 0.0, 12.0]), 1.0)
+    course = draw.uniform(-np.pi, np.pi) + cumulative_simpson(turns, dx=STEP, initial=0.0)
+    slip = smooth(np.where(t > 150.0, 1.2 * turns, 0.0), 1.0)
+    v_n = np.column_stack([speed * np.cos(course), speed * np.sin(course), 0.0 * t])
+    return Motion(
+        t, v_n, Rotation.from_euler("ZYX", np.column_stack([course + slip, 0 * t, 0 * t]))
+    )
+
+
 def mounted(truth: Truth, turn: Rotation) -> Truth:
     """The same ride felt by a unit that is turned against the vehicle's axes by `turn`."""
     M = turn.as_matrix()
@@ -141,6 +154,7 @@ CRAFT: dict[str, Callable[..., Motion]] = {
     "bicycle": bicycle,
     "train": train,
     "backing car": backing_car,
+    "car on ice": car_on_ice,
 }
 # a unit that is put in askew: roll, pitch, yaw in deg, of a car's
 MOUNTED = {

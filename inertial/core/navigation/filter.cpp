@@ -68,6 +68,22 @@ void learn(Receiver& receiver, const Measurement& z, const RowMatrix& S, double 
   }
 }
 
+// Quiet readings are a standstill only where the fixes' velocities say so too (E-60).
+void check_standstill(Leg& leg, const Fix& fix) {
+  constexpr double SHARE = 0.2, MOST = 25.0;
+  if (leg.quiet && fix.has_v) {
+    double sum = 0.0;
+    int known = 0;
+    for (int i = 0; i < 3; ++i) {
+      if (!std::isfinite(fix.v_n(i))) continue;
+      ++known;
+      sum += fix.v_n(i) * fix.v_n(i) / (leg.receiver.velocity * fix.sigma_v(i) * fix.sigma_v(i));
+    }
+    if (known > 0) leg.moved += SHARE * (std::min(sum / known, MOST) - leg.moved);
+  }
+  leg.quiet = false;
+}
+
 // The error that all its fixes have in common for a while (E-58).
 void remember_wander(Leg& leg, const Model& model, const Settings& s, const Fix& fix) {
   const double lag = model.has_lag() ? 0.0 : s.lag;
@@ -172,6 +188,7 @@ FixResult take(Leg& leg, const Model& model, const Settings& s, Memory& memory, 
   if (fix.withheld) return out;
 
   learn(leg.receiver, z, innovation.S, s.adapt);
+  check_standstill(leg, fix);
   const bool weighs = s.huber < FOREVER && s.window == Horizon::NONE;
   const Weights weight = weighs ? huber_weights(innovation.S, z.y, s.huber) : Weights(Weights::Ones());
   const Status status = judge(memory, s, white.nis, said_rows(z), weight);
@@ -237,7 +254,7 @@ FixResult take_one(Leg& leg, const Model& model, const Settings& settings, Memor
   if (was_used(out.status))
     leg = trial;
   else
-    leg.receiver = trial.receiver;
+    leg.receiver = trial.receiver, leg.moved = trial.moved, leg.quiet = trial.quiet;
   return out;
 }
 

@@ -221,6 +221,8 @@ struct Leg {
   double since_constraint = 0.0;  // s
   bool wheels = true;           // whether the wheels' constraint, where the model has it, is applied
   double strain = 0.0;          // NIS per row of the wheels' constraint, mean over the last looks (E-56)
+  bool quiet = false;           // since the last fix the readings looked like a standstill
+  double moved = 0.0;           // squared velocity of fixes then over its variance, a mean (E-60)
   Covariance P;                 // just after the last measurement
   Transition Phi;               // since then, closed intervals
   Covariance Q;
@@ -238,7 +240,7 @@ struct Leg {
   template <class Self, class Visitor>
   static void visit(Self& s, Visitor& v) {
     v("x", s.x), v("time", s.time), v("since_constraint", s.since_constraint);
-    v("wheels", s.wheels), v("strain", s.strain);
+    v("wheels", s.wheels), v("strain", s.strain), v("quiet", s.quiet), v("moved", s.moved);
     v("P", s.P), v("Phi", s.Phi), v("Q", s.Q), v("tick", s.tick), v("interval", s.interval);
     v("earth", s.earth), v("shake", s.shake), v("receiver", s.receiver), v("ticks", s.ticks);
   }
