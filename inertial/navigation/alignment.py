@@ -215,8 +215,9 @@ class Alignment:
                     "level; the course is to be the heading, and what is felt does not tell yet"
                 )
                 return None
-            how += f", which nothing has tested: believed to {math.degrees(UNTESTED * sigma):.0f} deg"
-            return Start(C_nb, self.gyro_bias, np.zeros(3), None, how, sigma_yaw=UNTESTED * sigma)
+            wide = UNTESTED * sigma
+            how += f", which nothing has tested: believed to {math.degrees(wide):.0f} deg"
+            return Start(C_nb, self.gyro_bias, np.zeros(3), None, how, sigma_yaw=wide)
         noisy = self._sigma_v / speed > 0.5 * s.sigma_course
         return Start(
             C_nb, self.gyro_bias, np.zeros(3), None, how, sigma_yaw=sigma if noisy else None
