@@ -1,6 +1,7 @@
 # make demo   everything it needs, then the live dashboard on one printed URL (SOURCE=drive DATA=<folder> plays a log,
 #             SOURCE=tilt or arm other simulated boards, BOARD=emulated the firmware image in the emulator)
 # make test   everything it needs, then all tests
+# make cases  inputs that once failed, from $GYROFREE_CASES or ../shared/cases
 # make firmware  the board's image and map into build/firmware, with its size
 # make fuzz   libFuzzer on the board's decoder and commands (SECONDS=60)
 # make wheel  dist/gyrofree-*.whl, which installs and runs where there is no compiler
@@ -17,7 +18,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 INSTALL := $(PIP) install --quiet --no-deps --require-hashes
 DRIVE := $(if $(DATA),--data "$(DATA)")
 
-.PHONY: demo test setup wheel dev system-packages bench docs messages lint firmware fuzz compose-test clean
+.PHONY: demo test cases setup wheel dev system-packages bench docs messages lint firmware fuzz compose-test clean
 
 # BOARD=emulated: the table is sensed by the firmware image in the emulator
 demo: setup $(if $(filter emulated,$(BOARD)),.make/board firmware)
@@ -80,6 +81,10 @@ system-packages:
 test: setup dev system-packages
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "not browser"
 	$(BIN)/python -m pytest -m browser
+
+# The inputs that once failed, from $GYROFREE_CASES or ../shared/cases; `make test` runs them too.
+cases: setup dev
+	$(BIN)/python -m pytest -q -rs tests/system/test_cases.py
 
 lint: dev
 	$(BIN)/ruff check .

@@ -16,6 +16,7 @@ from dashboard.desk import Desk
 from dashboard.settings import DashboardSettings
 from dashboard.web.app import create_app
 from dashboard.web.auth import Gate
+from dashboard.web.connections import Connections
 from dashboard.web.control import Replay
 from dashboard.web.front import Front
 from dashboard.web.jobs import Jobs
@@ -26,6 +27,8 @@ from sessions.library.catalogue import Catalogue
 log = logging.getLogger(__name__)
 
 STOP_LOOK_S = 0.1  # s between two looks at the stop event
+BACKLOG = 512  # connections that wait to be taken; a flood must not fill it
+HEAD_LIMIT = 32_768  # bytes of the head of one request
 GRACE_S = 1  # s, for answers under way when the process ends
 
 
@@ -56,7 +59,7 @@ def listen(host: str, port: int) -> socket.socket:
     bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         bound.bind(address)
-        bound.listen(128)
+        bound.listen(BACKLOG)
     except OSError as error:
         bound.close()
         if error.errno == errno.EADDRINUSE:
@@ -83,8 +86,10 @@ def serve(front: Front, bound: socket.socket, stop: threading.Event) -> None:
         proxy_headers=bool(settings.trusted_proxies),
         forwarded_allow_ips=settings.trusted_proxies or None,
         timeout_graceful_shutdown=GRACE_S,
+        http=Connections(settings).protocol(),
+        h11_max_incomplete_event_size=HEAD_LIMIT,
         timeout_keep_alive=15,
-        limit_concurrency=512,
+        backlog=BACKLOG,
         server_header=False,
         lifespan="off",
     )
@@ -130,7 +135,8 @@ def run(
                 settings.url,
             )
         with open_client(bus, stop) as session:
-            store, desk, watched = Store(), Desk(session, bus.prefix), threading.Event()
+            store = Store(settings.devices, settings.history_bytes)
+            desk, watched = Desk(session, bus.prefix), threading.Event()
             try:
                 handle = scene.start(settings, store, desk, watched)
             except scene.SceneError as error:

@@ -56,6 +56,8 @@ class Ledger:
     """Frames with the seq of the frame before them."""
     reboots: int = 0
     unknown_frames: int = 0
+    refused_frames: int = 0
+    """Whole frames whose values cannot be; nothing but their bytes is counted."""
     frames: Counter[int] = field(default_factory=Counter)
     """Good frames per type."""
     damage: Counter[str] = field(default_factory=Counter)
@@ -81,6 +83,14 @@ class Ledger:
             self._count_damage(event)
         else:
             self._count_frame(event)
+
+    def pass_over(self, frame: Frame) -> None:
+        """Count a whole frame that is not believed: it came, and all else it says is left."""
+        self.good_frames += 1
+        self.good_bytes += frame.wire_size
+        self.refused_frames += 1
+        if frame.epoch == self.epoch and (frame.seq - self.seq) % WRAP == 1:
+            self.seq = frame.seq
 
     def _count_damage(self, event: Damaged) -> None:
         self.bad_chunks += 1

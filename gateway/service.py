@@ -8,6 +8,7 @@ begins when the router comes and the name on the bus is ours (gateway/ports/iden
 import json
 import logging
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
 
@@ -28,6 +29,8 @@ from messages.history.journal_folder import JournalBusy
 log = logging.getLogger(__name__)
 
 HISTORY_BYTES = 4 << 20  # of records in one reply; who wants more asks on from where it ended
+LOOK_S = 0.1  # a board that failed is noticed after so long ...
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 30.0  # ... and begins anew after a pause that grows
 BUSY_RETRY_S = 0.2  # a journal that another gateway has is asked for again after so long
 
 
@@ -83,7 +86,6 @@ class _Line:
         device: DeviceSettings,
         settings: GatewaySettings,
         prefix: str,
-        stop: threading.Event,
         keeper: Keeper,
     ) -> None:
         self.link = DeviceLink(device, settings, keeper)
@@ -91,8 +93,8 @@ class _Line:
             None, prefix, self.link.spool
         )  # keeps what it is given until there is a bus
         self.link.go_live(self.publishers.put)
-        self._stop = stop
         self._halt = threading.Event()
+        self.failed = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"link-{device.name}")
         self._thread.start()
         journal = self.link.journal
@@ -103,12 +105,9 @@ class _Line:
     def _run(self) -> None:
         try:
             self.link.run(self._halt)
-        except (
-            Exception
-        ):  # a bug of ours: end the process, so that its supervisor starts a sound one
-            log.exception("%s: the gateway failed and stops", self.link.name)
-            self._stop.set()
-            raise
+        except Exception:  # a fault of ours: this board begins anew, the others do not notice
+            log.exception("%s: reading failed, and begins anew", self.link.name)
+            self.failed.set()
 
     def close(self) -> None:
         """Stop reading and close the journal; may be called again."""
@@ -126,21 +125,28 @@ def _serve(
     keeper: Keeper,
 ) -> None:
     """One board until `stop`: read it at once, publish when the session is there and the name is
-    ours.
+    ours. What fails here is one board's, and begins anew after a pause.
     """
-    line = None
-    try:
-        line = _open_line(device, settings, prefix, stop, keeper)
-        session = opened.result()
-        if line is not None and session is not None:
-            _publish(line, device, settings, prefix, session, stop, keeper)
-    except Exception:
-        log.exception("%s: the gateway failed and stops", device.name)
-        stop.set()
-        raise
-    finally:
-        if line is not None:
-            line.close()
+    pause_s = FIRST_PAUSE_S
+    while not stop.is_set():
+        line, began = None, time.monotonic()
+        try:
+            line = _open_line(device, settings, prefix, stop, keeper)
+            while line is not None and not opened.done() and not line.failed.wait(LOOK_S):
+                pass
+            session = opened.result() if opened.done() else None
+            if line is not None and session is not None:
+                _publish(line, device, settings, prefix, session, stop, keeper)
+        except Exception:
+            log.exception(
+                "%s: this board's part of the gateway failed, and begins anew", device.name
+            )
+        finally:
+            if line is not None:
+                line.close()
+        calm = time.monotonic() - began > LONGEST_PAUSE_S
+        pause_s = FIRST_PAUSE_S if calm else min(2.0 * pause_s, LONGEST_PAUSE_S)
+        stop.wait(pause_s)
 
 
 def _open_line(
@@ -154,7 +160,7 @@ def _open_line(
     said = False
     while not stop.is_set():
         try:
-            return _Line(device, settings, prefix, stop, keeper)
+            return _Line(device, settings, prefix, keeper)
         except JournalBusy as busy:
             if not said:
                 log.error(
@@ -202,7 +208,8 @@ def _publish(
                 orders.take(session, prefix, orders.BOARD, take_order_of(link), device.name),
             ]
             mine.publishers.attach(session)
-        stop.wait()
+            while not stop.is_set() and not mine.failed.is_set():
+                stop.wait(LOOK_S)
     finally:
         if mine is not None:
             mine.close()

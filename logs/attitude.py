@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.attitude.filters import ATTITUDES
+from inertial.timing import Timing
 from logs.attitude_log import Trial, read_trials
 from logs.sheet import LogError
+from messages.text import drawn
 
 Array = NDArray[np.float64]
+
+BRIDGED_S = 0.3  # s without samples that are interpolated; after more a filter starts anew
 
 Progress = Callable[[float, str], None]
 
@@ -64,21 +69,39 @@ def run_attitude(
         "filters": {name: _mean(logs, name) for name in names},
         "default": next(iter(ATTITUDES)),
         "logs": logs,
+        "notes": [note for trial in trials for note in trial.notes],
     }
 
 
 def run_filter(trial: Trial, name: str) -> tuple[Array, float]:
     """Inclination error (n,) rad of one filter, nan without a reference, and its time per sample,
-    us.
+    us. As live, a hole of up to BRIDGED_S is bridged; after a longer one it starts anew.
     """
     ATTITUDES[name](trial.period).batch(
         trial.f_b[:2], trial.omega_b[:2]
     )  # compile before the clock runs
-    attitude = ATTITUDES[name](trial.period)
+    q_nb = np.empty((len(trial.t), 4))
     started = time.perf_counter_ns()
-    q_nb = attitude.batch(trial.f_b, trial.omega_b)
+    for rows in _stretches(trial.timing):
+        index = trial.timing.index[rows] - trial.timing.index[rows][0]
+        even = [_even(index, values[rows]) for values in (trial.f_b, trial.omega_b)]
+        q_nb[rows] = ATTITUDES[name](trial.period).batch(*even)[index]
     cost = (time.perf_counter_ns() - started) / 1000.0 / len(trial.t)
     return inclination_error(q_nb, trial.up_b), cost
+
+
+def _stretches(timing: Timing) -> list[slice]:
+    """Rows between long holes."""
+    ends = [hole.row for hole in timing.holes if hole.seconds > BRIDGED_S]
+    return [slice(a, b) for a, b in pairwise([0, *ends, len(timing.index)])]
+
+
+def _even(index: NDArray[np.int64], values: Array) -> Array:
+    """Values (n, 3) at sample numbers index (n,), those that are missing interpolated."""
+    wanted = np.arange(int(index[-1]) + 1)
+    if len(wanted) == len(index):
+        return values
+    return np.column_stack([np.interp(wanted, index, column) for column in values.T])
 
 
 def inclination_error(q_nb: Array, up_b: Array) -> Array:
@@ -132,7 +155,7 @@ def _draw(
                 color=colour,
                 label=f"{name}: {rms:.2f}° RMS",
             )
-        axis.set_title(trial.name, fontsize=9, loc="left")
+        axis.set_title(drawn(trial.name), fontsize=9, loc="left")
         axis.set_ylabel("inclination error, °")
         axis.grid(True, which="major", alpha=0.3)
         axis.legend(fontsize=8, loc="upper right")

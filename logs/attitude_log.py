@@ -9,7 +9,8 @@ from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
 from inertial.plausible import doubt_of_gravity, doubt_of_rate
-from logs.quantities import read_si, refuse, timing_of
+from inertial.timing import Timing, TimingError, sample_timing
+from logs.quantities import read_si, refuse, said_of, timing_of
 from logs.sheet import LogError, open_sheet
 
 Array = NDArray[np.float64]
@@ -31,11 +32,13 @@ class Trial:
     omega_b: Array  # (n, 3) rad/s
     up_b: Array  # (n, 3) unit vector up by the reference; nan where there is none
     scored: NDArray[np.bool_]  # (n,)
+    timing: Timing
+    notes: tuple[str, ...] = ()  # for people: what is doubtful, missing or was left out
 
     @property
     def period(self) -> float:
         """s between samples."""
-        return float((self.t[-1] - self.t[0]) / (len(self.t) - 1))
+        return self.timing.period_s
 
 
 def read_trials(log: Path, units_as_named: bool = False) -> list[Trial]:
@@ -61,7 +64,9 @@ def _read(file: Path, units_as_named: bool) -> Trial:
 def _read_mat(file: Path) -> Trial:
     try:
         content = loadmat(file)
-    except (ValueError, OSError, NotImplementedError) as error:
+    except OSError:
+        raise
+    except Exception as error:  # a damaged file makes it raise almost anything
         raise LogError(f"{file}: not a MATLAB 5 file: {error}") from None
     missing = [name for name in MAT if name not in content]
     if missing:
@@ -69,40 +74,56 @@ def _read_mat(file: Path) -> Trial:
     q = np.asarray(content["opt_quat"], dtype=np.float64)
     t = np.arange(len(q)) / float(content["sampling_rate"].ravel()[0])
     moving = content["movement"].ravel() > 0
-    return _trial(file, t, content["imu_acc"], content["imu_gyr"], q, moving)
+    f, w = content["imu_acc"], content["imu_gyr"]
+    return _trial(file, _even(file, t), t, f, w, q, moving, [])
+
+
+def _even(file: Path, t: Array) -> Timing:
+    try:
+        return sample_timing(t)
+    except TimingError as error:
+        raise LogError(f"{file}: {error}") from None
 
 
 def _read_csv(file: Path, units_as_named: bool) -> Trial:
     sheet = open_sheet(file)
     table = read_si(sheet, [*QUANTITIES, *TRUTH], [SCORED], TRUTH)
-    timing_of(sheet, table)
+    timing = timing_of(sheet, table)
     f, w = (np.column_stack([table[name] for name in QUANTITIES[a:b]]) for a, b in ((1, 4), (4, 7)))
     q = np.column_stack([table[name] for name in TRUTH])
-    refuse(file, [doubt_of_gravity(f), doubt_of_rate(table["t"], f, w)], units_as_named)
+    notes = refuse(file, [doubt_of_gravity(f), doubt_of_rate(table["t"], f, w)], units_as_named)
+    notes += said_of(file, timing, table.cut_off)
     scored = table[SCORED] > 0 if SCORED in table else np.ones(len(q), dtype=bool)
-    return _trial(file, table["t"], f, w, q, scored)
+    return _trial(file, timing, table["t"], f, w, q, scored, notes)
 
 
-def _trial(file: Path, t: Array, f: Array, w: Array, q: Array, scored: NDArray[np.bool_]) -> Trial:
+def _trial(
+    file: Path,
+    timing: Timing,
+    t: Array,
+    f: Array,
+    w: Array,
+    q: Array,
+    scored: NDArray[np.bool_],
+    notes: list[str],
+) -> Trial:
     f, w = (np.ascontiguousarray(a, dtype=np.float64) for a in (f, w))
-    if len(t) < 2 or not np.all(np.diff(t) > 0.0):
-        raise LogError(f"{file}: times must grow; {len(t)} rows")
+    if f.shape != (len(t), 3) or w.shape != f.shape or q.shape != (len(t), 4):
+        raise LogError(
+            f"{file}: {len(q)} references, specific force {f.shape}, rate {w.shape}; want as many"
+            " rows of each"
+        )
     if not (np.isfinite(f).all() and np.isfinite(w).all()):
         row = int(np.flatnonzero(~np.isfinite(np.hstack([f, w])).all(axis=1))[0])
         raise LogError(f"{file}: row {row + 1}: a sample that is not a number")
-    steps = np.diff(t)
-    if steps.max() > 3.0 * np.median(steps):
-        row = int(steps.argmax())
-        raise LogError(
-            f"{file}: {steps.max():.3f} s between rows {row + 1} and {row + 2}; the filters want"
-            " even samples"
-        )
     known = np.isfinite(q).all(axis=1) & (np.linalg.norm(np.nan_to_num(q), axis=1) > 0.5)
     if not (known & scored).any():
         raise LogError(f"{file}: no row has a reference attitude to score against")
     up = np.full((len(q), 3), np.nan)
     up[known] = _up(Rotation.from_quat(q[known][:, [1, 2, 3, 0]]), f[known])
-    return Trial(file.stem, np.asarray(t, dtype=np.float64), f, w, up, known & scored)
+    return Trial(
+        file.stem, np.asarray(t, dtype=np.float64), f, w, up, known & scored, timing, tuple(notes)
+    )
 
 
 def _up(attitude: Rotation, f_b: Array) -> Array:

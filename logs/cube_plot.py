@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 
 from logs.cube_log import CubeLog
 from logs.cube_run import EstimatorRun, Reference
+from messages.text import drawn
 
 DEG = 180.0 / np.pi
 COLOURS = (
@@ -64,7 +65,7 @@ def draw(
             f"{data.path.name}: {len(data.names)} axes, {data.seconds:.1f} s at"
             f" {1.0 / data.period_s:.0f} Hz"
         )
-        figure.suptitle(title, fontsize=12, fontweight="bold", x=0.01, ha="left")
+        figure.suptitle(drawn(title), fontsize=12, fontweight="bold", x=0.01, ha="left")
         handles, labels = grid[2, 0].get_legend_handles_labels()
         figure.legend(
             handles, labels, loc="outside upper right", ncols=max(1, len(labels)), frameon=False

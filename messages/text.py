@@ -4,7 +4,8 @@ One helper for each medium:
 
     check(text)   at the doors where people write: "" or a sentence that says what is not wanted
     plain(text)   for terminals, logs and pictures: nothing that acts, nothing that is invisible
-    html(text)    inside HTML and SVG, between tags and in quoted attributes
+    html(text)    inside HTML and SVG, between tags and in quoted attributes; templates do it
+    drawn(text)   on figures
     cell(value)   of a table that a spreadsheet may open
 
 What acts or hides: control characters (a terminal obeys them), the bidirectional controls of
@@ -62,6 +63,8 @@ def plain(text: object, longest: int = LONGEST) -> str:
     cut.
     """
     whole = str(text)
+    if len(whole) <= longest and whole.isascii() and whole.isprintable():
+        return whole
     cut = whole if len(whole) <= longest else whole[: longest - 1] + "…"
     out, marks = [], 0
     for character in cut:
@@ -77,7 +80,7 @@ def plain(text: object, longest: int = LONGEST) -> str:
 
 
 def printed(text: object) -> str:
-    """Several lines for a terminal: line breaks and tabs stay, all else as `plain`."""
+    """Several lines for a terminal, uncut: line breaks and tabs stay, all else as `plain`."""
     whole = str(text).split("\n")
     return "\n".join("\t".join(plain(part, 1 << 20) for part in line.split("\t")) for line in whole)
 
@@ -85,6 +88,21 @@ def printed(text: object) -> str:
 def html(text: object, longest: int = LONGEST) -> Markup:
     """Text inside HTML or SVG. What is Markup already stays as it is."""
     return text if isinstance(text, Markup) else _escape(plain(text, longest))
+
+
+def paragraph(text: object) -> Markup:
+    """Text of several lines inside HTML."""
+    return text if isinstance(text, Markup) else _escape(printed(text))
+
+
+def template_value(value: object) -> object:
+    """For `finalize` of a jinja environment: whatever a template shows passes here."""
+    return paragraph(value) if isinstance(value, str) else value
+
+
+def drawn(text: object, longest: int = 120) -> str:
+    """A title or label of a figure: plain, and no formula between two dollar signs."""
+    return plain(text, longest).replace("$", r"\$")
 
 
 def cell(value: object) -> object:

@@ -26,6 +26,7 @@ An estimator is one of rate/, of nav/ for a vehicle, or of attitude/ for a board
 those all have the heading of the truth or of the first.
 """
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -41,6 +42,7 @@ from inertial.rotation import rotate
 
 ARROW_PER_RADPS = 0.55  # half sides per rad/s; 180 deg/s gives 1.7
 ARROW_LONGEST = 2.2
+MOST = 12  # estimators drawn of one device; the tables have them all
 
 LAYERS = ("truth", "estimates", "sensors", "rate", "trajectory", "fixes", "ellipsoid", "grid")
 
@@ -98,7 +100,7 @@ class SceneView:
     def update(self, device: Device) -> None:
         """Poses from the newest messages. Call under the store's lock, 20 to 30 times a second."""
         body = device.body
-        estimators = device.estimators(body)
+        estimators = device.estimators(body)[:MOST]
         truth = device.get("truth") is not None
         built = (device.name, device.generation, body, tuple(estimators), truth, self._choice.dark)
         if built != self._built:
@@ -242,9 +244,10 @@ class SceneView:
         for index, name in enumerate(estimators):
             message = device.get("nav", name).message
             q = geo.quaternion(message.q_nb)
-            p = tuple(message.p_ned_m) if len(message.p_ned_m) == 3 else None
+            p = geo.drawn_place(message.p_ned_m)
             self._set(f"/world/estimate/{name}/body", q=q, p=p)
-            surface = geo.ellipsoid(message.position_covariance)
+            flat = len(message.p_ned_m) == 3 and math.isnan(message.p_ned_m[2])
+            surface = geo.ellipsoid(geo.flattened(message.position_covariance, flat))
             path = f"/world/estimate/{name}/ellipsoid"
             if surface is not None and p is not None and path in self._nodes:
                 self._set(path, q=surface[1], p=p)

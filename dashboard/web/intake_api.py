@@ -2,7 +2,6 @@
 estimated again.
 """
 
-import re
 from typing import Annotated
 
 from fastapi import APIRouter, HTTPException, Query, Request
@@ -10,16 +9,19 @@ from pydantic import BaseModel, Field
 
 from dashboard.web.api import Operator, SignedIn, file_of
 from dashboard.web.front import Front, front_of
-from dashboard.web.schemas import Strict
+from dashboard.web.schemas import Line, Strict
 from dashboard.web.session_api import JobOut, start_job
-from dashboard.web.uploads import Upload
+from dashboard.web.uploads import Upload, UploadError, samples_and_fixes
+from messages import text
 
 routes = APIRouter(prefix="/api")
 
-FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,80}\.csv", re.IGNORECASE)
 LARGEST = 1 << 30  # bytes of one log
 NAMED = r"^[a-z][a-z0-9_-]{0,31}$"
-ADDED = r"^[a-z0-9][a-z0-9_-]{0,24}$"
+ESTIMATOR_NAME = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")]
+SETTING = Annotated[str, Field(pattern=r"^[a-z0-9_-]+(\.[a-z0-9_-]+){0,3}$", max_length=100)]
+VALUE = Annotated[Line, Field(max_length=300)]
+Added = Annotated[Line, Field(min_length=1, max_length=60)]  # manifest.slug makes an id of it
 
 
 class UploadOut(BaseModel):
@@ -33,22 +35,22 @@ class PieceOut(BaseModel):
 
 class ImportOrder(Strict):
     device: str = Field(default="log", pattern=NAMED)
-    name: str = Field(default="import", pattern=ADDED, description="added to the session's id")
+    name: Added = Field(default="import", description="added to the session's id")
 
 
 class RerunOrder(Strict):
-    estimators: list[str] = Field(
+    estimators: list[ESTIMATOR_NAME] = Field(
         default=[], max_length=8, description="rate estimators; none: as configured"
     )
-    navigators: list[str] = Field(
+    navigators: list[ESTIMATOR_NAME] = Field(
         default=[], max_length=8, description="navigation filters; none: as configured"
     )
-    settings: dict[str, str] = Field(
-        default={}, max_length=20, description="key of [estimator] -> value, as in TOML"
+    settings: dict[SETTING, VALUE] = Field(
+        default={},
+        max_length=20,
+        description="key of [estimator] -> value, as in TOML; files by name, of the library only",
     )
-    name: str = Field(
-        default="new", pattern=ADDED, description="added to the names of session and estimators"
-    )
+    name: Added = Field(default="new", description="added to the names of session and estimators")
     beside: bool = Field(default=True, description="keep the old estimates beside")
 
 
@@ -68,8 +70,11 @@ async def take_piece(
     wanted instead.
     """
     found = _upload(front_of(request), upload, who.name)
-    if not FILE_NAME.fullmatch(file):
-        raise HTTPException(422, f"file {file[:80]!r}: want a CSV file, like imu.csv")
+    file = text.composed(file)  # one file, whether its umlauts come in one piece or in two
+    if fault := text.file_name(file):
+        raise HTTPException(422, f"file {text.plain(file, 80)}: {fault}: give it another name")
+    if not file.lower().endswith(".csv"):
+        raise HTTPException(422, f"file {text.plain(file, 80)}: want a CSV file, like imu.csv")
     body = await request.body()
     with found.lock:
         path = found.folder / file
@@ -94,22 +99,17 @@ async def take_piece(
 def finish_import(request: Request, upload: int, body: ImportOrder, who: Operator) -> JobOut:
     front = front_of(request)
     found = _upload(front, upload, who.name)
-    files = sorted(found.folder.iterdir())
-    if not files:
-        raise HTTPException(409, "no file was sent")
-    fixes = [file for file in files if "gnss" in file.name.lower() or "gps" in file.name.lower()]
-    samples = [file for file in files if file not in fixes]
-    if len(samples) != 1 or len(fixes) > 1:
-        raise HTTPException(
-            409, "want one CSV of samples and, for a drive, one of fixes with gnss in its name"
-        )
-    order = ["import", str(samples[0]), "--device", body.device, "--name", body.name]
-    order += ["--gnss", str(fixes[0])] if fixes else []
-    return start_job(front, "import", samples[0].name, order, who.name, makes="session")
+    try:
+        samples, fixes = samples_and_fixes(sorted(found.folder.iterdir()))
+    except UploadError as error:
+        raise HTTPException(409, str(error)) from None
+    order = ["import", str(samples), "--device", body.device, "--name", body.name]
+    order += ["--gnss", str(fixes)] if fixes else []
+    return start_job(front, "import", samples.name, order, who.name, makes="session")
 
 
 def _upload(front: Front, number: int, user: str) -> Upload:
-    found = front.uploads.open.get(number)
+    found = front.uploads.open.get(number)  # of the user who began it
     if found is None or found.user != user:
         raise HTTPException(404, f"no upload {number}: begin anew")
     return found
@@ -133,7 +133,7 @@ def choices(request: Request, who: SignedIn) -> ChoicesOut:
 @routes.post("/sessions/{session}/rerun", summary="Estimate it again, as a new session (operator)")
 def rerun(request: Request, session: str, body: RerunOrder, who: Operator) -> JobOut:
     front = front_of(request)
-    order = ["rerun", str(file_of(front, session)), "--name", body.name]
+    order = ["rerun", str(file_of(front, session)), "--library-only", "--name", body.name]
     order += ["--estimators", ",".join(body.estimators)] if body.estimators else []
     order += ["--navigators", ",".join(body.navigators)] if body.navigators else []
     for key, value in body.settings.items():

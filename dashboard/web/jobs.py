@@ -6,6 +6,7 @@ composition root that writes into a folder; its files are served when it has end
 """
 
 import itertools
+import logging
 import shutil
 import subprocess
 import tempfile
@@ -17,9 +18,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from dashboard.web.control import ControlError
+from messages.text import plain
+
+log = logging.getLogger(__name__)
 
 KEPT = 20  # ended jobs; the files of older ones go
-LONGEST_S = 3600.0
+LONGEST_S = 3600.0  # s, then it is ended
 
 
 @dataclass
@@ -36,6 +40,7 @@ class Job:
     state: str = "waiting"  # waiting, running, done, failed
     message: str = ""  # why it failed
     made: str = ""  # id of the session it made
+    keeping: threading.Lock = field(default_factory=threading.Lock)  # its files are being moved
 
     @property
     def seconds(self) -> float:
@@ -62,7 +67,13 @@ class Jobs:
     `options` behind them.
     """
 
-    def __init__(self, command: Sequence[str], options: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        command: Sequence[str],
+        options: Sequence[str] = (),
+        longest_s: float = LONGEST_S,
+    ) -> None:
+        self._longest_s = longest_s
         self._options = list(options)
         self._command = [*(["nice", "-n", "15"] if shutil.which("nice") else []), *command]
         self._scratch = Path(tempfile.mkdtemp(prefix="gyrofree-jobs-"))
@@ -112,26 +123,47 @@ class Jobs:
     def _run(self, job: Job, arguments: list[str], accept: tuple[int, ...], makes: str) -> None:
         with self._turn:
             if self._closed:
+                job.ended, job.state = time.monotonic(), "failed"
+                job.message = "the dashboard ended"
                 return
             job.state = "running"
-            job.out.mkdir(parents=True, exist_ok=True)
+            well = False
             try:
-                out = ["--out", str(job.out)] if makes == "files" else []
-                self._process = subprocess.Popen(
-                    [*self._command, *arguments, *out, *self._options],
-                    stdin=subprocess.DEVNULL,
-                    stdout=subprocess.PIPE,
-                    stderr=subprocess.PIPE,
-                    text=True,
-                )
-                printed, said = self._process.communicate(timeout=LONGEST_S)
-                well = self._process.returncode in accept
-                if well and makes == "session":
-                    job.made = (printed.split() or [""])[-1]
-                job.message = (
-                    "" if well else (said.strip().splitlines() or ["it ended without a word"])[-1]
-                )
-            except (OSError, subprocess.TimeoutExpired) as error:
-                well, job.message = False, str(error)
-            job.ended = time.monotonic()
-            job.state = "done" if well else "failed"
+                job.out.mkdir(parents=True, exist_ok=True)
+                well = self._carry_out(job, arguments, accept, makes)
+            except Exception as error:  # whatever it was, nobody may wait for this job for ever
+                log.exception("job %d (%s of %s)", job.number, job.kind, job.session)
+                job.message = str(error) or type(error).__name__
+            finally:
+                job.message = plain(job.message)
+                job.ended = time.monotonic()
+                job.state = "done" if well else "failed"
+
+    def _carry_out(
+        self, job: Job, arguments: list[str], accept: tuple[int, ...], makes: str
+    ) -> bool:
+        """Run the command to its end; raises OSError and ValueError when it cannot be started."""
+        out = ["--out", str(job.out)] if makes == "files" else []
+        process = self._process = subprocess.Popen(
+            [*self._command, *arguments, *out, *self._options],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+        )
+        try:
+            printed, said = process.communicate(timeout=self._longest_s)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+            job.message = f"not done after {self._longest_s:g} s: given up"
+            return False
+        if process.returncode not in accept:
+            job.message = (said.strip().splitlines() or [f"it ended with {process.returncode}"])[-1]
+            return False
+        if makes == "session":
+            job.made = (printed.split() or [""])[-1]
+            if not job.made:
+                job.message = "it made no session and said nothing"
+        return makes != "session" or bool(job.made)

@@ -15,6 +15,7 @@ from dashboard.web import api
 from dashboard.web.auth import Role, WaitError, same_token
 from dashboard.web.front import Asker, address_of, asker, check_role, front_of
 from dashboard.web.users import UsersError, add_user, remove_user
+from messages.text import template_value
 
 log = logging.getLogger(__name__)
 
@@ -55,6 +56,7 @@ def _utc(seconds: float) -> str:
 _templates = jinja2.Environment(
     loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
     autoescape=True,
+    finalize=template_value,
     undefined=jinja2.StrictUndefined,
     trim_blocks=True,
     lstrip_blocks=True,

@@ -8,11 +8,10 @@ here (scene_messages.py).
 import asyncio
 import logging
 import time
+from collections import Counter
 from collections.abc import Callable, Collection
-from pathlib import Path
 from urllib.parse import parse_qsl, urlencode
 
-import viser
 import websockets
 from fastapi import APIRouter, Request, WebSocket
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
@@ -27,6 +26,8 @@ from dashboard.web.scene_messages import (
     may_send,
     message_type,
 )
+from dashboard.web.scene_page import policy, scene_page, script_hashes
+from messages.text import plain
 
 log = logging.getLogger(__name__)
 
@@ -34,15 +35,6 @@ FOREIGN_PARAMETERS = {
     "websocket",
     "playbackPath",
 }  # they point viser's page at other servers and files
-
-# viser's page is one file that unpacks itself: inline script and style, WebAssembly with generated
-# glue code (eval), workers from blobs. What this policy is for: nothing is fetched from and no
-# socket opened to another server.
-SCENE_CSP = (
-    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob:; style-src 'unsafe-inline';"
-    " img-src 'self' data: blob:; font-src data:; worker-src blob:; connect-src data: blob:"
-    " ws://{host} wss://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
-)
 
 
 class Rate:
@@ -60,12 +52,6 @@ class Rate:
         return self._level >= 0
 
 
-def scene_page() -> tuple[bytes, str]:
-    """viser's page and its version tag; one file, read once."""
-    page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_bytes()
-    return page, viser.__version__
-
-
 def router(
     settings: DashboardSettings,
     gate: Gate,
@@ -75,6 +61,8 @@ def router(
     """GET /scene/ and the WebSocket /scene/; scene_port gives viser's port on the loopback."""
     routes = APIRouter(include_in_schema=False)
     page, version = scene_page()
+    script_hashes()  # now, not while the first browser waits
+    open_scenes: Counter[str] = Counter()  # user -> scenes
 
     @routes.get("/scene/")
     def scene(request: Request) -> Response:
@@ -85,7 +73,7 @@ def router(
         if clean != query:
             return RedirectResponse("/scene/" + (f"?{urlencode(clean)}" if clean else ""), 303)
         headers = {
-            "content-security-policy": SCENE_CSP.format(host=request.headers["host"]),
+            "content-security-policy": policy(request.headers["host"]),
             "x-frame-options": "SAMEORIGIN",
             "cache-control": "private, max-age=3600",
             "etag": f'"viser-{version}"',
@@ -95,10 +83,22 @@ def router(
     @routes.websocket("/scene")  # viser's page drops the last slash of its own address
     @routes.websocket("/scene/")
     async def scene_socket(socket: WebSocket) -> None:
-        if gate.session_of(socket) is None:
+        found = gate.session_of(socket)
+        if found is None:
             await socket.close(1008, "sign in first")
             return
-        await Relay(settings, gate, socket, open_labels).run(scene_port())
+        user = found[1].name
+        if open_scenes[user] >= settings.scenes_per_user or (
+            open_scenes.total() >= settings.scenes
+        ):
+            log.warning("%s has %d scenes open: one more refused", user, open_scenes[user])
+            await socket.close(1013, "too many scenes are open: close other tabs")
+            return
+        open_scenes[user] += 1
+        try:
+            await Relay(settings, gate, socket, open_labels).run(scene_port())
+        finally:
+            open_scenes[user] -= 1
 
     return routes
 
@@ -218,7 +218,7 @@ class Relay:
             except BadMessage as error:
                 log.warning("browser of %s: %s", self._who, error)
                 return 1007, "not a message of viser's"
-            if may_send(role, name, fields, self._widgets.open):
+            if may_send(role, name, fields, self._widgets):
                 await scene.send(data)
             else:
                 self._note(role, name)
@@ -227,7 +227,7 @@ class Relay:
         """Say each refused kind once per connection: a browser may repeat it at any rate."""
         if name not in self._refused and name not in DROPPED_QUIETLY and len(self._refused) < 20:
             self._refused.add(name)
-            log.warning("refused %r of %s (%s) to the scene", name[:64], self._who, role.name)
+            log.warning("refused %s of %s (%s) to the scene", plain(name, 64), self._who, role.name)
 
     async def _watch(self) -> tuple[int, str]:
         """Ends the connection of a browser that was signed out, also when it sends nothing."""

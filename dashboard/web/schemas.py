@@ -86,7 +86,7 @@ class RecordingOut(BaseModel):
 
 
 class StartRecording(Strict):
-    name: str = Field(default="", max_length=32, pattern=r"^([a-z0-9][a-z0-9_-]*)?$")
+    name: Line = Field(default="", max_length=60)
     note: Lines = Field(default="", max_length=2000)
 
 

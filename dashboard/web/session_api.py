@@ -51,7 +51,9 @@ class ExportOrder(Strict):
     format: Literal["csv", "parquet", "mat", "kml", "gpx", "mcap"]
     start_s: float = Field(default=0.0, ge=0, description="s from the session's start")
     end_s: float | None = Field(default=None, ge=0)
-    topics: list[str] = Field(default=[], max_length=30)
+    topics: list[Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$")]] = Field(
+        default=[], max_length=30
+    )
 
 
 class NoteOrder(Strict):
@@ -132,9 +134,9 @@ def make_export(request: Request, session: str, body: ExportOrder, who: Operator
         "--format",
         body.format,
         "--from",
-        f"{body.start_s:g}",
+        repr(body.start_s),
     ]
-    arguments += ["--to", f"{body.end_s:g}"] if body.end_s is not None else []
+    arguments += ["--to", repr(body.end_s)] if body.end_s is not None else []
     arguments += ["--topics", ",".join(body.topics)] if body.topics else []
     return start_job(front, f"export-{body.format}", session, arguments, who.name)
 
@@ -144,7 +146,7 @@ def job(request: Request, number: int, who: SignedIn) -> JobOut:
     front = front_of(request)
     found = _known(front, number)
     if found.kind == "report" and found.state == "done":
-        _keep_report(front, found)
+        _guarded(lambda: _keep_report(front, found))
     return job_out(found)
 
 
@@ -173,10 +175,11 @@ def _known(front: Front, number: int) -> Job:
 def _keep_report(front: Front, job: Job) -> None:
     """A finished report moves to its session."""
     target = front.catalogue.root / job.session / REPORT_FOLDER
-    if job.files and target.parent.is_dir():
-        target.mkdir(exist_ok=True)
-        for file in job.files:
-            shutil.move(file, target / file.name)
+    with job.keeping:  # two pages may ask at once
+        if job.files and target.parent.is_dir():
+            target.mkdir(exist_ok=True)
+            for file in job.files:
+                shutil.move(file, target / file.name)
 
 
 class _Pipe(io.RawIOBase):

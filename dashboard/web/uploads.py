@@ -1,13 +1,51 @@
 """Files that a browser sends in pieces, until they are made a session of."""
 
 import itertools
+import re
 import shutil
 import tempfile
 import threading
 from dataclasses import dataclass, field
 from pathlib import Path
 
+HEAD = 8192  # bytes of a file that its header and some rows are in
+LATITUDE = re.compile(r"(?<![a-z])lat(itude)?(?![a-z])")
+RECEIVER = re.compile(r"gnss|gps")
 AT_ONCE = 4  # uploads that have not been finished; the oldest gives way
+
+
+class UploadError(ValueError):
+    """Files that no session can be made of; the text says what is wanted."""
+
+
+def samples_and_fixes(files: list[Path]) -> tuple[Path, Path | None]:
+    """Which of the files has the samples, and which, for a drive, the fixes: by their columns, and
+    where those say nothing by their names. Raises UploadError.
+    """
+    if len(files) == 1:
+        return files[0], None  # whatever it is called
+    if len(files) == 2:
+        for sign in (has_latitude, named_after_a_receiver):
+            fixes = [file for file in files if sign(file)]
+            if len(fixes) == 1:
+                return next(file for file in files if file not in fixes), fixes[0]
+    names = ", ".join(file.name for file in files) or "no file"
+    raise UploadError(
+        f"{names}: want one CSV of samples and, for a drive, one of fixes, whose columns have"
+        " latitude and longitude"
+    )
+
+
+def has_latitude(file: Path) -> bool:
+    """Does its beginning name a latitude? In any encoding: the word is ASCII."""
+    with file.open("rb") as stream:
+        head = stream.read(HEAD).replace(b"\0", b"").decode("latin-1").lower()
+    return LATITUDE.search(head) is not None
+
+
+def named_after_a_receiver(file: Path) -> bool:
+    """gnss or gps in its name."""
+    return RECEIVER.search(file.name.lower()) is not None
 
 
 @dataclass

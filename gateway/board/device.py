@@ -11,9 +11,12 @@ import logging
 import queue
 import threading
 import time
+from collections.abc import Iterator
 from concurrent.futures import Future
 
+from firmware_protocol.codec import Frame
 from gateway.board.decoder import Decoder
+from gateway.board.frame_door import FrameDoor
 from gateway.board.frames import FrameHandler
 from gateway.board.link_report import LinkReport
 from gateway.board.orders import Orders
@@ -31,6 +34,8 @@ from gateway.time.clock import DeviceClock
 from gateway.time.pps import PpsClock
 from gateway.time.wall import WallClock
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.checks import Refusal
+from messages.contract.door import Door
 from messages.contract.topics import LINK
 from messages.history.journal import Journal
 from messages.history.journal_file import BOARD, GNSS, Record
@@ -39,7 +44,9 @@ from messages.history.spool import Spool
 log = logging.getLogger(__name__)
 
 JOIN_WAIT_S = 0.01  # samples held back for joining wait no longer than this for the next frame
+FAILURES_SHOWN = 20  # faults of ours that stand in the log with all that is known of them
 STATUS_EVERY_S = 1.0
+STOPPED_S = 1.5  # longer than any wait below: this process was stopped, or got no processor
 
 
 class DeviceLink:
@@ -56,17 +63,19 @@ class DeviceLink:
         self.name, self.device, self._keeper = name, device, keeper or Keeper()
         self._next_put: Put | None = None  # None: there is no bus yet
         self._live = False
+        self._looked = time.monotonic()
         self.journal = Journal(
             folder, settings.journal_bytes, settings.segment_bytes, settings.sync_s
         )
         self.spool = Spool(folder / "published", settings.published_bytes, settings.published_age_s)
         self.queue: queue.SimpleQueue[Chunk | None] = queue.SimpleQueue()
         self.readers: list[Reader] = []
-        self.decoder = Decoder()
+        self.door = Door("gateway")
+        self.decoder = Decoder(FrameDoor(self.door, name, device.time_scale))
         self.state = BoardState()
         self.clock = DeviceClock(time_scale=device.time_scale)
         self.pps, self.wall = PpsClock(), WallClock(name)
-        self.out = Outgoing(name, self.journal.run, self.state, self.clock, self.wall)
+        self.out = Outgoing(name, self.journal.run, self.state, self.clock, self.wall, self.door)
         self.watch = BoardWatch(self.state, self.clock, self.pps, self.wall, self.out)
         self.samples = SampleFlow(name, device.analogue, self.state, self.out)
         self.gnss = GnssFlow(name, device.gnss_latency_s, self.wall, self.out)
@@ -83,7 +92,15 @@ class DeviceLink:
             self.orders,
         )
         self.report = LinkReport(
-            device, self.decoder, self.samples, self.gnss, self.clock, self.journal, self.spool
+            device,
+            self.decoder,
+            self.samples,
+            self.gnss,
+            self.clock,
+            self.journal,
+            self.spool,
+            self.door,
+            self.wall,
         )
 
     def run(self, stop: threading.Event) -> None:
@@ -118,9 +135,9 @@ class DeviceLink:
         self.report.message(self.readers, 0)  # rates and latency from here on
 
     def _loop(self, stop: threading.Event) -> None:
-        due = time.monotonic()
+        due = self._looked = time.monotonic()
         while not stop.is_set():
-            left = due - time.monotonic()
+            left = due - self._look()
             if left <= 0:
                 self._each_second()
                 due = max(due + STATUS_EVERY_S, time.monotonic())
@@ -141,12 +158,38 @@ class DeviceLink:
                 self.out.direct(self._next_put)
                 due = time.monotonic()  # the first status at once: it says that samples follow
 
+    def _look(self) -> float:
+        """Now, s; notices when this process was stopped meanwhile."""
+        now, before = time.monotonic(), self._looked
+        self._looked = now
+        if now - before > STOPPED_S:
+            self.watch.stopped(now - before)
+            self.report.stopped(now - before)
+            log.warning("%s: this process was stopped for %.1f s", self.name, now - before)
+        return now
+
     def _each_second(self) -> None:
+        try:
+            self._tell()
+        except Exception as error:
+            self._fail(error, "the state of the line")
+            self.frames.begin_anew(self.state.epoch or 0)
+
+    def _fail(self, error: Exception, what: str) -> None:
+        """A fault of ours: it costs what it was about, and neither this board nor another."""
+        failure = Refusal("failure", what, type(error).__name__, "to be understood")
+        self.door.refuse(self.name, failure, self.name)
+        if self.door.refused["failure"] <= FAILURES_SHOWN:
+            log.error("%s: %s", self.name, what, exc_info=error)
+
+    def _tell(self) -> None:
+        now_ns = time.monotonic_ns()
+        self._take_frames(self.decoder.wait(now_ns), now_ns)
         self.wall.follow()
         self.watch.look(self.readers[0].connected, time.monotonic_ns())
         if self.out.live:
             status = self.report.message(self.readers, self.queue.qsize())
-            self.out.publish(LINK, status, 0, time.time_ns())
+            self.out.publish(LINK, status, 0, self.wall.now_ns())
 
     def go_live(self, put: Put) -> None:
         """Publish from now on what is read from now on: put(topic, device, message), which must not
@@ -178,8 +221,20 @@ class DeviceLink:
             if chunk.channel == BOARD:
                 self.orders.ask("hello")  # who is there should not take ten seconds to learn
         elif chunk.channel == GNSS:
-            device_us = self.clock.device_us(chunk.monotonic_ns)
-            self.gnss.take(chunk.data, device_us, chunk.monotonic_ns)
+            try:
+                device_us = self.clock.device_us(chunk.monotonic_ns)
+                self.gnss.take(chunk.data, device_us, chunk.monotonic_ns)
+            except Exception as error:
+                self._fail(error, "bytes of the receiver")
+                self.gnss.restart()
         else:
-            for frame in self.decoder.feed(chunk.data):
-                self.frames.take(frame, self.decoder.ledger.reboots, chunk.monotonic_ns)
+            frames = self.decoder.feed(chunk.data, chunk.monotonic_ns)
+            self._take_frames(frames, chunk.monotonic_ns, chunk.late)
+
+    def _take_frames(self, frames: Iterator[Frame], at_ns: int, late: bool = False) -> None:
+        for frame in frames:
+            try:
+                self.frames.take(frame, self.decoder.ledger.reboots, at_ns, late)
+            except Exception as error:
+                self._fail(error, f"frame of type {frame.type}")
+                self.frames.begin_anew(frame.epoch)

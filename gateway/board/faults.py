@@ -115,6 +115,13 @@ class FaultWatch:
             )
         self._heard_s = now_s
 
+    def stopped(self, seconds: float) -> None:
+        """Nobody looked for so long."""
+        if self._heard_s is not None:
+            self._heard_s += seconds
+        for sensor in self._sensors:
+            sensor.same_since_s += seconds
+
     def samples(self, frame: Acc12, now_s: float, utc_ns: int) -> None:
         """One data frame: who is dead, stuck or stale?"""
         fresh = False

@@ -11,14 +11,18 @@ from gateway.ports.reader import Reader
 from gateway.samples.flow import SampleFlow
 from gateway.settings import DeviceSettings
 from gateway.time.clock import DeviceClock
+from gateway.time.wall import WallClock
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.door import Door
 from messages.history.journal import Journal
 from messages.history.spool import Spool
 
 UNREADABLE_S = 2.0  # bytes but no frame for so long: not our protocol, or not our speed
 UNREADABLE_BYTES = 100
+REFUSED_TOLD_S = 60.0  # that something was refused is said for so long
 BEHIND_CHUNKS = 2000
 CRYSTAL_PPM = 1000.0  # no crystal is this far off
+TOLD_S = 60.0  # that this process was stopped is said for so long
 
 
 class LinkReport:
@@ -33,15 +37,28 @@ class LinkReport:
         clock: DeviceClock,
         journal: Journal,
         spool: Spool,
+        door: Door,
+        wall: WallClock,
     ) -> None:
+        self._door, self._refused, self._refused_at = door, 0, -REFUSED_TOLD_S
         self._device, self._decoder, self._samples, self._gnss = device, decoder, samples, gnss
         self._clock, self._journal, self._published = clock, journal, spool.journal
+        self._wall = wall
+        self._stops, self._stopped_s = 0, 0.0  # times that this process did not run
+        self._stopped_at: float | None = None
+        self._last_stop_s = 0.0
         self._at = time.monotonic()
         self._samples_at = 0
         self._frames_at = 0
         self._bytes_at = 0
         self._frames_seen = 0
         self._unreadable_since: float | None = None
+
+    def stopped(self, seconds: float) -> None:
+        """This process did not run for so long."""
+        self._stops += 1
+        self._stopped_s += seconds
+        self._stopped_at, self._last_stop_s = time.monotonic(), seconds
 
     def message(self, readers: Sequence[Reader], behind: int) -> pb.LinkStatus:
         """The state now, without its header; rates and latency since the last call. behind: reads
@@ -83,7 +100,13 @@ class LinkReport:
             gnss_good=self._gnss.good,
             gnss_bad=self._gnss.bad,
             damage=ledger.damage,
+            refused=self._door.counts(),
+            stops=self._stops,
+            stopped_s=self._stopped_s,
+            clock_offset_s=self._wall.offset_s,
         )
+        for name, count in self._gnss.refused.items():
+            status.refused[f"receiver: {name}"] = count
         self._at, self._samples_at = now, self._samples.count
         self._frames_at = ledger.good_frames
         return status
@@ -93,10 +116,34 @@ class LinkReport:
     ) -> list[str]:
         device, skew_ppm = self._device, self._clock.skew_ppm
         found = [reader.message for reader in readers if reader.message]
+        if self._stopped_at is not None and now - self._stopped_at < TOLD_S:
+            found.append(
+                f"this gateway's process was stopped for {self._last_stop_s:.1f} s,"
+                f" {now - self._stopped_at:.0f} s ago (a signal, a debugger, or no processor): what"
+                " the port could not hold meanwhile is lost, and the board is not to blame"
+            )
+        if self._wall.offset_s:
+            found.append(
+                f"the host's clock was set by {self._wall.offset_s:+,.3f} s since this gateway"
+                " began: time stamps go on without that step; start the gateway again when the new"
+                " time is the right one"
+            )
         if self._unreadable(now, connected):
             found.append(
                 f"{device.port}: bytes come but no frame can be read; most likely the speed is"
                 f" wrong: set `baud` to the board's (now {device.baud})"
+            )
+        if receiver := self._gnss.message(now):
+            found.append(receiver)
+        refused = self._door.counts()
+        total = sum(refused.values())
+        if total > self._refused:
+            self._refused, self._refused_at = total, now
+        if now - self._refused_at < REFUSED_TOLD_S:
+            kinds = ", ".join(f"{kind} {n}" for kind, n in sorted(refused.items()))
+            found.append(
+                f"whole frames whose values cannot be are left out ({kinds}): is the firmware of"
+                " another version, or does something else write to this line? The log names them"
             )
         if self._journal.message:
             found.append(self._journal.message)

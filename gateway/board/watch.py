@@ -31,6 +31,12 @@ class BoardWatch:
         """A frame has come."""
         self._faults.heard(received_ns * 1e-9, self._wall.utc_ns(received_ns))
 
+    def stopped(self, seconds: float) -> None:
+        """This process was stopped for so long: what was not heard meanwhile is not the board's
+        fault.
+        """
+        self._faults.stopped(seconds)
+
     def samples(self, frame: Acc12, received_ns: int) -> None:
         """Readings: who is dead, stuck or stale?"""
         self._faults.samples(frame, received_ns * 1e-9, self._wall.utc_ns(received_ns))

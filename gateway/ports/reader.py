@@ -20,15 +20,20 @@ log = logging.getLogger(__name__)
 
 FIRST_RETRY_S = 0.1
 LAST_RETRY_S = 2.0
+LOOK_MS = 500  # a silent port is looked at so often, so that silence is told from being stopped
+STOPPED_NS = 1_500_000_000  # between two looks: this process was stopped, or got no processor
 
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """One read. monotonic_ns: just after the last byte was read."""
+    """One read. monotonic_ns: just after the last byte was read; late: the process had been
+    stopped, and the bytes may have waited in the port for it.
+    """
 
     channel: int
     data: bytes
     monotonic_ns: int
+    late: bool = False
 
 
 class Reader:
@@ -119,22 +124,27 @@ class Reader:
             self._take(data, monotonic_ns, monotonic_ns + offset_ns)
         return adopt_port(self.url, left.fd)
 
-    def _take(self, data: bytes, monotonic_ns: int, utc_ns: int) -> None:
+    def _take(self, data: bytes, monotonic_ns: int, utc_ns: int, late: bool = False) -> None:
         self._journal.append(self._channel, data, monotonic_ns, utc_ns)
-        self._out.put(Chunk(self._channel, data, monotonic_ns))
+        self._out.put(Chunk(self._channel, data, monotonic_ns, late))
 
     def _read_until_lost(self, port: Port) -> None:
         poller = select.poll()
         poller.register(port.fileno(), select.POLLIN)
         poller.register(self._wake_out, select.POLLIN)
+        looked, late = time.monotonic_ns(), False
         while not self._stop.is_set():
-            poller.poll()
+            ready = poller.poll(0)
+            if not ready:
+                late = False  # nothing of the time before is left
+                ready = poller.poll(LOOK_MS)
             if self._stop.is_set():
                 return
-            data = port.read()
-            if not data:
-                continue
-            self._take(data, time.monotonic_ns(), time.time_ns())
+            now = time.monotonic_ns()
+            late, looked = late or now - looked > STOPPED_NS, now
+            data = port.read() if ready else b""
+            if data:
+                self._take(data, time.monotonic_ns(), time.time_ns(), late)
 
     def _say(self, message: str) -> None:
         if message != self.message:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from gateway.time.clock import unwrap
 
 JOIN_BELOW_NS = 5_000_000  # frames shorter than this (above 200 Hz with n = 1) are joined
+FARTHEST = 1 << 30  # samples; a longer gap is none
 JOIN_UP_TO_NS = 10_000_000
 
 
@@ -89,5 +90,7 @@ class Index:
         """(unwrapped first index, samples lost directly before it)."""
         first = first_index if self._next is None else unwrap(self._next, first_index)
         lost = 0 if self._next is None else max(0, first - self._next)
+        if first < 0 or lost >= FARTHEST:  # no gap: the board counts anew
+            first, lost = first_index, 0
         self._next = first + n
         return first, lost

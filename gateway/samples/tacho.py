@@ -17,6 +17,7 @@ from dataclasses import dataclass
 TIME_SIGMA = 1e-6  # s, capture resolution 10 ns plus the slope of an optical edge
 MARK_SIGMA = 0.02  # of a pitch, printed or milled marks
 SILENT_INTERVALS = 3.0
+MOST_PULSES = 100_000  # remembered until the rate is asked for
 FRAME_DELAY_S = 0.06  # pulses wait in the board for their frame: silence shorter than this is none
 
 
@@ -59,6 +60,7 @@ class Tachometer:
         self._sign, self._known = sign, direction_known
         self.pulses += len(times_us)
         self._times.extend(times_us)
+        del self._times[:-MOST_PULSES]
 
     def rate(self, now_us: float) -> Rate | None:
         """The rate that the pulses since the last call say; None when they say nothing new."""

@@ -17,8 +17,12 @@ BUCKET_S = (
 )
 SLOPE_AFTER_S = 10.0  # before that scatter / span says nothing about skew
 SLOPE_PRIOR = 100e-6  # a crystal's tolerance, used until then
+LEAST_SLOPE = -0.999  # a device that runs a thousand times as fast as the host; -1 has no inverse
 JUMP_S = 1.0  # a receipt this far from the line is no delay any more
-JUMP_COUNT = 20  # so many in a row: the device's clock jumped
+JUMP_COUNT = 20  # so many in a row: the device's clock jumped ...
+JUMP_SETTLE_NS = 3_000_000_000  # ... when, being late, they have not caught up for so long
+WRAP_BITS = 32  # of a board's counter of microseconds that begins again after 71.6 minutes
+WRAP_DOUBT_US = 60_000_000  # a wrap is one when the board goes on within this
 
 
 def lower_hull(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -69,6 +73,8 @@ class DeviceClock:
         self._base_ns = 0
         self._line: Line | None = None
         self._far = 0
+        self._least_far, self._settled_ns = 0.0, 0  # how late at least, and since when not less
+        self._doubt_s = 0.0  # newest receipts contradict the line by this
         self.residual_s = 0.0
         self.span_s = 0.0
 
@@ -77,8 +83,12 @@ class DeviceClock:
         """True from the first receipt on."""
         return self._line is not None
 
-    def add(self, device_us: int, host_ns: int) -> None:
-        """One receipt: device time of the frame and host monotonic time of its last byte."""
+    def add(self, device_us: int, host_ns: int, late: bool = False) -> None:
+        """One receipt: device time of the frame and host monotonic time of its last byte.
+
+        `late`: this process had been stopped, and the byte may have waited for it since. Such a
+        receipt says nothing of the clock but that it was not sent after it.
+        """
         if self._line is None:
             self._base_us, self._base_ns = device_us, host_ns
             self._line = Line(0.0, 0.0, 0.0)
@@ -87,10 +97,15 @@ class DeviceClock:
         x = (device_us - self._base_us) / 1e6 / self.time_scale
         y = (host_ns - self._base_ns) / 1e9 - x
         above = y - self._line.at(x)
-        if self._jumped(above):
+        if late and above > 0.0:
+            return
+        if self._jumped(above, host_ns):
             self.reset()
             self.add(device_us, host_ns)
+            self._doubt_s = abs(above)  # which of the two was right is not known
             return
+        if self._far:
+            return  # a glitch, a backlog or a jump: the next ones tell
         newest = self._buckets[-1]
         if x < newest[0] - self.window_s:
             return  # out of order by more than a window: nothing to learn
@@ -131,13 +146,25 @@ class DeviceClock:
     def sigma_s(self) -> float:
         """One sigma of the mapping without the fixed path delay, s."""
         if self.span_s < SLOPE_AFTER_S:
-            return self.residual_s + SLOPE_PRIOR * max(self.span_s, BUCKET_S)
-        return max(self.residual_s, 1e-6)
+            return self.residual_s + SLOPE_PRIOR * max(self.span_s, BUCKET_S) + self._doubt_s
+        return max(self.residual_s, 1e-6) + self._doubt_s
 
-    def _jumped(self, above: float) -> bool:
+    def _jumped(self, above: float, host_ns: int) -> bool:
+        """Does this receipt prove that the device's clock jumped? Too early, it does after a few;
+        too late, it may be one of many that waited somewhere and are being caught up with.
+        """
         limit = max(JUMP_S, 20 * self.residual_s)
-        self._far = self._far + 1 if abs(above) > limit else 0
-        if self._far < JUMP_COUNT:
+        if abs(above) <= limit:
+            if self._far or self.span_s >= SLOPE_AFTER_S:
+                self._doubt_s = 0.0
+            self._far = 0
+            return False
+        if not self._far or above < self._least_far - 0.05 * limit:
+            self._least_far, self._settled_ns = above, host_ns
+        self._far += 1
+        self._doubt_s = abs(above)
+        waited = above < 0.0 or host_ns - self._settled_ns >= JUMP_SETTLE_NS
+        if self._far < JUMP_COUNT or not waited:
             return False
         self.jumps += 1
         return True
@@ -153,6 +180,7 @@ class DeviceClock:
                 slope = (y1 - y0) / (x1 - x0)
                 if x1 >= mean:
                     break
+        slope = max(slope, LEAST_SLOPE)
         offset = min(y - slope * (x - mean) for x, y in points)
         self._line = Line(mean, offset, slope)
         above = [y - self._line.at(x) for x, y in points]
@@ -165,3 +193,24 @@ def unwrap(previous: int, counter: int, bits: int = 32) -> int:
     """
     half, whole = 1 << (bits - 1), 1 << bits
     return previous + (counter - previous + half) % whole - half
+
+
+class Continued:
+    """Device time, continued over the wraps of a counter of 32 bits; a clock of 64 bits passes
+    through as it is.
+    """
+
+    def __init__(self) -> None:
+        self._wraps = 0
+        self._newest: int | None = None  # continued, us
+
+    def take(self, t_us: int) -> int:
+        """The time of a frame, us, as one that does not begin again."""
+        newest = self._newest
+        if newest is not None and t_us < 1 << WRAP_BITS and newest >= 1 << (WRAP_BITS - 1):
+            near = unwrap(newest, t_us, WRAP_BITS)
+            if self._wraps or 0 <= near - newest <= WRAP_DOUBT_US:
+                self._wraps = max(self._wraps, near >> WRAP_BITS)
+                t_us = near
+        self._newest = t_us if newest is None else max(newest, t_us)
+        return t_us

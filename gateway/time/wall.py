@@ -1,32 +1,42 @@
-"""The host's UTC clock against its monotonic one: it may be slewed or stepped under us."""
+"""UTC of one gateway run: the host's clock as it was at the start, and what has elapsed since.
+
+The wall clock may be set under us. Time stamps go on as if it had not been, so that they stay in
+order and their differences true; by how much the wall clock differs is said beside them.
+"""
 
 import logging
-import time
+
+from messages.clock import Clock
 
 log = logging.getLogger(__name__)
 
-STEP_NS = 500_000_000
-
 
 class WallClock:
-    """UTC of monotonic times, by the offset that was looked up last."""
+    """UTC of monotonic times, without steps."""
 
     def __init__(self, name: str) -> None:
         """name: of the device, for the log."""
-        self._name = name
-        self.offset_ns = time.time_ns() - time.monotonic_ns()
+        self._name, self._clock = name, Clock()
 
     def utc_ns(self, monotonic_ns: int) -> int:
         """UTC of a monotonic time, ns."""
-        return monotonic_ns + self.offset_ns
+        return self._clock.at_ns(monotonic_ns)
+
+    def now_ns(self) -> int:
+        """UTC of now, ns."""
+        return self._clock.now_ns()
+
+    @property
+    def offset_s(self) -> float:
+        """By how much the wall clock was set since the start, s."""
+        return self._clock.offset_ns * 1e-9
 
     def follow(self) -> None:
-        """Look the offset up; a step of the clock is said."""
-        offset = time.time_ns() - time.monotonic_ns()
-        if abs(offset - self.offset_ns) > STEP_NS:
+        """Look at the wall clock; a step is said."""
+        step = self._clock.look()
+        if step is not None:
             log.warning(
-                "%s: the host's clock was stepped by %.3f s; UTC times follow it",
+                "%s: %s; time stamps go on without the step, LinkStatus.clock_offset_s says it",
                 self._name,
-                (offset - self.offset_ns) / 1e9,
+                step,
             )
-        self.offset_ns = offset

@@ -85,7 +85,7 @@ def _check_log(path: Path, gnss: Path | None = None, as_named: bool = False) -> 
     try:
         return kind_of(path, gnss, as_named)
     except (LogError, OSError) as error:
-        raise fail(str(error)) from None
+        raise fail(str(error), CONFIG) from None
 
 
 def play(
@@ -115,7 +115,7 @@ def play(
     """Play a log of real sensors through the wire, the gateway and everything behind it.
 
     The columns are described in docs/logs.md. Like `gyrofree demo`, this prints one URL; with
-    --link it is only the board.
+    --link it is only the board. Without --loop it ends with the log, and says what was recorded.
     """
     kind = _check_log(log, gnss, units_as_named)
     if link is not None:
@@ -128,9 +128,10 @@ def play(
         return run_service(body, verbose)
     from gyrofree.running import demo as demonstration
 
-    board = ["play", str(log.absolute()), "--speed", str(speed)] + (["--loop"] if loop else [])
-    board += ["--gnss", str(gnss.absolute())] if gnss else []
+    board = ["play", f"--speed={speed}"] + (["--loop"] if loop else [])
+    board += [f"--gnss={gnss.absolute()}"] if gnss else []
     board += ["--units-as-named"] if units_as_named else []
+    board += ["--", str(log.absolute())]
     demonstration.run(
         demonstration.Plan(
             folder.absolute(),
@@ -140,5 +141,6 @@ def play(
             port,
             bus_port,
             time_scale=speed,
+            once=not loop,
         )
     )

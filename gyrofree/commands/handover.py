@@ -5,14 +5,11 @@ again.
 import functools
 import json
 import sys
-import tomllib
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from pydantic import ValidationError
 
-from estimator.settings import EstimatorSettings
 from gyrofree.commands.options import (
     AsJson,
     Config,
@@ -20,12 +17,15 @@ from gyrofree.commands.options import (
     UnitsAsNamed,
     catalogue_of,
     file_of,
+    say,
+    session_name,
     settings_of,
 )
 from gyrofree.commands.run import progress_bar
 from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
 from messages.contract.topics import TopicError, check_name
-from sessions.recording.manifest import SessionError, name_of
+from sessions.library.annotations import give_title
+from sessions.recording.manifest import SessionError, name_of, slug
 
 
 def export(
@@ -64,7 +64,7 @@ def export(
         raise fail(str(error), EXIT_CONFIG) from None
     except OSError as error:
         raise fail(str(error)) from None
-    print(
+    say(
         json.dumps([str(file) for file in files], indent=2)
         if as_json
         else "\n".join(map(str, files))
@@ -100,11 +100,11 @@ def report(
         with progress_bar() as progress:
             made = build(path, load_spec(spec), device, boot, progress)
         if as_json:
-            print(made.json, end="")
+            say(made.json, end="")
         else:
             for file in made.write(out or Path(f"report-{name_of(path)}")):
-                print(file)
-            print(f"verdict: {made.verdict}")
+                say(file)
+            say(f"verdict: {made.verdict}")
     except (ValueError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
     if made.verdict == "fail":
@@ -119,7 +119,9 @@ def import_log(
         Path | None, typer.Option(help="CSV of GNSS epochs beside a single CSV of samples.")
     ] = None,
     device: Annotated[str, typer.Option(help="Device name for the samples.")] = "log",
-    name: Annotated[str, typer.Option(help="Added to the session's id.")] = "import",
+    name: Annotated[
+        str, typer.Option(help="Added to the session's id.", callback=session_name)
+    ] = "import",
     units_as_named: UnitsAsNamed = False,
     as_json: AsJson = False,
     config: Config = None,
@@ -136,14 +138,19 @@ def import_log(
         check_name(device)
         source = read_board_log(log, gnss, units_as_named)
         for note in source.notes:
-            print(f"note: {note}", file=sys.stderr)
-        rows = list(importer.rows_of(source, settings.bus.prefix, device))
+            say(f"note: {note}", file=sys.stderr)
+        rows = importer.rows_of(source, settings.bus.prefix, device)
         folder = _estimated(
-            settings, rows, f"20240101-000000-{name}", f"made of {log.name}", settings.recorder.root
+            settings,
+            rows,
+            f"20240101-000000-{slug(name) or 'import'}",
+            f"made of {log.name}",
+            settings.recorder.root,
         )
+        give_title(folder, name)
     except (LogError, TopicError, SessionError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
-    print(json.dumps({"session": folder.name}) if as_json else folder.name)
+    say(json.dumps({"session": folder.name}) if as_json else folder.name)
 
 
 def _estimated(settings, rows, session: str, note: str, root: Path) -> Path:
@@ -171,7 +178,11 @@ def rerun(
         str, typer.Option(help="Navigation filters to run, separated by commas.")
     ] = "",
     name: Annotated[
-        str, typer.Option(help="Added to the new session's id and to the new estimators' names.")
+        str,
+        typer.Option(
+            help="Added to the new session's id and the new estimators' names.",
+            callback=session_name,
+        ),
     ] = "new",
     beside: Annotated[
         bool, typer.Option("--beside/--instead", help="Keep the old estimates beside.")
@@ -183,6 +194,9 @@ def rerun(
             help="KEY=VALUE of [estimator] for this run, as layout.half_side_m=0.0493; repeatable.",
         ),
     ] = None,
+    library_only: Annotated[
+        bool, typer.Option(help="Files in --set by name, of the folders for cards and axis maps.")
+    ] = False,
     as_json: AsJson = False,
     config: Config = None,
 ) -> None:
@@ -193,60 +207,35 @@ def rerun(
     """
     from estimator.choice import UnknownEstimator
     from estimator.pipeline import Pipeline
+    from gyrofree.running.rerun_settings import from_library, with_changes
     from sessions.replay.rerun import estimates_again, rerun_id, write_session
 
     settings = settings_of(config)
-    path = file_of(settings, session)
+    path, short = file_of(settings, session), slug(name, 24) or "new"
     chosen = {"rate": estimators, "navigators": navigators}
     changes = {
         key: [one.strip() for one in text.split(",")] for key, text in chosen.items() if text
     }
     try:
         estimator = with_changes(settings.estimator.model_copy(update=changes), changed or [])
+        estimator = from_library(settings.estimator, estimator) if library_only else estimator
         settings = settings.model_copy(update={"estimator": estimator})
         pipeline = Pipeline(estimator)
         with progress_bar() as progress:
-            rows = estimates_again(path, pipeline, name if beside else "", progress)
+            rows = estimates_again(path, pipeline, short if beside else "", progress)
             what = ", ".join([*sum(changes.values(), []), *(changed or [])]) or "this configuration"
             note = f"{path.parent.name} again: {what}"
             folder = write_session(
                 catalogue_of(settings).root,
-                rerun_id(path, name),
+                rerun_id(path, short),
                 rows,
                 note,
                 settings.model_dump(mode="json"),
             )
+        give_title(folder, name)
     except (UnknownEstimator, SessionError, ValueError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
-    print(json.dumps({"session": folder.name}) if as_json else folder.name)
-
-
-def with_changes(settings: EstimatorSettings, changes: list[str]) -> EstimatorSettings:
-    """Settings with `key=value` texts applied, values as in TOML (a bare word is a string); raises
-    ValueError.
-    """
-    data = settings.model_dump()
-    for text in changes:
-        key, equals, value = (part.strip() for part in text.partition("="))
-        try:
-            parsed = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
-            parsed = value
-        place, *inner = key.split(".")
-        table, name = data, place
-        for part in inner:
-            table, name = table.get(name) if isinstance(table, dict) else None, part
-        if not equals or not isinstance(table, dict) or name not in table:
-            raise ValueError(
-                f"--set {text!r}: want KEY=VALUE with a key of [estimator], like"
-                " layout.half_side_m=0.0493"
-            )
-        table[name] = parsed
-    try:
-        return EstimatorSettings.model_validate(data)
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise ValueError(f"--set {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+    say(json.dumps({"session": folder.name}) if as_json else folder.name)
 
 
 def reprocess(
@@ -299,9 +288,9 @@ def reprocess(
         raise fail(str(error), EXIT_CONFIG) from None
     bad = sum(bool(row.get("problem")) for row in rows)
     if as_json:
-        print(json.dumps(rows, indent=2))
+        say(json.dumps(rows, indent=2))
     else:
-        print(f"{out}: {len(rows)} rows of {len(paths)} sessions, {bad} with a problem")
+        say(f"{out}: {len(rows)} rows of {len(paths)} sessions, {bad} with a problem")
 
 
 def mount(app: typer.Typer) -> None:

@@ -2,14 +2,16 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from gyrofree.config import ConfigError, Settings, load_or_default
 from gyrofree.running.process import EXIT_CONFIG, fail
+from messages.text import printed
 
 if TYPE_CHECKING:
     from sessions.library.catalogue import Catalogue
@@ -62,11 +64,32 @@ def file_of(settings: Settings, session: str) -> Path:
         raise fail(str(error)) from None
 
 
+def session_name(name: str) -> str:
+    """A name that a person gives a session; one that cannot be ends the command."""
+    from sessions.recording.manifest import name_fault  # here: help should not wait for it
+
+    if fault := name_fault(name):
+        raise typer.BadParameter(fault)
+    return name
+
+
+def say(*parts: object, sep: str = " ", end: str = "\n", file: TextIO | None = None) -> None:
+    """print(), for texts that may come from outside: see messages.text."""
+    print(*map(printed, parts), sep=sep, end=end, file=file)
+
+
+class Terminal(Console):
+    """Shows texts as they stand: what is in a cell neither moves the cursor nor is markup."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        return super().render_str(printed(text), **options | {"markup": False, "emoji": False})
+
+
 def console_of(width: int = 160) -> Console:
     """Standard output; `width` characters where that is a file or a pipe, which has no width of its
     own.
     """
-    return Console(file=sys.stdout, width=None if sys.stdout.isatty() else width)
+    return Terminal(file=sys.stdout, width=None if sys.stdout.isatty() else width)
 
 
 def show_table(table: Table, width: int = 160) -> None:

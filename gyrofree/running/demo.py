@@ -15,8 +15,10 @@ from gyrofree.config import Settings, load
 from gyrofree.running.doctor import health, port_taken
 from gyrofree.running.process import EXIT_FAILED, EXIT_TAKEN, fail, start_logging, stop_on_signals
 from gyrofree.running.supervisor import Supervisor
+from sessions.library.catalogue import Catalogue
 
 TICK = 0.1  # s between two looks at the children
+DRAIN = 3.0  # s that the last samples of a played log have to reach the recording
 WAIT_FOR_PAGE = 60.0  # s; a cold compile cache needs most of it
 USER = "demo"
 
@@ -35,6 +37,7 @@ class Plan:
     record: bool = True
     time_scale: float = 1.0  # seconds of the log per second
     estimator: str = ""  # further lines of [estimator]
+    once: bool = False  # the board is a log that is played to its end
 
 
 SIMULATED = {  # boards of `gyrofree simulate` besides the table: its arguments, device, layout
@@ -111,7 +114,7 @@ def run(plan: Plan) -> None:
     supervisor.start()
     said, deadline = False, time.monotonic() + WAIT_FOR_PAGE
     try:
-        while not stop.wait(TICK) and supervisor.fatal is None:
+        while not stop.wait(TICK) and supervisor.fatal is None and not supervisor.done:
             supervisor.step()
             if not said and health("dashboard", settings).state == "ok":
                 said = True
@@ -121,12 +124,28 @@ def run(plan: Plan) -> None:
                     f"the dashboard does not answer after {WAIT_FOR_PAGE:g} s; the log above"
                     " says why"
                 )
+        if supervisor.done:
+            supervisor.say("the log has been played to its end")
+            stop.wait(DRAIN)
     finally:
         supervisor.say("stopping")
         clean = supervisor.stop()
         supervisor.say("stopped cleanly" if clean else "stopped; a process had to be killed")
     if supervisor.fatal is not None:
         raise fail(f"{supervisor.fatal.name} could not go on", EXIT_FAILED)
+    if supervisor.done:
+        print(_summary(settings, plan))
+
+
+def _summary(settings: Settings, plan: Plan) -> str:
+    """What is left of a log that was played."""
+    newest = next(iter(Catalogue(Path(settings.recorder.root)).list()), None)
+    if newest is None:
+        return f"played to its end; nothing was recorded in {plan.folder}"
+    return (
+        f"played to its end: session {newest.id}, {newest.seconds:.1f} s,"
+        f" {newest.messages:,} messages, {newest.lost} lost, in {settings.recorder.root}"
+    )
 
 
 def _supervise(plan: Plan, config: Path) -> Supervisor:
@@ -135,8 +154,10 @@ def _supervise(plan: Plan, config: Path) -> Supervisor:
         supervisor.add(service, service, "--config", str(config))
     # The board comes last: estimators that see its first standstill know its heading and biases
     # from the start.
-    board = [*plan.board, "--config", str(config), "--link", str(plan.folder / "board")]
-    supervisor.add("board", *board, waits_for=("estimator", "estimating"))
+    name, *arguments = plan.board  # a log's name may begin with -, and comes last
+    places = [f"--config={config}", f"--link={plan.folder / 'board'}"]
+    board = [name, *places, *arguments]
+    supervisor.add("board", *board, waits_for=("estimator", "estimating"), once=plan.once)
     return supervisor
 
 

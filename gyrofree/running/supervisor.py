@@ -18,6 +18,7 @@ from rich.console import Console
 from rich.text import Text
 
 from gyrofree.running.process import EXIT_CONFIG, EXIT_TAKEN, command
+from messages.text import printed
 
 PAUSE_FIRST = 0.05  # s; while a gateway is away its board's samples are lost
 PAUSE_LONGEST = 5.0  # s
@@ -47,6 +48,7 @@ class Child:
     waits_for: tuple[str, str] | None = (
         None  # another child, and what its log must say before this one starts
     )
+    once: bool = False  # its end is the end of all: done with exit code 0, else a fault
 
 
 def _die_with_parent() -> None:
@@ -61,16 +63,23 @@ class Supervisor:
         self.console = console or Console(stderr=True, highlight=False)
         self.children: list[Child] = []
         self.fatal: Child | None = None
+        self.done = False  # a child that runs once has done its work
         self._stopping = False
 
-    def add(self, name: str, *arguments: str, waits_for: tuple[str, str] | None = None) -> None:
+    def add(
+        self,
+        name: str,
+        *arguments: str,
+        waits_for: tuple[str, str] | None = None,
+        once: bool = False,
+    ) -> None:
         """Have `gyrofree ARGUMENTS` as a child called `name`.
 
         waits_for: another child and a text of its log, before which this one is not started; at
-        most LONGEST_WAIT.
+        most LONGEST_WAIT. once: it is not started again, and `done` or `fatal` says how it ended.
         """
         colour = COLOURS[len(self.children) % len(COLOURS)]
-        self.children.append(Child(name, list(arguments), colour, waits_for=waits_for))
+        self.children.append(Child(name, list(arguments), colour, waits_for=waits_for, once=once))
 
     def say(self, text: str, style: str = "bold") -> None:
         """A line of the supervisor's own."""
@@ -89,7 +98,7 @@ class Supervisor:
         now = time.monotonic()
         for child in self.children:
             if child.process is None:
-                if now >= child.due and not self._stopping:
+                if now >= child.due and not self._stopping and not (child.once and child.started):
                     self._spawn(child)
             elif child.process.poll() is not None:
                 self._ended(child, child.process.returncode, now)
@@ -144,7 +153,10 @@ class Supervisor:
     def _ended(self, child: Child, code: int, now: float) -> None:
         child.process = None
         how = f"by signal {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
-        if code in (EXIT_CONFIG, EXIT_TAKEN):
+        if child.once and code == 0:
+            self.done = True
+            return
+        if child.once or code in (EXIT_CONFIG, EXIT_TAKEN):
             self.fatal = child
             self.say(
                 f"{child.name} ended {how} and cannot go on: its line above says why", "bold red"
@@ -174,5 +186,7 @@ class Supervisor:
 
     def _print(self, name: str, colour: str, text: str, style: str) -> None:
         clock = time.strftime("%H:%M:%S")
-        line = Text.assemble((clock, "dim"), " ", (f"{name:<10}", colour), " ", (text, style))
+        line = Text.assemble(
+            (clock, "dim"), " ", (f"{name:<10}", colour), " ", (printed(text), style)
+        )
         self.console.print(line, soft_wrap=True)

@@ -1,6 +1,5 @@
 """Pictures and the page of `gyrofree reproduce gyro-free`, in the order of the paper."""
 
-import html
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from inertial.constants import MILLI_G
 from logs.cube_plot import COLOURS, REFERENCE, STYLE
 from logs.reproduce import gyro_free_study as study
 from logs.reproduce.gyro_free_study import Study
+from messages.text import html
 
 DEG = 180.0 / np.pi
 TITLES = {
@@ -219,8 +219,8 @@ def _row(what: str, *values: Any) -> str:
             return " · ".join(f"{v:.2f}" for v in value)
         return "–" if value is None else f"{value:.2f}" if isinstance(value, float) else str(value)
 
-    cells = "".join(f"<td>{html.escape(cell(value))}</td>" for value in values)
-    return f"<tr><th>{html.escape(what)}</th>{cells}</tr>"
+    cells = "".join(f"<td>{html(cell(value))}</td>" for value in values)
+    return f"<tr><th>{html(what)}</th>{cells}</tr>"
 
 
 def write_index(out: Path, result: dict[str, Any]) -> None:
@@ -273,8 +273,8 @@ def write_index(out: Path, result: dict[str, Any]) -> None:
         ),
     ]
     figures = "".join(
-        f'<figure><img src="{one["file"]}" alt="{html.escape(one["title"])}">'
-        f"<figcaption>{html.escape(one['caption'])}</figcaption></figure>"
+        f'<figure><img src="{one["file"]}" alt="{html(one["title"])}">'
+        f"<figcaption>{html(one['caption'])}</figcaption></figure>"
         for one in result["figures"]
     )
     head = "".join(
@@ -282,7 +282,7 @@ def write_index(out: Path, result: dict[str, Any]) -> None:
     )
     (out / "index.html").write_text(
         PAGE
-        + f"""<p>Session: {html.escape(result["session"])}, {result["samples"]} samples at
+        + f"""<p>Session: {html(result["session"])}, {result["samples"]} samples at
 {result["rate_hz"]:g} Hz.
 The numbers of the paper are Hoseini and Moradi, 2017; it prints no errors of rate and angle.</p>
 <table><tr>{head}</tr>{"".join(rows)}</table>

@@ -2,7 +2,6 @@
 along a drive.
 """
 
-import html
 import math
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from inertial.simulation.drive import CONDITIONS
 from logs.reproduce.in_motion import COMPONENTS, Errors
+from messages.text import html
 
 DEG = 180.0 / math.pi
 FAMILIES = {  # colours that stay apart for the colour-blind (Okabe and Ito)
@@ -59,9 +59,7 @@ def page(text: str, pictures: list[Path]) -> str:
     for block in text.strip().split("\n\n"):
         lines = block.splitlines()
         if lines[0].startswith("|"):
-            rows = [
-                [html.escape(cell.strip()) for cell in line.strip("|").split("|")] for line in lines
-            ]
+            rows = [[html(cell.strip()) for cell in line.strip("|").split("|")] for line in lines]
             head = "".join(f"<th>{cell}</th>" for cell in rows[0])
             cells = "".join(
                 "<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows[2:]
@@ -69,9 +67,9 @@ def page(text: str, pictures: list[Path]) -> str:
             body.append(f"<table><tr>{head}</tr>{cells}</table>")
         elif lines[0].startswith("#"):
             level = 1 if lines[0].startswith("# ") else 2
-            body.append(f"<h{level}>{html.escape(lines[0].lstrip('# '))}</h{level}>")
+            body.append(f"<h{level}>{html(lines[0].lstrip('# '))}</h{level}>")
         else:
-            body.append(f"<p>{html.escape(block)}</p>")
+            body.append(f"<p>{html(block)}</p>")
     images = "".join(
         f'<p><img src="{picture.name}" alt="{picture.stem}" width="900"></p>'
         for picture in pictures

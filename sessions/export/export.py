@@ -10,7 +10,6 @@ Big recordings stream: only mat holds all in memory.
 """
 
 import csv
-import logging
 import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -27,27 +26,28 @@ from scipy.io import savemat
 
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
-from messages.contract.topics import GNSS, LOG, NAV, RATE, Topic, TopicError, parse
+from messages.contract.topics import GNSS, LOG, NAV, RATE, Topic, parse
+from messages.text import cell
 from sessions.export.columns import Column
 from sessions.export.table import (
     Block,
     Progress,
     Selection,
     Survey,
+    Table,
     blocks,
     silent,
     survey,
     tables,
 )
 from sessions.export.track import write_gpx, write_kml
-from sessions.recording.mcap_log import Damage, McapLog, Recorded, read
+from sessions.recording.mcap_append import McapLog
+from sessions.recording.mcap_log import Recorded
 from sessions.recording.samples import decode
+from sessions.recording.timeline import straight
 
 RATE_ESTIMATE: Topic = replace(RATE, type=pb.RateEstimate)  # one sample of a batch
 ROW_GROUP = 20_000  # rows of Parquet written at once
-
-
-log_of = logging.getLogger(__name__)
 
 
 class ExportError(ValueError):
@@ -84,8 +84,12 @@ def to_csv(
 
 
 def _cells(column: Column, values: NDArray[Any]) -> list[float | int | str]:
-    """A column for CSV: nothing for NaN, whole numbers without a point."""
+    """A column for CSV: nothing for NaN, whole numbers without a point, no text that a spreadsheet
+    executes.
+    """
     cells: list[float | int | str] = values.tolist()
+    if column.text:
+        return [cell(text) for text in cells]
     if values.dtype.kind != "f":
         return cells
     return ["" if v != v else int(v) if column.whole else v for v in cells]
@@ -175,16 +179,11 @@ def to_mcap(
     target = out / "cut.mcap"
     count = 0
     start = None
-    foreign: set[str] = set()
     with target.open("wb") as stream:
         log = McapLog(stream.fileno(), 128 * 1024)
-        for row in read(path, Damage()):
+        for row in straight(path):
             start = row.log_ns if start is None else start
-            try:
-                topic = parse(row.key).topic
-            except TopicError:  # of another program: not ours to cut, and counted by `verify`
-                foreign.add(row.key)
-                continue
+            topic = parse(row.key).topic
             if (
                 selection.takes(topic)
                 and selection.start_s <= (row.log_ns - start) / 1e9 <= selection.end_s
@@ -201,8 +200,6 @@ def to_mcap(
     if not count:
         target.unlink()
         raise ExportError(f"{path}: no message of the wanted topics and time")
-    if foreign:
-        log_of.warning("%s: left out, not of this program: %s", path, ", ".join(sorted(foreign)))
     progress(1.0, "cut")
     return [target]
 
@@ -280,20 +277,52 @@ def _second_half(progress: Progress) -> Progress:
 
 
 def _tracks(path: Path, selection: Selection, progress: Progress) -> dict[str, np.ndarray]:
-    """Name -> (n, 4) utc s, latitude deg, longitude deg, height m."""
-    wanted = selection.topics or frozenset({GNSS.name, NAV.name})
+    """Name -> (n, 4) utc s, latitude deg, longitude deg, height above mean sea level m or NaN."""
+    wanted = (selection.topics or frozenset({GNSS.name, NAV.name})) - {LOG.name}
     found = tables(
-        path, Selection(wanted - {LOG.name}, selection.start_s, selection.end_s), progress
+        path, Selection(wanted | {GNSS.name}, selection.start_s, selection.end_s), progress
     )
-    result = {
-        file_stem(key): table.vector("utc_s", "latitude_deg", "longitude_deg", "height_m")
-        for key, table in found.items()
-        if "latitude_deg" in table.data
+    geoids = {
+        parse(key).device: _geoid(table) for key, table in found.items() if parse(key).topic is GNSS
     }
-    result = {name: track[np.any(track[:, 1:] != 0.0, axis=1)] for name, track in result.items()}
-    result = {name: track for name, track in result.items() if len(track)}
+    result = {}
+    for key, table in found.items():
+        where = parse(key)
+        if "latitude_deg" not in table.data or where.topic.name not in wanted:
+            continue
+        track = table.vector("utc_s", "latitude_deg", "longitude_deg")
+        placed = np.isfinite(track).all(axis=1) & np.any(track[:, 1:] != 0.0, axis=1)
+        if placed.any():
+            heights = _above_sea(table, geoids.get(where.device, np.zeros((0, 2))))
+            result[file_stem(key)] = np.column_stack([track, heights])[placed]
     if not result:
         raise ExportError(
             f"{path}: it has neither fixes nor a navigation solution, so there is no track to draw"
         )
     return result
+
+
+def _geoid(fixes: Table) -> np.ndarray:
+    """(n, 2) utc s, height of the geoid above the ellipsoid m, where a receiver gave both."""
+    undulation = fixes.data["height_m"] - fixes.data["height_msl_m"]
+    sea = fixes.data["height_reference"] == pb.HEIGHT_REFERENCE_SEA_LEVEL
+    known = np.isfinite(undulation) & ~sea
+    return np.column_stack([fixes.data["utc_s"], undulation])[known]
+
+
+def _above_sea(table: Table, geoid: np.ndarray) -> np.ndarray:
+    """(n,) heights above mean sea level, m: the receiver's own, or the ellipsoid's less the geoid
+    as the same device's fixes had it; NaN where neither is known.
+    """
+    data = table.data
+    if "height_msl_m" in data:
+        return data["height_msl_m"]
+    if "height_m" not in data or "height_reference" not in data:
+        return np.full(len(data["utc_s"]), np.nan)
+    own = data["height_reference"] == pb.HEIGHT_REFERENCE_SEA_LEVEL
+    undulation = (
+        np.interp(data["utc_s"], geoid[:, 0], geoid[:, 1])
+        if len(geoid)
+        else np.full(len(data["utc_s"]), np.nan)
+    )
+    return np.where(own, data["height_m"], data["height_m"] - undulation)

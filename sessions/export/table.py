@@ -2,7 +2,7 @@
 rows.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,10 +11,12 @@ import numpy as np
 from google.protobuf.message import DecodeError, Message
 from numpy.typing import NDArray
 
-from messages.contract.topics import Topic, TopicError, parse
+from messages.contract.topics import Topic, parse
 from sessions.export.columns import TIME, Column, Columns
-from sessions.recording.mcap_log import Damage, Recorded, read
+from sessions.recording.mcap_damage import Damage
+from sessions.recording.mcap_log import Recorded, say
 from sessions.recording.samples import Gathering, decode
+from sessions.recording.timeline import straight
 
 Progress = Callable[[float, str], None]  # share done 0 to 1, what is being done
 
@@ -30,6 +32,7 @@ class Selection:
     topics: frozenset[str] = frozenset()  # names; empty: all
     start_s: float = 0.0  # from the first message's receive time, s
     end_s: float = float("inf")
+    fields: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # by topic; absent: all
 
     def takes(self, topic: Topic) -> bool:
         """Is this topic wanted?"""
@@ -44,35 +47,39 @@ class Survey:
     counts: dict[str, int] = field(default_factory=dict)  # bus key -> messages
     first_ns: int = 0  # receive time of the first message, ns since 1970
     last_ns: int = 0
-    undecodable: int = 0  # messages whose type is unknown or whose bytes are no such message
     damage: Damage = field(default_factory=Damage)
 
 
 def messages(
-    path: Path, selection: Selection, damage: Damage
+    path: Path, selection: Selection, damage: Damage | None = None
 ) -> Iterator[tuple[Recorded, Topic, Message | None]]:
-    """Selected messages in the order of recording, decoded; None for one that cannot be. Raises
-    OSError.
+    """Selected messages in the order of recording, decoded; None for one that cannot be. What
+    cannot be read is counted in `damage`, or logged where none is given. Raises OSError.
     """
-    start = None
-    for row in read(path, damage):
+    start, found = None, Damage() if damage is None else damage
+    for row in straight(path, found):
         start = row.log_ns if start is None else start
         if not selection.start_s <= (row.log_ns - start) / 1e9 <= selection.end_s:
             continue
-        try:
-            topic = parse(row.key).topic
-        except TopicError:
-            continue
+        topic = parse(row.key).topic
         if selection.takes(topic):
             try:
                 yield row, topic, decode(topic, row.payload)
             except DecodeError:
+                found.undecodable += 1
                 yield row, topic, None
+    if damage is None:
+        say(path, found)
 
 
-def survey(path: Path, selection: Selection = Selection(), progress: Progress = silent) -> Survey:
-    """First reading: keys, counts, times, widths. Raises OSError."""
-    found = Survey()
+def survey(
+    path: Path,
+    selection: Selection = Selection(),
+    progress: Progress = silent,
+    damage: Damage | None = None,
+) -> Survey:
+    """First reading: keys, counts, times, widths. What is damaged is logged. Raises OSError."""
+    found = Survey(damage=Damage() if damage is None else damage)
     size = max(1, path.stat().st_size)
     seen = 0
     for row, topic, message in messages(path, selection, found.damage):
@@ -84,12 +91,12 @@ def survey(path: Path, selection: Selection = Selection(), progress: Progress = 
                 min(0.99, seen / (4 * size)), "looking through"
             )  # payloads shrink to about a quarter
         if message is None:
-            found.undecodable += 1
             continue
         if row.key not in found.columns:
-            found.columns[row.key] = Columns(topic)
+            found.columns[row.key] = Columns(topic, selection.fields.get(topic.name))
         found.columns[row.key].widen(message)
         found.counts[row.key] = found.counts.get(row.key, 0) + 1
+    say(path, found.damage)
     progress(1.0, "looked through")
     return found
 
@@ -110,10 +117,11 @@ def blocks(
         key: Gathering(
             columns.topic,
             lambda taken, key=key, columns=columns: ready.append((key, columns.table(taken))),
+            columns.only,
         )
         for key, columns in found.columns.items()
     }
-    for row, _, message in messages(path, selection, Damage()):
+    for row, _, message in messages(path, selection):
         if message is None or row.key not in gathering:
             continue
         gathering[row.key].add(message, row.log_ns)
@@ -144,10 +152,15 @@ class Table:
 
 
 def tables(
-    path: Path, selection: Selection = Selection(), progress: Progress = silent
+    path: Path,
+    selection: Selection = Selection(),
+    progress: Progress = silent,
+    damage: Damage | None = None,
 ) -> dict[str, Table]:
-    """A whole recording in memory: bus key -> table. Raises OSError."""
-    found = survey(path, selection, lambda done, what: progress(done * 0.4, what))
+    """A whole recording in memory: bus key -> table. What cannot be read is counted in `damage`.
+    Raises OSError.
+    """
+    found = survey(path, selection, lambda done, what: progress(done * 0.4, what), damage)
     parts: dict[str, list[Block]] = {key: [] for key in found.columns}
     for key, block in blocks(
         path, found, selection, lambda done, what: progress(0.4 + done * 0.6, "reading")
@@ -157,10 +170,8 @@ def tables(
 
 
 def _table(columns: list[Column], parts: list[Block]) -> Table:
-    data = {
-        column.name: np.concatenate([part[column.name] for part in parts]).astype(
-            str if column.text else np.float64
-        )
-        for column in columns
-    }
+    data = {}
+    for column in columns:  # a recording is long: no column is kept twice
+        whole = np.concatenate([part.pop(column.name) for part in parts])
+        data[column.name] = whole.astype(str if column.text else np.float64, copy=False)
     return Table(columns, data)

@@ -16,7 +16,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from messages import text
-from sessions.recording.manifest import SessionError
+from sessions.recording.manifest import SESSION_NAME, SessionError
 
 FILE = "annotations.json"
 TAG = re.compile(r"[a-z0-9][a-z0-9_.-]{0,31}")
@@ -83,6 +83,14 @@ def change_annotations(folder: Path, change: Callable[[Annotations], Annotations
             os.fsync(stream.fileno())
         os.replace(new, folder / FILE)
     return changed
+
+
+def give_title(folder: Path, name: str) -> None:
+    """The name that a person gave a session, where its id could not take all of it. Raises as
+    change_annotations.
+    """
+    if name and not SESSION_NAME.fullmatch(name):
+        change_annotations(folder, lambda was: was.model_copy(update={"title": name}))
 
 
 def _check_words(said: Annotations) -> None:

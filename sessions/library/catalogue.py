@@ -6,6 +6,7 @@ import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from messages.clock import Moment
 from sessions.library.annotations import Annotations, read_annotations
 from sessions.recording.manifest import (
     RECORDING,
@@ -32,6 +33,9 @@ class SessionInfo:
     path: Path | None  # of the MCAP file; None when there is none
     note: str
     problem: str = ""  # why it is unreadable or incomplete; empty when all is well
+    number: int = 0  # of the session in its folder; grows; 0: of a version that gave none
+    clock_steps: tuple[float, ...] = ()  # by which the wall clock was set while it was recorded, s
+    written: Moment | None = None  # when its session.json was
     sources: tuple[str, ...] = ()  # HARDWARE, SIMULATED, EMULATED, PLAYED
     annotations: Annotations = field(
         default_factory=Annotations
@@ -113,6 +117,9 @@ class Catalogue:
             path=path,
             note=manifest.note,
             problem="; ".join(filter(None, (problem, damage))),
+            number=manifest.number,
+            clock_steps=tuple(step.step_s for step in manifest.clock_steps),
+            written=Moment.of(manifest.written),
             sources=tuple(manifest.sources),
             annotations=notes,
         )

@@ -106,6 +106,7 @@ class Curves:
     ] = ()  # <device>/<gateway run>/<boot>: sessions that share one have one clock
     coarse: bool = False  # a first look at a part of the file
     leader: str = ""  # the first estimator of the configuration it was recorded with
+    said: tuple[str, ...] = ()  # sentences about damage of the recording
 
     @property
     def t(self) -> Array:
@@ -201,6 +202,7 @@ def save(curves: Curves, recording: Path) -> Path:
         "tracks": [[track.key, track.origin] for track in curves.tracks.values()],
         "clocks": curves.clocks,
         "leader": curves.leader,
+        "said": curves.said,
         "marks": [[mark.t, mark.text, mark.author, mark.seconds] for mark in curves.marks],
     }
     arrays["facts"] = np.frombuffer(json.dumps(facts).encode(), np.uint8)
@@ -274,4 +276,5 @@ def load(recording: Path) -> Curves | None:
         tuple(Mark(*mark) for mark in facts["marks"]),
         tuple(facts["clocks"]),
         leader=facts["leader"],
+        said=tuple(facts.get("said", ())),
     )

@@ -7,6 +7,7 @@ writes curves.npz beside the recording and prints the share done, a number per l
 
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,8 @@ from sessions.library.curves import Curves, Line, Mark, bin_for, bins_of, load, 
 from sessions.library.curves_bins import Binner, PulseLine, TrackLine
 from sessions.library.scan import Block, Extent, Progress, extent, scan
 from sessions.recording.manifest import SessionError, name_of, read_manifest
+from sessions.recording.mcap_damage import Damage
+from sessions.recording.mcap_log import say
 from sessions.recording.samples import Samples, decode, samples
 
 Array = NDArray[np.float64]
@@ -50,13 +53,15 @@ def build(path: Path, coarse: bool = False, on_progress: Progress = lambda _: No
     found = extent(path)
     stride = max(1, found.chunks // COARSE_CHUNKS) if coarse else 1
     reading = _Reading(path, found, stride)
-    for block in scan(path, tuple(WANTED), stride, on_progress):
+    damage = Damage()
+    for block in scan(path, tuple(WANTED), stride, on_progress, damage):
         reading.take(
             block
             if stride == 1
             else Block(block.key, block.log_ns[::COARSE_THIN], block.payloads[::COARSE_THIN])
         )
-    return reading.result()
+    say(path, damage)
+    return replace(reading.result(), said=tuple(damage.said()))
 
 
 def ensure(path: Path, on_progress: Progress = lambda _: None) -> Curves:
@@ -170,7 +175,7 @@ class _Reading:
         latitude, longitude, height = (read.fields[f"origin_{name}"] for name in PLACE)
         known = (read.lengths["p_ned_m"] == 3) & ((latitude != 0) | (longitude != 0))
         for k in np.flatnonzero(known):
-            origin = (np.radians(latitude[k]), np.radians(longitude[k]), float(height[k]))
+            origin = _origin(np.radians(latitude[k]), np.radians(longitude[k]), float(height[k]))
             self._track(key, origin).add(float(t[k]), *read.fields["p_ned_m"][k].tolist())
 
     def _gnss(self, key: str, read: Samples, t: Array) -> None:
@@ -178,7 +183,7 @@ class _Reading:
         for k in np.flatnonzero(fields["quality"]):
             latitude, longitude, height = (float(fields[name][k]) for name in PLACE)
             place = (float(np.radians(latitude)), float(np.radians(longitude)), height)
-            self._track(key, place).add_place(float(t[k]), *place)
+            self._track(key, _origin(*place)).add_place(float(t[k]), *place)
 
     def _track(self, key: str, origin: tuple[float, float, float]) -> TrackLine:
         return self._tracks.setdefault(key, TrackLine(key, origin))
@@ -189,6 +194,11 @@ class _Reading:
             moment = (at_utc_ns - self._extent.first_ns) / 1e9 if at_utc_ns else float(t[k])
             text, author = fields["text"][k] or "mark", fields["author"][k]
             self._marks.append(Mark(moment, text, author, float(fields["seconds"][k])))
+
+
+def _origin(latitude: float, longitude: float, height: float) -> tuple[float, float, float]:
+    """Where a track counts from, at height 0 where its first point has none."""
+    return latitude, longitude, height if np.isfinite(height) else 0.0
 
 
 def _dark(key: str, lines: dict[str, Line]) -> NDArray[np.bool_] | None:

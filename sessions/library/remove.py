@@ -7,6 +7,7 @@ import shutil
 import time
 from dataclasses import dataclass
 
+from messages.clock import boot_id
 from sessions.library.annotations import read_annotations
 from sessions.library.catalogue import Catalogue, SessionInfo
 from sessions.recording.manifest import SessionError
@@ -45,8 +46,10 @@ def too_many(
     """Sessions that the rule would remove, oldest first: closed or recovered ones without the tag
     `keep`.
     """
-    now_s = time.time() if now_s is None else now_s
-    oldest_first = sorted(catalogue.list(), key=lambda info: (info.start_utc_ns, info.id))
+    oldest_first = sorted(
+        catalogue.list(), key=lambda info: (info.number, info.start_utc_ns, info.id)
+    )
+    ages = _ages(oldest_first, now_s)
     total = sum(info.bytes for info in oldest_first)
     result = []
     for info in oldest_first:
@@ -55,12 +58,41 @@ def too_many(
             or KEEP in read_annotations(catalogue.root / info.id).tags
         ):
             continue
-        old = rule.days > 0 and now_s - info.start_utc_ns / 1e9 > rule.days * 86400.0
+        old = rule.days > 0 and ages[info.id] > rule.days * 86400.0
         big = 0 < rule.max_bytes < total
         if old or big:
             result.append(info)
             total -= info.bytes
     return result
+
+
+def _ages(oldest_first: list[SessionInfo], now_s: float | None) -> dict[str, float]:
+    """How old each session is at least, s, by what does not depend on a clock that may have been
+    set: elapsed time within this start of the machine; else the wall clock, which counts from the
+    session's time or a later one of a session before it, whichever is the newer, and is not
+    believed where it has run ahead of elapsed time.
+    """
+    here = boot_id()
+    of_this_boot = [
+        one.written for one in oldest_first if one.written is not None and one.written.boot == here
+    ]
+    if now_s is None:
+        now_s = min([time.time(), *(one.wall_ns * 1e-9 + one.age_s for one in of_this_boot)])
+    ages, newest_s = {}, 0.0
+    for info in oldest_first:
+        written_s = info.start_utc_ns / 1e9
+        newest_s = max(newest_s, written_s) if written_s <= now_s else newest_s
+        began_s = newest_s if info.number else written_s
+        ages[info.id] = max(0.0, now_s - began_s)
+        if info.written in of_this_boot and _live(info):
+            ages[info.id] = min(ages[info.id], info.written.age_s + info.seconds)
+    return ages
+
+
+def _live(info: SessionInfo) -> bool:
+    """Was it written when it was recorded, and not made of an older log?"""
+    end_s = info.start_utc_ns / 1e9 + info.seconds + sum(info.clock_steps)
+    return info.written is not None and abs(info.written.wall_ns / 1e9 - end_s) < 86400.0
 
 
 def retain(catalogue: Catalogue, rule: Retention, now_s: float | None = None) -> list[str]:

@@ -1,36 +1,32 @@
 """Messages of a few topics out of a long recording, fast: by the file's own index, chunk by chunk.
 
-mcap.reader makes an object of every message; here only those of the wanted channels are touched,
-found by the MessageIndex records behind each chunk (https://mcap.dev/spec#message-index-op0x07). A
-file without an index, or with one that cannot be read, is read from front to end instead.
+Chunks that hold none of the wanted channels are not read. A file without an index, or with one that
+cannot be trusted, is read from front to end instead.
 """
 
-import functools
-import io
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-import numpy as np
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
-from mcap.reader import SeekingReader
-from mcap.records import Chunk, ChunkIndex
+from mcap.opcode import Opcode
+from mcap.records import ChunkIndex
 from mcap.summary import Summary
 
-from messages.contract.topics import Topic, TopicError, parse
-from sessions.recording import mcap_chunk
-from sessions.recording.mcap_log import RECORD_LIMIT, Damage, read
-
-RECORD = struct.Struct("<BQ")  # opcode, length
-MESSAGE_HEAD = 22  # bytes before a message's payload: channel, sequence, log and publish time
-INDEX_HEAD = struct.Struct(
-    "<BQHI"
-)  # of a MessageIndex record: opcode, length, channel, bytes of its entries
-ENTRY = np.dtype([("log_ns", "<u8"), ("offset", "<u8")])
-LENGTH = struct.Struct("<Q")
+from messages.contract.topics import Topic, parse
+from sessions.recording.mcap_damage import Damage
+from sessions.recording.mcap_index import keys_of, ordered_summary_of
+from sessions.recording.mcap_log import say
+from sessions.recording.mcap_records import (
+    MESSAGE,
+    RECORD,
+    RECORD_LIMIT,
+    Unreadable,
+    content,
+    records,
+)
+from sessions.recording.timeline import straight
 
 Progress = Callable[[float], None]
 
@@ -50,36 +46,14 @@ class Extent:
         return (self.last_ns - self.first_ns) / 1e9
 
 
-def summary_of(path: Path) -> Summary | None:
-    """The file's own index; None where it has none that can be read. Raises OSError."""
-    found = path.stat()
-    return _summary(path, found.st_size, found.st_mtime_ns)
-
-
-@functools.lru_cache(maxsize=2)  # that of an hour takes longer to read than a first look at it
-def _summary(path: Path, size: int, mtime_ns: int) -> Summary | None:
-    with path.open("rb") as stream:
-        try:
-            found = SeekingReader(stream, record_size_limit=RECORD_LIMIT).get_summary()
-        except (McapError, ValueError, EOFError, struct.error):
-            return None
-    whole = (
-        found is not None
-        and found.statistics is not None
-        and found.statistics.message_count
-        and found.chunk_indexes
-    )
-    return found if whole else None
-
-
 def extent(path: Path) -> Extent:
     """Times and counts of a recording. Raises OSError, and ValueError for a file without any
     message.
     """
-    found = summary_of(path)
+    found = ordered_summary_of(path)
     if found is not None:
         counts = found.statistics.channel_message_counts
-        names = {channel.topic: counts.get(number, 0) for number, channel in found.channels.items()}
+        names = {key: counts.get(number, 0) for number, key in keys_of(found).items()}
         return Extent(
             found.statistics.message_start_time,
             found.statistics.message_end_time,
@@ -88,7 +62,7 @@ def extent(path: Path) -> Extent:
         )
     damage = Damage()
     first = last = 0
-    for row in read(path, damage):
+    for row in straight(path, damage):
         first = min(first or row.log_ns, row.log_ns)
         last = max(last, row.log_ns)
     if not first:
@@ -106,74 +80,88 @@ class Block:
 
 
 def scan(
-    path: Path, topics: tuple[Topic, ...], stride: int = 1, on_progress: Progress = lambda _: None
+    path: Path,
+    topics: tuple[Topic, ...],
+    stride: int = 1,
+    on_progress: Progress = lambda _: None,
+    damage: Damage | None = None,
 ) -> Iterator[Block]:
     """The messages of these topics, block by block as the file has them; of one chunk in `stride`
     only.
 
-    A damaged chunk is left out. `stride` is for a first look; a file without an index is read
-    whole. Raises OSError.
+    What cannot be read is counted in `damage`, or logged where none is given. `stride` is for a
+    first look; a file without an index is read whole. Raises OSError.
     """
-    found = summary_of(path)
+    account = Damage() if damage is None else damage
+    found = ordered_summary_of(path)
     if found is None:
-        for row in read(path):
+        for row in straight(path, account):
             if _wanted(row.key, topics):
                 yield Block(row.key, [row.log_ns], [row.payload])
-        return
-    keys = {
-        number: channel.topic
-        for number, channel in found.channels.items()
-        if _wanted(channel.topic, topics)
-    }
+    else:
+        yield from _indexed(path, found, topics, stride, on_progress, account)
+    if damage is None:
+        say(path, account)
+
+
+def _indexed(
+    path: Path,
+    found: Summary,
+    topics: tuple[Topic, ...],
+    stride: int,
+    on_progress: Progress,
+    damage: Damage,
+) -> Iterator[Block]:
+    keys = {number: key for number, key in keys_of(found).items() if _wanted(key, topics)}
     chunks = sorted(found.chunk_indexes, key=lambda chunk: chunk.chunk_start_offset)[::stride]
     with path.open("rb") as stream:
         for count, chunk in enumerate(chunks):
-            if any(number in keys for number in chunk.message_index_offsets):
-                yield from _blocks(stream, chunk, keys)
+            held = chunk.message_index_offsets  # other writers leave them out
+            if not held or any(number in keys for number in held):
+                yield from _blocks(stream, chunk, keys, damage)
             if count % 50 == 0:
                 on_progress(count / len(chunks))
     on_progress(1.0)
 
 
 def _wanted(key: str, topics: tuple[Topic, ...]) -> bool:
-    try:
-        return parse(key).topic in topics
-    except TopicError:
-        return False
+    return parse(key).topic in topics
 
 
-def _blocks(stream: IO[bytes], chunk: ChunkIndex, keys: dict[int, str]) -> Iterator[Block]:
+def _blocks(
+    stream: IO[bytes], chunk: ChunkIndex, keys: dict[int, str], damage: Damage
+) -> Iterator[Block]:
     """The wanted messages of one chunk, key by key; none of a chunk that cannot be read."""
+    found: dict[str, Block] = {}
+    for log_ns, key, payload in rows_of(stream, chunk, keys, damage):
+        block = found.get(key) or found.setdefault(key, Block(key, [], []))
+        block.log_ns.append(log_ns)
+        block.payloads.append(payload)
+    yield from found.values()
+
+
+def rows_of(
+    stream: IO[bytes], chunk: ChunkIndex, keys: dict[int, str], damage: Damage
+) -> list[tuple[int, str, bytes]]:
+    """(receive time ns, bus key, payload) of the messages of these channels in one chunk; none of a
+    chunk that cannot be read, which is counted.
+    """
     stream.seek(chunk.chunk_start_offset)
-    if max(chunk.chunk_length, chunk.message_index_length) > RECORD_LIMIT:
-        return
+    rows = []
     try:
-        data = _inside(stream.read(chunk.chunk_length))
-    except Exception:  # damaged lengths make the library raise almost anything, see mcap_log
-        return
-    index = stream.read(chunk.message_index_length)
-    position = 0
-    while position + INDEX_HEAD.size <= len(index):
-        _, length, channel, size = INDEX_HEAD.unpack_from(index, position)
-        if channel in keys:
-            entries = np.frombuffer(
-                index, ENTRY, size // ENTRY.itemsize, position + INDEX_HEAD.size
-            )
-            yield Block(
-                keys[channel],
-                entries["log_ns"].tolist(),
-                _payloads(data, entries["offset"].tolist()),
-            )
-        position += RECORD.size + length
-
-
-def _payloads(data: bytes, offsets: list[int]) -> list[bytes]:
-    length_at = LENGTH.unpack_from
-    begin = RECORD.size + MESSAGE_HEAD
-    return [data[o + begin : o + RECORD.size + length_at(data, o + 1)[0]] for o in offsets]
-
-
-def _inside(record: bytes) -> bytes:
-    """A chunk's records, decompressed and checked by their CRC."""
-    chunk = Chunk.read(ReadDataStream(io.BytesIO(record[RECORD.size :])))
-    return mcap_chunk.content(chunk)
+        head = stream.read(RECORD.size)
+        opcode, length = RECORD.unpack(head) if len(head) == RECORD.size else (0, 0)
+        if opcode != Opcode.CHUNK or length > RECORD_LIMIT:
+            raise Unreadable("no chunk where the index has one")
+        data, _ = content(stream.read(length))
+        for opcode, begin, end in records(data):
+            if opcode != Opcode.MESSAGE:
+                continue
+            channel, _, log_ns, _ = MESSAGE.unpack_from(data, begin)
+            damage.messages += 1
+            if channel in keys:
+                rows.append((log_ns, keys[channel], data[begin + MESSAGE.size : end]))
+    except (Unreadable, struct.error):
+        damage.chunks += 1
+        return []
+    return rows

@@ -7,7 +7,7 @@ from pathlib import Path
 from sessions.export.table import Progress, Selection, messages, silent
 from sessions.library import curves
 from sessions.recording.manifest import KeyCount, Manifest, read_manifest
-from sessions.recording.mcap_log import Damage
+from sessions.recording.mcap_damage import Damage
 
 
 @dataclass
@@ -21,14 +21,14 @@ class Verification:
     counted: int  # by the recorder
     undecodable: int
     damage: str
+    others: str = ""  # what other programs wrote into the file
     differing: dict[str, str] = field(default_factory=dict)  # bus key -> what differs
     curves: str = "none"  # kept for drawing: none, stale (made anew when needed) or fresh
 
     @property
     def ok(self) -> bool:
         """Everything that was recorded is there and can be read."""
-        whole = self.damage == str(Damage()) and not self.undecodable
-        return whole and self.hash_ok is not False and not self.differing
+        return self.damage == str(Damage()) and self.hash_ok is not False and not self.differing
 
 
 def verify(folder: Path, progress: Progress = silent) -> Verification:
@@ -42,11 +42,10 @@ def verify(folder: Path, progress: Progress = silent) -> Verification:
             if manifest.sha256
             else None
         )
-    damage, found, undecodable = Damage(), {}, 0
+    damage, found = Damage(), {}
     total = max(1, manifest.messages)
-    for count, (row, _, message) in enumerate(messages(path, Selection(), damage)):
+    for count, (row, _, _) in enumerate(messages(path, Selection(), damage)):
         found[row.key] = found.get(row.key, 0) + 1
-        undecodable += message is None
         if count % 5000 == 0:
             progress(0.1 + 0.9 * min(1.0, count / total), "reading")
     progress(1.0, "read")
@@ -56,8 +55,9 @@ def verify(folder: Path, progress: Progress = silent) -> Verification:
         hash_ok=hash_ok,
         messages=sum(found.values()),
         counted=manifest.messages,
-        undecodable=undecodable,
+        undecodable=damage.undecodable,
         damage=str(damage),
+        others=damage.others,
         curves=curves.state(path),
         differing={} if manifest.state == "open" else _differences(manifest, found),
     )

@@ -35,10 +35,13 @@ class Intake:
         ask: Callable[[Question], None] | None,
         since_ns: int,
         door: Door,
+        now_ns: Callable[[], int] = time.time_ns,
     ) -> None:
         """Without `ask` nothing is repaired. Runs that began after since_ns (UTC) are wanted from
         their beginning. What may not come in is refused at the `door`.
+        now_ns: the clock of the receive times.
         """
+        self._now_ns = now_ns
         self._prefix = prefix
         self._door = door
         self._mender = None if ask is None else Mender(ask, since_ns=since_ns, refuse=door.refuse)
@@ -106,7 +109,7 @@ class Intake:
             stream = arrival.device, arrival.topic.source
             at_ns = arrival.at_ns
             if arrival.late:  # the publisher's clock may differ from ours; the order must not
-                at_ns = min(at_ns, time.time_ns())
+                at_ns = min(at_ns, self._now_ns())
             at_ns = self._last_ns[stream] = max(at_ns, self._last_ns.get(stream, 0))
             name = arrival.topic.name, arrival.device, arrival.estimator
             key = self._keys.get(name)

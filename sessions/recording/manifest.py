@@ -7,16 +7,42 @@ to trust the file: open (being recorded, or cut off), closed (complete, with its
 
 import os
 import re
+import unicodedata
 from pathlib import Path
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from messages import text
+from messages.clock import Moment
+
 MANIFEST = "session.json"
 RECORDING = "recording.mcap"
 RECOVERED = "recovered.mcap"
+NUMBER = "number"  # file of a folder of sessions: the newest one's number
 SESSION_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,31}")  # what a person may add to an id
 SESSION_ID = re.compile(r"[0-9]{8}-[0-9]{6}(-[a-z0-9][a-z0-9_-]{0,40})?")
+
+
+NAME_LENGTH = 100  # characters that a person may call a session
+GERMAN = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})  # the usual way to write them
+
+
+def name_fault(name: str) -> str:
+    """Why a session may not be called so, or "". Its id takes of the name what it can: slug."""
+    if len(name) > NAME_LENGTH:
+        return f"name of {len(name)} characters: want at most {NAME_LENGTH}"
+    fault = text.check(name)
+    return f"name: {fault}" if fault else ""
+
+
+def slug(name: str, longest: int = 32) -> str:
+    """What a person calls a session, as it may stand in an id: "Messung Prüfstand (2)" ->
+    "messung-pruefstand-2"; empty when no letter of it can.
+    """
+    small = unicodedata.normalize("NFC", name).lower().translate(GERMAN)
+    ascii_only = unicodedata.normalize("NFKD", small).encode("ascii", "ignore").decode()
+    return re.sub(r"[^a-z0-9_-]+", "-", ascii_only)[:longest].strip("-_")
 
 
 class SessionError(ValueError):
@@ -52,6 +78,15 @@ class KeyCount(BaseModel):
         return self.messages - self.repeated + self.lost
 
 
+class ClockStep(BaseModel):
+    """The wall clock was set while a session was recorded. Its times go on without the step."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    at_utc_ns: int = 0  # on the session's axis
+    step_s: float = 0.0  # by how much it went forward
+
+
 class Manifest(BaseModel):
     """The content of session.json. Unknown fields are left out on reading: later versions may add
     some.
@@ -70,8 +105,13 @@ class Manifest(BaseModel):
     )
     devices: list[str] = []
     sources: list[str] = []  # names of messages.Source seen in headers: HARDWARE, SIMULATED, ...
-    start_utc_ns: int = 0  # receive time of the start, ns since 1970
-    end_utc_ns: int = 0  # receive time of the last message counted here
+    number: int = 0  # grows from session to session of a folder, whatever the wall clock says
+    # Receive time of the start and of the last message counted here, ns since 1970: the wall clock
+    # at the start, and what has elapsed since.
+    start_utc_ns: int = 0
+    end_utc_ns: int = 0
+    clock_steps: list[ClockStep] = []
+    written: list[str | int] = []  # when this was written: messages.clock.Moment
     bytes: int = 0  # of the file
     sha256: str = ""  # of the closed or recovered file
     keys: dict[str, KeyCount] = {}
@@ -126,10 +166,41 @@ def read_manifest(folder: Path) -> Manifest:
     return manifest
 
 
+def next_number(root: Path) -> int:
+    """The number of a session that begins now: above those of all sessions in the folder, and of
+    all that ever were as far as the file beside them tells.
+    """
+    path = root / NUMBER
+    try:
+        known = [int(path.read_text())]
+    except (OSError, ValueError):
+        known = []
+    try:
+        names = [entry.name for entry in os.scandir(root) if SESSION_ID.fullmatch(entry.name)]
+    except OSError:
+        names = []
+    if not known:  # once, in a folder of before: its sessions have none, or a backup came without
+        for name in names:
+            try:
+                known.append(read_manifest(root / name).number)
+            except SessionError:
+                continue
+    number = max(known, default=0) + 1
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        new = path.with_suffix(".new")
+        new.write_text(f"{number}\n")
+        os.replace(new, path)
+    except OSError:
+        pass  # the session itself says what the disk refuses
+    return number
+
+
 def write_manifest(folder: Path, manifest: Manifest) -> None:
     """Replace session.json in one step: after a crash there is the old or the new one. Raises
     OSError.
     """
+    manifest.written = list(Moment.now())
     new = folder / (MANIFEST + ".new")
     with new.open("w", encoding="utf-8") as stream:
         stream.write(manifest.model_dump_json(indent=1) + "\n")

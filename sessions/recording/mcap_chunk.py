@@ -3,37 +3,23 @@
 
 A chunk is decompressed up to the size that it declares and not one byte further, and is left out
 when it declares more than LARGEST, or shrank to less than a thousandth (recordings shrink to a
-quarter, simulated silence to a fiftieth). Its records come one after another, so that a chunk of a
-million empty messages is not a million objects at once.
+quarter, simulated silence to a fiftieth).
 """
 
 import io
-import struct
 import zlib
-from collections.abc import Iterator
 
 import lz4.frame
 import zstandard
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
-from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Message, Schema
+from mcap.records import Chunk
 
 LARGEST = 64 * 1024**2  # bytes of a chunk once decompressed; ours have 128 KiB
 SMALL = 1024**2  # bytes that a chunk may have however little it shrank to
 SHRINKS = 1000  # times; more is a bomb
-_HEAD = struct.Struct("<BQ")  # opcode and length of a record
 
 
 class ChunkError(ValueError):
     """A chunk that is damaged, or not what it declares."""
-
-
-def records(chunk: Chunk) -> Iterator[Schema | Channel | Message]:
-    """Its records, in order; one that is cut ends it. Raises ChunkError, also after some of them
-    when a record is damaged.
-    """
-    return _parts(content(chunk))
 
 
 def content(chunk: Chunk) -> bytes:
@@ -68,29 +54,3 @@ def _decompressed(chunk: Chunk, size: int) -> bytes:
     if chunk.compression:
         raise ChunkError(f"a chunk is compressed by {chunk.compression[:20]!r}: want zstd or lz4")
     return chunk.data
-
-
-def _parts(data: bytes) -> Iterator[Schema | Channel | Message]:
-    at = 0
-    while at + _HEAD.size <= len(data):
-        opcode, length = _HEAD.unpack_from(data, at)
-        at += _HEAD.size
-        body = data[at : at + length]
-        at += length
-        if len(body) < length:
-            return
-        try:
-            record = _record(opcode, body)
-        except (struct.error, UnicodeDecodeError, McapError) as error:
-            raise ChunkError(f"a record of a chunk cannot be read: {error}") from None
-        if record is not None:
-            yield record
-
-
-def _record(opcode: int, body: bytes) -> Schema | Channel | Message | None:
-    stream = ReadDataStream(io.BytesIO(body))
-    if opcode == Opcode.MESSAGE:
-        return Message.read(stream, len(body))
-    if opcode == Opcode.CHANNEL:
-        return Channel.read(stream)
-    return Schema.read(stream) if opcode == Opcode.SCHEMA else None

@@ -1,36 +1,51 @@
-"""MCAP with the bus's own bytes in it: one channel per bus key, its schema a protobuf
-FileDescriptorSet.
+"""The one reader of MCAP, front to end: ours and other writers', with chunks or without, cut off or
+damaged anywhere.
 
-The file can be opened by any MCAP viewer; layout and records: https://mcap.dev/spec. Nothing here
-looks into a payload.
+Frames of records are read here, for a length beyond the file's end, a byte too few or an unknown
+compression must end in an account and not in a shorter message; what is inside them is parsed by
+the mcap library (https://mcap.dev/spec). Nothing here looks into a payload.
 """
 
-import hashlib
+import functools
 import io
-import os
-import struct
+import logging
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from google.protobuf.descriptor import FileDescriptor
-from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Message, Schema
-from mcap.stream_reader import StreamReader
+from mcap.records import Channel, DataEnd, Footer, Schema, Statistics
 
-from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import Topic
-from sessions.recording import mcap_chunk
-from sessions.recording.mcap_writer import McapWriter
+from sessions.recording.mcap_damage import Damage
+from sessions.recording.mcap_index import keys_of, summary_of
+from sessions.recording.mcap_records import (
+    BLOCK,
+    MESSAGE,
+    RECORD,
+    RECORD_LIMIT,
+    SUMMARY_CRC,
+    Names,
+    Unreadable,
+    content,
+    crc_of,
+    parsed,
+    records,
+)
+from sessions.recording.mcap_writer import MAGIC
 
-PROFILE = "gyrofree"
-RULES = "google/protobuf/descriptor.proto"  # what the contract's rules are written with
-_HEAD = struct.Struct("<BQ")  # opcode and length of a record
-RECORD_LIMIT = 64 * 1024**2  # bytes; a longer record is damage, not data (our chunks are 128 KiB)
+READ = (
+    Opcode.CHUNK,
+    Opcode.MESSAGE,
+    Opcode.SCHEMA,
+    Opcode.CHANNEL,
+    Opcode.DATA_END,
+    Opcode.STATISTICS,
+    Opcode.FOOTER,
+)
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,214 +58,180 @@ class Recorded:
     payload: bytes
 
 
-def descriptor_set(topic: Topic) -> bytes:
-    """The serialised FileDescriptorSet of a topic's type with everything it imports, dependencies
-    first.
-    """
-    files: dict[str, FileDescriptor] = {}
-
-    def visit(file: FileDescriptor) -> None:
-        if file.name not in files and file.name != RULES:
-            for dependency in file.dependencies:
-                visit(dependency)
-            files[file.name] = file
-
-    visit(topic.type.DESCRIPTOR.file)
-    result = FileDescriptorSet()
-    for file in files.values():
-        _without_rules(file, result.file.add())
-    return result.SerializeToString()
-
-
-def _without_rules(file: FileDescriptor, out: FileDescriptorProto) -> None:
-    """A file as other viewers read it: our rules for what a field may hold are not theirs."""
-    file.CopyToProto(out)
-    if RULES not in out.dependency:
-        return
-    out.dependency.remove(RULES)
-    del out.extension[:]
-    found = list(out.message_type)
-    while found:
-        message = found.pop()
-        found += message.nested_type
-        message.options.ClearExtension(pb.open)
-        for field in message.field:
-            field.options.ClearExtension(pb.rule)
-            if not field.options.ByteSize():
-                field.ClearField("options")
-        if not message.options.ByteSize():
-            message.ClearField("options")
-
-
-class Sink:
-    """What the MCAP writer writes to: memory first, the file when `push` is called.
-
-    On a full disk the bytes stay in memory and the next push goes on where the last one stopped, so
-    that a disk that gets room again has lost nothing.
-    """
-
-    def __init__(self, fd: int) -> None:
-        self._fd = fd
-        self._written = 0
-        self.hash = (
-            hashlib.sha256()
-        )  # of what the file holds; the writer never goes back, so no second reading
-        self.pending = bytearray()
-
-    def write(self, data: bytes) -> int:
-        self.pending += data
-        return len(data)
-
-    def tell(self) -> int:
-        return self._written + len(self.pending)
-
-    def push(self) -> None:
-        """Write what is pending; raises OSError with everything unwritten kept."""
-        while self.pending:
-            n = os.write(self._fd, self.pending)
-            self._written += n
-            self.hash.update(memoryview(self.pending)[:n])
-            del self.pending[:n]
-
-
-class McapLog:
-    """Appends messages; channels and schemas are made at the first message of a key."""
-
-    def __init__(self, fd: int, chunk_bytes: int, folder: Path | None = None) -> None:
-        """folder: where the index of a long recording waits for its end."""
-        self._sink = Sink(fd)
-        self._writer = McapWriter(self._sink, chunk_bytes, folder)
-        self._writer.start(PROFILE)
-        self._schemas: dict[str, int] = {}
-        self._channels: dict[str, int] = {}
-
-    @property
-    def channels(self) -> dict[int, str]:
-        """MCAP channel id -> bus key."""
-        return {number: key for key, number in self._channels.items()}
-
-    @property
-    def pending(self) -> int:
-        """Bytes of complete chunks that are not in the file yet."""
-        return len(self._sink.pending)
-
-    @property
-    def size(self) -> int:
-        """Bytes of the file once everything pending is written."""
-        return self._sink.tell()
-
-    @property
-    def spilt(self) -> bool:
-        """Some of the file's index waits on the disk for its end."""
-        return self._writer.spilt
-
-    @property
-    def sha256(self) -> str:
-        """Hex digest of what has been written to the file."""
-        return self._sink.hash.hexdigest()
-
-    def open_channel(self, key: str, topic: Topic) -> int:
-        """Channel number of a key, made when it is new."""
-        if key not in self._channels:
-            name = topic.type.DESCRIPTOR.full_name
-            if name not in self._schemas:
-                self._schemas[name] = self._writer.schema(name, "protobuf", descriptor_set(topic))
-            self._channels[key] = self._writer.channel(key, "protobuf", self._schemas[name])
-        return self._channels[key]
-
-    def add(
-        self, channel: int, log_ns: int, publish_ns: int, payload: bytes, sequence: int = 0
-    ) -> None:
-        """Append one message; MCAP's own sequence has 32 bits."""
-        self._writer.message(channel, log_ns, publish_ns, payload, sequence & 0xFFFFFFFF)
-
-    def close_chunk(self) -> None:
-        """End the running chunk, so that the next push writes everything added until now."""
-        self._writer.end_chunk()
-
-    def push(self) -> None:
-        """Write complete chunks to the file; raises OSError, nothing is forgotten then."""
-        self._sink.push()
-
-    def finish(self) -> None:
-        """End the data and append index and statistics; push writes them."""
-        self._writer.finish()
-
-
-@dataclass
-class Damage:
-    """What was wrong with a file that was read to its readable end."""
-
-    chunks: int = 0  # complete, but with a wrong CRC, not to be decompressed, or larger than said
-    orphans: int = 0  # messages of channels that no readable chunk declares
-    tail: str = ""  # why reading ended before the file's end; empty when it did not
-
-    def __str__(self) -> str:
-        parts = [f"{self.chunks} damaged chunks left out"] if self.chunks else []
-        parts += [f"{self.orphans} messages of unknown channels left out"] if self.orphans else []
-        return "; ".join(parts + ([self.tail] if self.tail else [])) or "no damage"
-
-
 def read(
     path: Path, damage: Damage | None = None, channels: dict[int, str] | None = None
 ) -> Iterator[Recorded]:
-    """Every readable message in the order of recording, also of a file without an end; CRCs are
-    checked.
+    """Every readable message of this program in the order of recording, also of a file without an
+    end; CRCs are checked.
 
     `channels` (of session.json) names channels whose declaration is in a damaged chunk. What could
-    not be read is counted in `damage`. Raises OSError when the file cannot be opened.
+    not be read is counted in `damage`; a caller that gives none has it logged. Raises OSError.
     """
-    damage = damage if damage is not None else Damage()
-    names = dict(channels or {})
+    found = Damage() if damage is None else damage
     with path.open("rb") as stream:
-        for record in _records(stream, damage):
-            if isinstance(record, Channel):
-                names[record.id] = record.topic
-            elif isinstance(record, Message):
-                key = names.get(record.channel_id)
-                if key is None:
-                    damage.orphans += 1
-                else:
-                    yield Recorded(record.log_time, record.publish_time, key, record.data)
+        yield from _Reading(path, stream, found, channels or {}).messages()
+    if damage is None:
+        say(path, found)
 
 
-def _records(stream: IO[bytes], damage: Damage) -> Iterator[Schema | Channel | Message]:
-    """Records of all good chunks; ends, with the reason in damage.tail, where the file cannot be
-    read on.
+def say(path: Path, damage: Damage) -> None:
+    """Log what is wrong with a file, once for each state of it."""
+    state = path.stat()
+    _say(path, state.st_size, state.st_mtime_ns, tuple(damage.said()))
 
-    Damaged lengths make the MCAP library raise almost anything (struct.error, UnicodeDecodeError,
-    its own errors), so everything but an error of the disk is taken as "this is no MCAP from here
-    on".
-    """
-    records = StreamReader(stream, emit_chunks=True, record_size_limit=RECORD_LIMIT).records
-    while True:
-        try:
-            record = next(records)
-        except StopIteration:
+
+@functools.lru_cache(maxsize=256)
+def _say(path: Path, size: int, mtime_ns: int, said: tuple[str, ...]) -> None:
+    for text in said:
+        log.warning("%s: %s", path, text)
+
+
+class _Reading:
+    """One file, front to end."""
+
+    def __init__(
+        self, path: Path, stream: IO[bytes], damage: Damage, channels: dict[int, str]
+    ) -> None:
+        self._path: Path | None = path  # until its index has been asked for names
+        self._stream, self._damage = stream, damage
+        self._names = Names(channels)
+        self._crc = self._before_record = 0  # of all bytes; of those before the running record
+        self._at = 0  # byte at which the running record begins
+        self._summary_at = 0  # byte behind the data section
+        self._counted: int | None = None  # messages by the file's statistics
+
+    def messages(self) -> Iterator[Recorded]:
+        """All that can be read; the damage is counted."""
+        damage = self._damage
+        start = self._stream.read(len(MAGIC))
+        self._crc = zlib.crc32(start)
+        if start != MAGIC:
+            damage.tail = "it is empty" if not start else "it does not begin as an MCAP file does"
             return
-        except OSError:
-            raise
-        except Exception as error:
-            damage.tail = f"ends at byte {stream.tell()} without a close ({type(error).__name__})"
-            return
-        if not isinstance(record, Chunk):
-            continue
+        while (head := self._head()) is not None:
+            opcode, length = head
+            if opcode in READ and length <= RECORD_LIMIT:
+                body = self._take(length)
+                if len(body) < length:
+                    damage.tail = self._cut()
+                    return
+                yield from self._record(opcode, body)
+                if opcode == Opcode.FOOTER:
+                    self._end()
+                    return
+            elif not self._pass_over(opcode, length):
+                damage.tail = self._cut()
+                return
+
+    def _head(self) -> tuple[int, int] | None:
+        self._at, self._before_record = self._stream.tell(), self._crc
+        head = self._take(RECORD.size)
+        if len(head) < RECORD.size:
+            self._damage.tail = self._cut()
+            return None
+        return RECORD.unpack(head)
+
+    def _take(self, length: int) -> bytes:
+        data = self._stream.read(length)
+        self._crc = zlib.crc32(data, self._crc)
+        return data
+
+    def _cut(self) -> str:
+        end = self._stream.seek(0, io.SEEK_END)
+        if self._at == end:
+            return f"ends at byte {end} without a close"
+        return f"cut off or damaged from byte {self._at} of {end} on"
+
+    def _pass_over(self, opcode: int, length: int) -> bool:
+        """Leave a record out; False where the file ends within it."""
+        self._damage.oversized += opcode in READ
+        while length:
+            data = self._take(min(length, BLOCK))
+            if not data:
+                return False
+            length -= len(data)
+        return True
+
+    def _record(self, opcode: int, body: bytes) -> Iterator[Recorded]:
         try:
-            yield from mcap_chunk.records(record)
-        except mcap_chunk.ChunkError:
-            damage.chunks += 1
+            if opcode == Opcode.CHUNK:
+                yield from self._chunk(body)
+            elif opcode == Opcode.MESSAGE:
+                yield from self._message(body, False)
+            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                if not self._summary_at:
+                    self._declare(opcode, body)
+            else:
+                self._close(opcode, body)
+        except Unreadable as error:
+            log.debug("record at byte %d: %s", self._stream.tell() - len(body), error)
+            if opcode == Opcode.CHUNK:
+                self._damage.chunks += 1
+            elif self._summary_at:
+                self._damage.index = True
+            else:
+                self._damage.records += 1
 
+    def _chunk(self, body: bytes) -> Iterator[Recorded]:
+        data, checked = content(body)
+        for opcode, begin, end in records(data):
+            if opcode == Opcode.MESSAGE:
+                yield from self._message(data[begin:end], checked)
+            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                self._declare(opcode, data[begin:end])
 
-def chunk_at(stream: IO[bytes], offset: int) -> Iterator[Message]:
-    """Messages of the chunk whose record begins at this byte, as the file's index says; none where
-    there is no readable chunk.
-    """
-    stream.seek(offset)
-    opcode, length = _HEAD.unpack(stream.read(_HEAD.size).ljust(_HEAD.size, b"\0"))
-    if opcode != Opcode.CHUNK or length > RECORD_LIMIT:
-        return
-    try:
-        chunk = Chunk.read(ReadDataStream(io.BytesIO(stream.read(length))))
-        yield from (one for one in mcap_chunk.records(chunk) if isinstance(one, Message))
-    except (mcap_chunk.ChunkError, McapError, struct.error, UnicodeDecodeError):
-        return
+    def _declare(self, opcode: int, body: bytes) -> None:
+        if opcode == Opcode.SCHEMA:
+            self._names.schema(parsed(Schema, body))
+        else:
+            self._names.channel(parsed(Channel, body))
+
+    def _message(self, body: bytes, checked: bool) -> Iterator[Recorded]:
+        if len(body) < MESSAGE.size:
+            raise Unreadable("a message without a head")
+        channel, _, log_ns, publish_ns = MESSAGE.unpack_from(body)
+        self._damage.messages += 1
+        self._damage.unchecked += not checked
+        if channel not in self._names and self._path is not None:
+            index, self._path = summary_of(self._path), None
+            self._names.add(keys_of(index) if index is not None else {})
+        key = self._names.keys.get(channel)
+        if key is not None:
+            yield Recorded(log_ns, publish_ns, key, body[MESSAGE.size :])
+        elif channel in self._names.foreign:
+            foreign, name = self._damage.foreign, self._names.foreign[channel]
+            foreign[name] = foreign.get(name, 0) + 1
+        else:
+            self._damage.orphans += 1
+
+    def _close(self, opcode: int, body: bytes) -> None:
+        if opcode == Opcode.DATA_END:
+            told = parsed(DataEnd, body).data_section_crc
+            if told and told != self._before_record:
+                self._damage.checksum = True
+            elif told:
+                self._damage.unchecked = 0
+            self._summary_at = self._stream.tell()
+        elif opcode == Opcode.STATISTICS:
+            self._counted = parsed(Statistics, body).message_count
+        else:
+            self._foot(parsed(Footer, body))
+
+    def _foot(self, footer: Footer) -> None:
+        if footer.summary_start not in (0, self._summary_at):
+            self._damage.index = True
+        elif footer.summary_start and footer.summary_crc:
+            end = self._stream.tell()
+            told = crc_of(self._stream, self._summary_at, end - SUMMARY_CRC)
+            self._damage.index |= told != footer.summary_crc
+            self._stream.seek(end)
+
+    def _end(self) -> None:
+        damage = self._damage
+        if self._stream.read(len(MAGIC)) != MAGIC:
+            damage.tail = self._cut()
+        elif behind := len(self._stream.read(1)):
+            rest = behind - self._stream.tell() + self._stream.seek(0, io.SEEK_END)
+            damage.tail = f"{rest} bytes behind its end are not read"
+        if self._counted is not None and not damage.index:
+            damage.missing = max(0, self._counted - damage.messages)

@@ -22,8 +22,10 @@ from messages.contract.door import Door, device_of
 from messages.contract.topics import RECORDER
 from messages.history.mending_state import Question
 from messages.text import plain
+from sessions.library.annotations import give_title
 from sessions.recording.intake import Entry, Intake
-from sessions.recording.manifest import SESSION_NAME, Manifest
+from sessions.recording.manifest import Manifest, SessionError, name_fault, slug
+from sessions.recording.session_clock import SessionClock
 from sessions.recording.settings import RecorderSettings
 from sessions.recording.store import SessionStore, start
 
@@ -59,6 +61,7 @@ class Recorder:
         self._orders: deque[Order] = deque()
         self._ask = ask
         self._fresh = True
+        self._clock = SessionClock()
         self._bytes_in = self._bytes_out = 0  # of the inbox: counted each by one thread
         self._door = self._new_door()
         self._intake = Intake(bus.prefix, None, 0, self._door)
@@ -85,7 +88,7 @@ class Recorder:
             self._overflow += 1
             return
         self._bytes_in += size
-        self._inbox.append((time.time_ns(), str(sample.key_expr), sample.payload.to_bytes()))
+        self._inbox.append((self._clock.now_ns(), str(sample.key_expr), sample.payload.to_bytes()))
 
     def on_order(self, order: Order) -> None:
         """Zenoh's thread: keep the order for the loop."""
@@ -114,6 +117,7 @@ class Recorder:
     def step(self) -> None:
         """Write what came in, answer orders, close a chunk when it is time."""
         self.wake.clear()
+        self._clock.look(self._store.manifest if self._store is not None else None)
         self._auto_start()
         self._drain()
         while self._orders:
@@ -173,9 +177,12 @@ class Recorder:
         """Start a session; on refusal say why in the status and, with auto_start, try again
         later.
         """
+        if self._fresh and not self._inbox:
+            self._clock.begin()
         try:
             store = start(
                 self.settings,
+                self._clock.now_ns(),
                 name=name,
                 note=note,
                 user=user,
@@ -196,7 +203,11 @@ class Recorder:
         if self._fresh:  # a file that only goes on keeps what is known of the streams
             self._door = self._new_door()
             self._intake = Intake(
-                self.bus.prefix, self._ask, store.manifest.start_utc_ns, self._door
+                self.bus.prefix,
+                self._ask,
+                store.manifest.start_utc_ns,
+                self._door,
+                self._clock.now_ns,
             )
         self._fresh = True
         self._store, self._recording = store, True
@@ -263,19 +274,16 @@ class Recorder:
         if command.action == pb.RecorderCommand.ACTION_START:
             if self._store is not None:
                 return f"already recording {self._store.manifest.id}: stop it first"
-            if command.name and not SESSION_NAME.fullmatch(command.name):
-                return (
-                    f"name {command.name[:80]!r}: want a letter or digit, then a-z, 0-9, _ and -,"
-                    " at most 32"
-                )
+            if fault := name_fault(command.name):
+                return fault
             if fault := text.check(command.note, lines=True) or text.check(command.user):
                 return f"note or user: {fault}"
             log.info("start ordered by %s", command.user or "an unnamed user")
-            return (
-                ""
-                if self._begin(name=command.name, note=command.note, user=command.user)
-                else self._message
-            )
+            name = slug(command.name)
+            if not self._begin(name=name, note=command.note, user=command.user):
+                return self._message
+            self._keep_title(command.name)
+            return ""
         if command.action == pb.RecorderCommand.ACTION_STOP:
             if self._store is None:
                 return "not recording: nothing to stop"
@@ -285,14 +293,25 @@ class Recorder:
             return self._message
         return ""
 
+    def _keep_title(self, name: str) -> None:
+        if self._store is not None:
+            try:
+                give_title(self._store.folder, name)
+            except (SessionError, OSError) as error:
+                log.warning("%s: its title is not kept: %s", self._store.folder, error)
+
     def status(self) -> pb.RecorderStatus:
         """The state of now."""
         status = pb.RecorderStatus()
         status.CopyFrom(self._describe(self._store) if self._store else self._last)
         status.recording = self._store is not None
         status.header.device = RECORDER
-        status.header.utc_ns = time.time_ns()
+        status.header.utc_ns = self._clock.now_ns()
         status.message = (self._store.error if self._store else "") or self._message
+        if self._store is not None:
+            steps = self._store.manifest.clock_steps
+            status.clock_steps = len(steps)
+            status.clock_offset_s = sum(step.step_s for step in steps)
         return status
 
     def _describe(self, store: SessionStore) -> pb.RecorderStatus:

@@ -11,7 +11,8 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from messages.contract.topics import Address, TopicError, parse
+from messages.clock import Moment
+from messages.contract.topics import Address, parse
 from sessions.recording.certificate import Witness, certify
 from sessions.recording.keys import KeyState
 from sessions.recording.manifest import (
@@ -24,7 +25,9 @@ from sessions.recording.manifest import (
     sync_folder,
     write_manifest,
 )
-from sessions.recording.mcap_log import Damage, McapLog, read
+from sessions.recording.mcap_append import McapLog
+from sessions.recording.mcap_damage import Damage
+from sessions.recording.mcap_log import read
 from sessions.recording.store import lock
 
 log = logging.getLogger(__name__)
@@ -78,11 +81,7 @@ def _copy(source: Path, fd: int, channels: dict[int, str] | None) -> Salvage:
     for message in read(source, result.damage, channels):
         state = states.get(message.key)
         if state is None:
-            try:
-                address = parse(message.key)
-            except TopicError:
-                result.damage.orphans += 1
-                continue
+            address = parse(message.key)
             state = KeyState(out.open_channel(message.key, address.topic), address)
             states[message.key], addresses[message.key] = state, address
         state.publish_time(message.payload)
@@ -138,11 +137,19 @@ def recover_session(folder: Path) -> Manifest | None:
     manifest.sha256 = found.sha256
     manifest.recovery = (
         f"{found.messages} messages from {original.stat().st_size} bytes of {RECORDING}, which was"
-        f" not closed: {found.damage}"
+        f" not closed: {'; '.join(filter(None, (str(found.damage), found.damage.others)))}"
     )
     write_manifest(folder, manifest)
     log.warning("%s: recovered %s", manifest.id, manifest.recovery)
     return manifest
+
+
+def _order(folder: Path) -> tuple[int, str]:
+    """Sessions by their numbers; their names are of a clock that may have been set."""
+    try:
+        return read_manifest(folder).number, folder.name
+    except SessionError:
+        return 0, folder.name
 
 
 def cut_off(root: Path, within_s: float, max_bytes: int) -> Path | None:
@@ -152,13 +159,18 @@ def cut_off(root: Path, within_s: float, max_bytes: int) -> Path | None:
     try:
         newest = max(
             (f for f in root.iterdir() if (f / RECORDING).exists()),
-            key=lambda f: f.name,
+            key=_order,
             default=None,
         )
-        if newest is None or read_manifest(newest).state != "open":
+        if newest is None:
+            return None
+        manifest = read_manifest(newest)
+        if manifest.state != "open":
             return None
         state = (newest / RECORDING).stat()
-        if time.time() - state.st_mtime > within_s or state.st_size > max_bytes:
+        written = Moment.of(manifest.written)
+        age_s = written.age_s if written is not None else time.time() - state.st_mtime
+        if age_s > within_s or state.st_size > max_bytes:
             return None
         fd = os.open(newest / RECORDING, os.O_RDONLY | os.O_CLOEXEC)
     except (SessionError, OSError):

@@ -22,8 +22,14 @@ from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import Address, TopicError, parse
 from sessions.recording.certificate import Witness, certify
 from sessions.recording.keys import KeyState
-from sessions.recording.manifest import RECORDING, Manifest, sync_folder, write_manifest
-from sessions.recording.mcap_log import McapLog
+from sessions.recording.manifest import (
+    RECORDING,
+    Manifest,
+    next_number,
+    sync_folder,
+    write_manifest,
+)
+from sessions.recording.mcap_append import McapLog
 from sessions.recording.settings import RecorderSettings
 
 log = logging.getLogger(__name__)
@@ -249,6 +255,7 @@ _SOURCES = frozenset(pb.Source.values())
 
 def start(
     settings: RecorderSettings,
+    now_ns: int | None = None,
     *,
     name: str = "",
     note: str = "",
@@ -256,10 +263,10 @@ def start(
     continues: str = "",
     configuration: dict[str, object] | None = None,
 ) -> SessionStore:
-    """Begin a session now; its id is the UTC time and the name. Raises OSError when the root cannot
-    be written.
+    """Begin a session now; its id is the UTC time and the name. now_ns: by the clock of its receive
+    times. Raises OSError when the root cannot be written.
     """
-    now = time.time_ns()
+    now = time.time_ns() if now_ns is None else now_ns
     stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime(now // 1_000_000_000))
     base = f"{stamp}-{name}" if name else stamp
     for attempt in range(100):
@@ -269,6 +276,7 @@ def start(
             note=note,
             user=user,
             continues=continues,
+            number=next_number(settings.root),
             start_utc_ns=now,
             end_utc_ns=now,
             versions=versions(),

@@ -31,11 +31,11 @@ from messages.contract.topics import (
     PIPELINE_ORDERS,
     RATE,
     Topic,
-    TopicError,
     parse,
 )
 from sessions.library.scan import scan
-from sessions.recording.mcap_log import Damage, read
+from sessions.recording.mcap_damage import Damage
+from sessions.recording.mcap_log import read
 from sessions.recording.samples import Gathering, Samples, decode, joined, padded
 
 ESTIMATES: tuple[Topic, ...] = (RATE, NAV, INNOVATION)
@@ -80,6 +80,7 @@ class Report:
     inputs: int
     refused: int  # inputs the pipeline could not use, as it could not when they were live
     damage: str
+    others: str = ""  # what other programs wrote into the file
 
     @property
     def identical(self) -> bool:
@@ -106,8 +107,9 @@ def reproduce(path: Path, pipeline: Pipeline) -> Report:
             if address.topic not in ESTIMATES and address.topic not in PIPELINE_INPUTS:
                 continue
             message = decode(address.topic, row.payload)
-        except (TopicError, DecodeError):
+        except DecodeError:
             refused += 1
+            damage.undecodable += 1
             continue
         if address.topic in ESTIMATES:
             recorded.add(row.key, address.topic, message)
@@ -130,7 +132,7 @@ def reproduce(path: Path, pipeline: Pipeline) -> Report:
         key: compare(before.get(key), after.get(key))
         for key in sorted(before.keys() | after.keys())
     }
-    return Report(compared, inputs, refused, str(damage))
+    return Report(compared, inputs, refused, str(damage), damage.others)
 
 
 class _Estimates:

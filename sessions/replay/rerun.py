@@ -11,8 +11,13 @@ from pathlib import Path
 
 from messages.contract.topics import ATTITUDE, AXES, ESTIMATOR, PIPELINE_INPUTS, POSE, parse
 from sessions.export.table import Progress, Selection, messages, silent
-from sessions.recording.manifest import SESSION_ID, Manifest, SessionError, check_id
-from sessions.recording.mcap_log import Damage
+from sessions.recording.manifest import (
+    SESSION_ID,
+    Manifest,
+    SessionError,
+    check_id,
+    next_number,
+)
 from sessions.recording.settings import RecorderSettings
 from sessions.recording.store import SessionStore, versions
 from sessions.replay.reproduce import ESTIMATES, Pipeline, give_orders
@@ -32,7 +37,7 @@ def estimates_again(
     counts: dict[str, int] = {}
     size, seen = max(1, path.stat().st_size), 0
     give_orders(path, pipeline)
-    for row, topic, message in messages(path, Selection(), Damage()):
+    for row, topic, message in messages(path, Selection()):
         seen += len(row.payload) + 40
         if topic not in COMPUTED or name:
             yield row.log_ns, row.key, row.payload
@@ -98,6 +103,7 @@ def _open(
         name = session if attempt == 1 else f"{session}-{attempt}"
         manifest = Manifest(
             id=name,
+            number=next_number(root),
             note=note,
             start_utc_ns=start_ns,
             end_utc_ns=start_ns,

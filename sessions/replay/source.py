@@ -1,18 +1,18 @@
 """Messages of a recording from any moment on, in the order of their times."""
 
 import heapq
-import itertools
-import struct
 from collections.abc import Iterator
 from pathlib import Path
 
 from google.protobuf.message import DecodeError
-from mcap.exceptions import McapError
-from mcap.reader import SeekingReader
 
 from messages.contract.topics import Topic, TopicError, parse
-from sessions.recording.mcap_log import RECORD_LIMIT, Damage, chunk_at, read
+from sessions.library.scan import rows_of
+from sessions.recording.mcap_damage import Damage
+from sessions.recording.mcap_index import keys_of, ordered_summary_of
+from sessions.recording.mcap_log import say
 from sessions.recording.samples import decode
+from sessions.recording.timeline import straight
 from sessions.replay.replay import Input
 
 
@@ -28,24 +28,18 @@ class Source:
         self.length_s = (end_ns - self.start_ns) / 1e9
 
     def _bounds(self) -> tuple[int, int]:
-        with self._path.open("rb") as stream:
-            try:
-                found = SeekingReader(stream, record_size_limit=RECORD_LIMIT).get_summary()
-            except (McapError, ValueError, EOFError, struct.error):
-                found = None
-        self._index = found
-        self._indexed = (
-            found is not None and found.statistics is not None and bool(found.chunk_indexes)
-        )
-        if self._indexed and found.statistics.message_count:
-            return found.statistics.message_start_time, found.statistics.message_end_time
+        self._index = ordered_summary_of(self._path)
+        if self._index is not None:
+            found = self._index.statistics
+            return found.message_start_time, found.message_end_time
         damage = Damage()
-        times = [
-            row.log_ns for row in read(self._path, damage)
-        ]  # without an index: as far as it can be read
-        if not times:
+        first = last = 0
+        for row in straight(self._path, damage):  # without an index: as far as it can be read
+            first, last = min(first or row.log_ns, row.log_ns), max(last, row.log_ns)
+        say(self._path, damage)
+        if not first:
             raise ValueError(f"{self._path}: no message in it, {damage}: want an MCAP recording")
-        return min(times), max(times)
+        return first, last
 
     def items(self, from_ns: int = 0) -> Iterator[Input]:
         """Decoded messages from this log time on, in its order."""
@@ -58,33 +52,24 @@ class Source:
                 continue
 
     def _rows(self, from_ns: int) -> Iterator[tuple[int, str, bytes]]:
-        if not self._indexed:
-            yield from (
-                (r.log_ns, r.key, r.payload) for r in read(self._path) if r.log_ns >= from_ns
-            )
+        """Of all keys, in the order of their times as far as the file has an index."""
+        if self._index is None:
+            rows = ((r.log_ns, r.key, r.payload) for r in straight(self._path))
+            yield from (row for row in rows if row[0] >= from_ns)
             return
-        yield from self._indexed_rows(from_ns)
-
-    def _indexed_rows(self, from_ns: int) -> Iterator[tuple[int, str, bytes]]:
-        """By the file's index, one chunk at a time: a message waits until no later chunk can have
-        an earlier one.
-        """
-        waiting: list[tuple[int, int, str, bytes]] = []
-        order = itertools.count()
-        chunks = sorted(
-            (one for one in self._index.chunk_indexes if one.message_end_time >= from_ns),
-            key=lambda one: one.message_start_time,
-        )
+        chunks = [c for c in self._index.chunk_indexes if c.message_end_time >= from_ns]
+        chunks.sort(key=lambda chunk: (chunk.message_start_time, chunk.chunk_start_offset))
+        damage, held, count = Damage(), [], 0
         with self._path.open("rb") as stream:
-            for one in chunks:
-                while waiting and waiting[0][0] < one.message_start_time:
-                    log_ns, _, key, payload = heapq.heappop(waiting)
+            for chunk in chunks:
+                while held and held[0][0] < chunk.message_start_time:
+                    log_ns, _, key, payload = heapq.heappop(held)
                     yield log_ns, key, payload
-                for message in chunk_at(stream, one.chunk_start_offset):
-                    channel = self._index.channels.get(message.channel_id)
-                    if channel is not None and message.log_time >= from_ns:
-                        row = message.log_time, next(order), channel.topic, message.data
-                        heapq.heappush(waiting, row)
-        while waiting:
-            log_ns, _, key, payload = heapq.heappop(waiting)
+                for row in rows_of(stream, chunk, keys_of(self._index), damage):
+                    if row[0] >= from_ns:
+                        count += 1  # equal times stay in the file's order
+                        heapq.heappush(held, (row[0], count, row[1], row[2]))
+        while held:
+            log_ns, _, key, payload = heapq.heappop(held)
             yield log_ns, key, payload
+        say(self._path, damage)

@@ -9,7 +9,7 @@ from inertial.constants import GRAVITY
 from sessions.recording.manifest import Manifest
 from sessions.report.data import Rate, Run
 from sessions.report.paper import CubeTest, PositionError, cube_test, local_gravity, position_error
-from sessions.report.segments import STEP, Segment, measured, reference, segment
+from sessions.report.segments import Segment, grid, measured, reference, segment
 from sessions.report.stability import Allan, Consistency, allan_axes, consistency, longest_rest
 from sessions.report.table_test import Plateau, ScaleFactor, plateaus, scale_factor
 
@@ -54,7 +54,7 @@ class Analysis:
     allan_axes: list[Allan] = field(default_factory=list)
     navigation: list[NavigationResult] = field(default_factory=list)
     gravity: float = GRAVITY  # m/s^2
-    completeness: float | None = None  # 0 to 1
+    completeness: float | None = None  # 0 to 1; None where the recording itself is damaged
 
     def rate(self, name: str) -> RateResult | None:
         """The result of an estimator."""
@@ -79,7 +79,7 @@ def analyse(run: Run, manifest: Manifest | None) -> Analysis:
         else [],
         navigation=_navigation(run),
         gravity=g,
-        completeness=_completeness(manifest, run.device),
+        completeness=_completeness(manifest, run.device) if run.whole else None,
     )
 
 
@@ -120,8 +120,8 @@ def _rate_result(
         error = rate.omega_b - np.column_stack([np.zeros((len(omega_z), 2)), omega_z])
         known = measured(run.tacho, rate.t)
         rms = np.sqrt((error[known] ** 2).mean(axis=0)) if known.any() else None
-        grid = np.arange(rate.t[0], rate.t[-1], STEP)
-        turned = float(reference(run.tacho, grid).sum() * STEP)
+        t, step = grid(run.tacho, float(rate.t[0]), float(rate.t[-1]))
+        turned = float(reference(run.tacho, t).sum() * step)
         angle = float(rate.angle_z[-1] - rate.angle_z[0]) - turned
     start = next((part.end for part in parts if part.still), 0.0)
     return RateResult(

@@ -109,6 +109,7 @@ def _json(
         "allan": [asdict(one) for one in found.allan_axes],
         "navigation": {nav.name: asdict(nav) for nav in found.navigation},
         "link": found.run.link,
+        "damage": list(found.run.said),
     }
     return json.dumps(_plain(content), indent=1, sort_keys=True, ensure_ascii=False) + "\n"
 

@@ -2,7 +2,7 @@
 of the run.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from messages.contract.topics import ACCEL, GNSS, INNOVATION, LINK, NAV, RATE, TACHO, parse
 from sessions.export.table import Progress, Selection, Table, silent, tables
+from sessions.recording.mcap_damage import Damage
 
 Array = NDArray[np.float64]
 XYZ = ("x", "y", "z")
@@ -95,8 +96,29 @@ class Run:
         default_factory=lambda: np.zeros((0, 4))
     )  # t, latitude rad, longitude rad, height m
     link: dict[str, float] = field(default_factory=dict)  # last ledger of the line
+    said: tuple[str, ...] = ()  # sentences about damage of the recording
+    whole: bool = True  # nothing of the recording is missing or unreadable
 
 
+FIELDS = {  # of long tables: what a report is made of
+    ACCEL.name: ("epoch", "period_s", "f_mps2"),
+    TACHO.name: ("epoch", "omega_radps", "sigma_radps"),
+    RATE.name: (
+        "epoch",
+        "omega_ib_b_radps",
+        "omega_covariance",
+        "alpha_b_radps2",
+        "f_b_mps2",
+        "angle_z_rad",
+        "p_n_m",
+        "nis",
+        "nis_dof",
+        "still",
+        "calibration",
+    ),
+    NAV.name: ("epoch", "p_ned_m", "v_n_mps", "sigma"),
+    INNOVATION.name: ("epoch", "nis", "dof", "accepted"),
+}
 WANTED = frozenset(topic.name for topic in (ACCEL, TACHO, RATE, NAV, INNOVATION, GNSS, LINK))
 
 
@@ -108,7 +130,8 @@ def load_run(
 
     Raises ReportError when there is no such device or boot, or no estimate at all; OSError.
     """
-    found = tables(path, Selection(WANTED), progress)
+    damage = Damage()
+    found = tables(path, Selection(WANTED, fields=FIELDS), progress, damage)
     devices: dict[str, int] = {}
     for key, table in found.items():
         address = parse(key)
@@ -129,7 +152,8 @@ def load_run(
             f"{path}: no boot {boot} of {device}; there are {', '.join(map(str, sorted(lengths)))}"
         )
     epoch = boot if boot is not None else max(sorted(lengths), key=lambda b: round(lengths[b], 1))
-    return _run(mine, device, epoch, tuple(sorted(lengths)))
+    run = _run(mine, device, epoch, tuple(sorted(lengths)))
+    return replace(run, said=tuple(damage.said()), whole=damage.whole)
 
 
 def _boots(timed: list[Table]) -> dict[int, float]:
@@ -147,7 +171,8 @@ def _run(mine: dict[str, Table], device: str, epoch: int, boots: tuple[int, ...]
     for key, table in sorted(mine.items()):
         address = parse(key)
         at = table.data.get("epoch", np.zeros(len(table))) == epoch
-        part = Table(table.columns, {name: column[at] for name, column in table.data.items()})
+        data = table.data if at.all() else {n: column[at] for n, column in table.data.items()}
+        part = Table(table.columns, data)
         if len(part):
             by_topic.setdefault(address.topic.name, []).append((address.estimator, part))
     starts = [

@@ -81,6 +81,7 @@ def _facts(found: Analysis, manifest: Manifest | None, spec: Spec) -> list[tuple
     ]
     if found.cube is not None and found.cube.tilt is not None:
         facts.append(("Tilt of the table's axis", f"{deg(found.cube.tilt, 2)}°"))
+    facts += [("Recording", text) for text in run.said]
     if manifest and manifest.note:
         facts.append(("Note", manifest.note))
     return facts

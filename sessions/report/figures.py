@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from sessions.report.analysis import Analysis
 from sessions.report.data import Run
-from sessions.report.segments import STEP, reference
+from sessions.report.segments import grid, reference
 
 COLOURS = (
     "#0072B2",
@@ -144,7 +144,7 @@ def _angle(figure: Figure, found: Analysis) -> bool:
     if len(t):
         ax.plot(
             t,
-            np.degrees(np.cumsum(omega) * STEP),
+            np.degrees(np.cumsum(omega) * (t[1] - t[0] if len(t) > 1 else 0.0)),
             color=REFERENCE,
             linestyle="--",
             label="tachometer",
@@ -251,7 +251,7 @@ def _axes(figure: Figure, label: str):
 def _reference(run: Run) -> tuple[np.ndarray, np.ndarray]:
     if run.tacho is None:
         return np.zeros(0), np.zeros(0)
-    t = np.arange(0.0, run.seconds, STEP)
+    t, _ = grid(run.tacho, 0.0, run.seconds)
     return t, reference(run.tacho, t)
 
 

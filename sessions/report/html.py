@@ -5,11 +5,13 @@ from pathlib import Path
 
 import jinja2
 
+from messages.text import template_value
 from sessions.report.document import Document
 
 _environment = jinja2.Environment(
     loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
     autoescape=True,
+    finalize=template_value,
     undefined=jinja2.StrictUndefined,
     trim_blocks=True,
     lstrip_blocks=True,

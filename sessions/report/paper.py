@@ -14,7 +14,7 @@ from inertial.constants import GRAVITY
 from inertial.earth import gravity
 from inertial.rate.field import cube_angular_acceleration, cube_specific_force
 from sessions.report.data import Accel, Rate, Run
-from sessions.report.segments import STEP, Segment, reference
+from sessions.report.segments import STEP, Segment, grid, reference
 
 Array = NDArray[np.float64]
 
@@ -57,10 +57,11 @@ def cube_test(accel: Accel, side: float, segments: list[Segment], run: Run) -> C
 
 
 def local_gravity(run: Run) -> float:
-    """m/s^2, at the median fix, or the standard one."""
-    if not len(run.fixes):
+    """m/s^2, at the median fix, or the standard one where no fix has a height."""
+    high = run.fixes[np.isfinite(run.fixes).all(axis=1)]
+    if not len(high):
         return GRAVITY
-    return float(gravity(float(np.median(run.fixes[:, 1])), float(np.median(run.fixes[:, 3]))))
+    return float(gravity(float(np.median(high[:, 1])), float(np.median(high[:, 3]))))
 
 
 def equivalent_bias(
@@ -75,11 +76,11 @@ def equivalent_bias(
     resting = [part for part in segments if part.still and part.holds(t).sum() > 20]
     if run.tacho is None or len(resting) < 2:
         return None, None
-    grid = np.arange(0.0, run.seconds + STEP, STEP)
-    angle = np.concatenate([[0.0], np.cumsum(reference(run.tacho, grid)[:-1] * STEP)])
+    times, step = grid(run.tacho, 0.0, run.seconds + STEP)
+    angle = np.concatenate([[0.0], np.cumsum(reference(run.tacho, times)[:-1] * step)])
     rows, values, heights = [], [], []
     for part in resting:
-        psi = float(np.interp(0.5 * (part.begin + part.end), grid, angle))
+        psi = float(np.interp(0.5 * (part.begin + part.end), times, angle))
         mean = p[part.holds(t)].mean(axis=0)
         c, s = np.cos(psi), np.sin(psi)
         rows += [[1.0, 0.0, c, s], [0.0, 1.0, -s, c]]  # p_xy = b_xy + R(-psi) u

@@ -2,7 +2,6 @@
 
 import io
 from pathlib import Path
-from xml.sax.saxutils import escape
 
 from matplotlib import font_manager
 from reportlab.lib import colors
@@ -24,6 +23,7 @@ from reportlab.platypus import (
     TableStyle,
 )
 
+from messages.text import html, paragraph
 from sessions.report.document import Document
 from sessions.report.grids import Grid
 
@@ -90,7 +90,7 @@ def _story(document: Document) -> list:
     head = Table(
         [
             [
-                Paragraph(escape(document.title), _style("title", 17, fontName=BOLD)),
+                Paragraph(html(document.title), _style("title", 17, fontName=BOLD)),
                 Paragraph(
                     document.verdict.upper(),
                     _style("verdict", 13, fontName=BOLD, textColor=verdict, alignment=2),
@@ -107,7 +107,7 @@ def _story(document: Document) -> list:
         )
     for number, picture in enumerate(document.pictures, 1):
         caption = Paragraph(
-            escape(f"Figure {number}. {picture.caption}"), _style("caption", 7.5, textColor=DIM)
+            html(f"Figure {number}. {picture.caption}"), _style("caption", 7.5, textColor=DIM)
         )
         image = Image(io.BytesIO(picture.png))
         image.drawHeight *= WIDTH / image.drawWidth
@@ -121,15 +121,15 @@ def _story(document: Document) -> list:
 
 def _title(text: str) -> Paragraph:
     return Paragraph(
-        escape(text), _style("heading", 10.5, fontName=BOLD, spaceBefore=7 * mm, spaceAfter=2 * mm)
+        html(text), _style("heading", 10.5, fontName=BOLD, spaceBefore=7 * mm, spaceAfter=2 * mm)
     )
 
 
 def _pairs(rows: list[tuple[str, str]]) -> Table:
     cells = [
         [
-            Paragraph(escape(name), _style("name", 8, textColor=DIM)),
-            Paragraph(escape(value), _style("value", 8)),
+            Paragraph(html(name), _style("name", 8, textColor=DIM)),
+            Paragraph(paragraph(value), _style("value", 8)),
         ]
         for name, value in rows
     ]
@@ -141,8 +141,8 @@ def _pairs(rows: list[tuple[str, str]]) -> Table:
 def _grid(grid: Grid) -> list:
     size = 7.0 if len(grid.head) < 7 else 6.0
     body, bold = _style("cell", size), _style("head", size, fontName=BOLD, textColor=DIM)
-    cells = [[Paragraph(escape(cell), bold) for cell in grid.head]]
-    cells += [[Paragraph(escape(cell), body) for cell in row] for row in grid.rows]
+    cells = [[Paragraph(html(cell), bold) for cell in grid.head]]
+    cells += [[Paragraph(html(cell), body) for cell in row] for row in grid.rows]
     style = TableStyle(
         [
             ("LINEBELOW", (0, 0), (-1, 0), 0.7, INK),
@@ -157,7 +157,7 @@ def _grid(grid: Grid) -> list:
     blocks = [_title(grid.title), Table(cells, colWidths=widths, style=style, repeatRows=1)]
     if grid.remark:
         blocks.append(
-            Paragraph(escape(grid.remark), _style("remark", 7, textColor=DIM, spaceBefore=1.5 * mm))
+            Paragraph(html(grid.remark), _style("remark", 7, textColor=DIM, spaceBefore=1.5 * mm))
         )
     return [KeepTogether(blocks)] if len(grid.rows) < 12 else blocks
 

@@ -16,6 +16,7 @@ from sessions.report.data import Tacho
 Array = NDArray[np.float64]
 
 STEP = 0.01  # s, grid
+GRID_LEAST, GRID_PER_PULSE = 1_000_000, 20  # its points are at most the larger of these
 SILENCE = 0.6  # s without a pulse: the table stands (1 degree per pulse: below 1.7 deg/s)
 SMOOTH = 0.3  # s
 SLOPE = np.radians(12.0)  # rad/s^2
@@ -72,6 +73,15 @@ def reference(tacho: Tacho, t: Array) -> Array:
     return np.interp(t, np.concatenate(times), np.concatenate(rates), left=0.0, right=0.0)
 
 
+def grid(tacho: Tacho, begin: float, end: float) -> tuple[Array, float]:
+    """Times from begin to before end, STEP apart, and that step: wider where time stamps span more
+    than there are data for, so that memory goes with the data and not with the stamps.
+    """
+    most = max(GRID_LEAST, GRID_PER_PULSE * len(tacho.t))
+    step = max(STEP, (end - begin) / most)
+    return np.arange(begin, end, step), step
+
+
 def measured(tacho: Tacho, t: Array) -> NDArray[np.bool_]:
     """Where the reference is a measurement: not within SILENCE before pulses begin and after they
     end.
@@ -103,13 +113,13 @@ def segment(tacho: Tacho, seconds: float) -> list[Segment]:
         uniform_filter1d,
     )  # here: slow to load, and `reference` wants none of it
 
-    t = np.arange(0.0, seconds, STEP)
+    t, step = grid(tacho, 0.0, seconds)
     if len(t) < 10:
         return []
     raw = reference(tacho, t)
-    width = int(SMOOTH / STEP)
+    width = max(1, int(SMOOTH / step))
     smooth = uniform_filter1d(median_filter(raw, width | 1), width)
-    flat = np.abs(np.gradient(smooth, STEP)) < SLOPE
+    flat = np.abs(np.gradient(smooth, step)) < SLOPE
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flat.astype(int), [0]])))
     found: list[Segment] = []
     for first, last in zip(edges[::2], edges[1::2], strict=True):

@@ -94,7 +94,7 @@ def gateway(folder: Path, hours: float, done: Any) -> None:
 
     def write(data: bytes) -> bool:
         now_ns = begin_ns + round(t_s[0] * 1e9)
-        link.journal.append(BOARD, data, now_ns, now_ns + link.wall.offset_ns)
+        link.journal.append(BOARD, data, now_ns, link.wall.utc_ns(now_ns))
         link.take(Chunk(BOARD, data, now_ns))
         return True
 

@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from gateway.time.clock import DeviceClock, lower_hull, unwrap
+from gateway.time.clock import Continued, DeviceClock, lower_hull, unwrap
 
 
 def receipts(
@@ -115,3 +115,67 @@ def test_unwrap_is_invisible(bits):
         true += step
         seen = unwrap(seen, true % whole, bits)
         assert seen == true
+
+
+def fed(seconds: float = 30.0) -> DeviceClock:
+    """A clock that knows its device: 100 Hz, 1 ms late, device time 5 s at host time 1000 s."""
+    clock = DeviceClock()
+    for device, host in receipts(seconds, 0.0, lambda draw: 0.001):
+        clock.add(device, host)
+    return clock
+
+
+def test_what_waited_for_a_stopped_process_moves_no_time_stamp():
+    """Stopped for 20 s: its port held the first 3 s of them, and all come at once."""
+    clock = fed()
+    for k in range(300):
+        clock.add(35_000_000 + 10_000 * k, 1_050_000_000_000 + 50_000 * k, late=True)
+        assert clock.host_ns(35_000_000 + 10_000 * k) == pytest.approx(
+            1_030_001_000_000 + 10_000_000 * k, abs=1_000_000
+        )
+    assert clock.jumps == 0 and clock.sigma_s < 0.001
+    clock.add(55_100_000, 1_050_101_000_000)
+    assert clock.jumps == 0 and clock.sigma_s < 0.001
+
+
+def test_a_backlog_that_is_caught_up_with_is_no_jump():
+    """Somebody else on the line was stopped for 8 s, and now sends ten times as fast: whatever is
+    said of UTC meanwhile is not said with a small sigma.
+    """
+    clock = fed()
+    for k in range(880):
+        device, host = 35_000_000 + 10_000 * k, 1_038_001_000_000 + 1_000_000 * k
+        clock.add(device, host)
+        true_ns = 1_030_001_000_000 + 10_000_000 * k
+        assert abs(clock.host_ns(device) - true_ns) < 3e9 * clock.sigma_s + 2e6
+    for k in range(100):
+        clock.add(43_800_000 + 10_000 * k, 1_038_801_000_000 + 10_000_000 * k)
+    assert clock.jumps == 0 and clock.sigma_s < 0.2  # the last of the backlog is scatter
+
+
+@pytest.mark.parametrize("jump_s", [-3000.0, -3.0, 3.0, 3000.0])
+def test_a_jump_is_doubted_until_it_is_believed(jump_s):
+    clock = fed()
+    for k in range(1000):
+        device, host = 35_000_000 + 10_000 * k, 1_030_001_000_000 + 10_000_000 * k
+        clock.add(device + round(jump_s * 1e6), host)
+        wrong_s = abs(clock.host_ns(device + round(jump_s * 1e6)) - host) * 1e-9
+        assert wrong_s < 3.0 * clock.sigma_s + 0.002
+    assert clock.jumps == 1 and wrong_s < 0.001
+
+
+@pytest.mark.parametrize("start_us", [5_000_000, (1 << 32) - 1_000_000])
+@pytest.mark.parametrize("bits", [32, 64])
+def test_a_counter_of_32_bits_goes_on_over_its_wrap(bits, start_us):
+    time = Continued()
+    for k in range(3000):
+        true_us = start_us + 1000 * k
+        assert time.take(true_us % (1 << bits)) == true_us
+        if k % 7 == 6:  # a frame that overtook another
+            assert time.take((true_us - 1500) % (1 << bits)) == true_us - 1500
+
+
+def test_a_clock_that_really_goes_back_is_not_continued():
+    time = Continued()
+    for t_us in (3_000_000_000, 3_000_010_000, 7_000_000, 7_010_000):
+        assert time.take(t_us) == t_us

@@ -75,10 +75,10 @@ def test_a_log_that_cannot_be_played_is_named_by_file_row_and_column(tmp_path):
     (tmp_path / "cut.csv").write_text(
         header + "0,0,0,-9.8,0,0,0\n0.01,0,zero,-9.8,0,0,0\n0.02,0,0,-9.8,0,0,0\n"
     )
-    refused(gyrofree("play", "cut.csv", cwd=tmp_path), 1, "cut.csv:3", "'fy_mps2'", "'zero'")
-    refused(gyrofree("play", "absent.csv", cwd=tmp_path), 1, "absent.csv")
+    refused(gyrofree("play", "cut.csv", cwd=tmp_path), 2, "cut.csv:3", "'fy_mps2'", "'zero'")
+    refused(gyrofree("play", "absent.csv", cwd=tmp_path), 2, "absent.csv")
     (tmp_path / "columns.csv").write_text("time,value\n1,2\n")
-    refused(gyrofree("play", "columns.csv", cwd=tmp_path), 1, "columns.csv:1")
+    refused(gyrofree("play", "columns.csv", cwd=tmp_path), 2, "columns.csv:1")
 
 
 def test_a_drive_wants_its_folder(tmp_path):

@@ -8,8 +8,8 @@ import typer
 from typer.testing import CliRunner
 
 from estimator.settings import EstimatorSettings
-from gyrofree.commands.handover import with_changes
 from gyrofree.commands.main import app
+from gyrofree.running.rerun_settings import with_changes
 
 SERVICES = {"demo", "router", "gateway", "estimator", "record", "dashboard", "simulate", "play"}
 ORDERS = {

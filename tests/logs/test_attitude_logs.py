@@ -85,7 +85,6 @@ def test_inclination_does_not_see_heading():
     ("spoil", "complaint"),
     [
         (lambda t: t[:1], "want at least two"),
-        (lambda t: np.delete(t, range(300, 400), axis=0), "1.010 s between rows 300 and 301"),
         (lambda t: np.where(np.arange(len(t))[:, None] == 7, np.nan, t), ":9: column 't_s'"),
         (
             lambda t: np.column_stack([t[:, :7], np.full((len(t), 4), np.nan)]),
@@ -96,6 +95,24 @@ def test_inclination_does_not_see_heading():
 def test_a_damaged_log_is_refused_with_its_reason(tmp_path, spoil, complaint):
     with pytest.raises(LogError, match=complaint):
         run_attitude(write(tmp_path / "bad.csv", spoil(rows(-1.0))))
+
+
+@pytest.mark.parametrize(
+    ("lost", "limit_deg", "said"),
+    [
+        ([], 0.3, ""),
+        ([300, 301, 500], 0.3, "3 samples are missing"),
+        (range(300, 400), 3.0, "100 s"),
+    ],
+)
+def test_missing_samples_are_bridged_and_after_a_hole_a_filter_starts_anew(
+    tmp_path, lost, limit_deg, said
+):
+    table = np.delete(rows(-1.0), list(lost), axis=0)
+    result = run_attitude(write(tmp_path / "swing.csv", table), filters=["vqf"])
+    assert np.degrees(result["filters"]["vqf"]["inclination_rms_rad"]) < limit_deg
+    assert result["logs"]["swing"]["samples"] == len(table)
+    assert said in " ".join(result["notes"])
 
 
 def test_wrong_names_and_files_are_refused_with_the_right_ones(tmp_path):

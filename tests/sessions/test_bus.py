@@ -107,10 +107,12 @@ def test_start_stop_and_refusals_by_query(client, recording):
     status = until(lambda: order(client), "the recorder's answer")
     assert not status.recording and status.header.device == RECORDER
     assert "not recording" in order(client, STOP).message
-    assert "want a letter or digit" in order(client, START, name="../up").message
+    assert "character 2 is U+202E" in order(client, START, name="a\u202eb").message
+    assert "note or user: character 1" in order(client, START, note="\x1b[2J").message
+    assert "at most 100" in order(client, START, name="x" * 101).message
     begun = order(client, START, name="run-1", note="first", user="ann")
     assert begun.recording and begun.session.endswith("-run-1") and begun.message == ""
-    again = order(client, START)
+    again = order(client, START, name="../Prüfstand (2)")
     assert again.recording and f"already recording {begun.session}" in again.message
     publishers = Publishers(client, "t")
 

@@ -17,8 +17,9 @@ from messages.contract.topics import TOPICS
 from messages.history.mending import Mender
 from messages.history.mending_state import FARTHEST, Arrival
 from sessions.library.catalogue import Catalogue
-from sessions.recording import mcap_log
-from sessions.recording.mcap_log import Damage, descriptor_set, read
+from sessions.recording import mcap_append
+from sessions.recording.mcap_append import descriptor_set
+from sessions.recording.mcap_log import Damage, read
 from sessions.recording.recorder import Recorder
 from sessions.recording.settings import RecorderSettings
 from tests.sessions.test_bus import START, STOP, bus, client, order, recording, until  # noqa: F401
@@ -256,4 +257,4 @@ def test_other_viewers_are_not_given_our_rules():
             and b"RateBatch" in data
             or topic.type is not pb.RateBatch
         )
-        assert mcap_log.RULES.encode() not in data
+        assert mcap_append.RULES.encode() not in data

@@ -21,7 +21,8 @@ from messages.contract.topics import ACCEL, LOCATION, STATUS
 from sessions.library.catalogue import Catalogue
 from sessions.recording import store as store_module
 from sessions.recording.manifest import SessionError, read_manifest
-from sessions.recording.mcap_log import Damage, McapLog, Sink, read
+from sessions.recording.mcap_append import McapLog, Sink
+from sessions.recording.mcap_log import Damage, read
 from sessions.recording.mcap_writer import LIBRARY, McapWriter
 from sessions.recording.recover import recover_all, recover_session, salvage
 from sessions.recording.settings import RecorderSettings

@@ -51,9 +51,13 @@ def _users() -> str:
 
 
 class Door:
-    """A served Front; `ahead` moves the clock of sign-ins forward, s."""
+    """A served Front; `ahead` moves the clock of sign-ins forward, s. Without a scene of its own it
+    serves the one at port scene_at.
+    """
 
-    def __init__(self, folder: Path, port: int, scene: bool = True, **options: Any) -> None:
+    def __init__(
+        self, folder: Path, port: int, scene: bool = True, scene_at: int = 0, **options: Any
+    ) -> None:
         services = {key: options.pop(key) for key in SERVICES if key in options}
         self.settings = DashboardSettings(
             port=port, users=folder / "users.json", sessions_root=folder / "sessions", **options
@@ -66,7 +70,7 @@ class Door:
             settings=self.settings,
             gate=self.new_gate(),
             catalogue=Catalogue(self.settings.sessions_root),
-            scene_port=self.viser.get_port if self.viser else lambda: 0,
+            scene_port=self.viser.get_port if self.viser else lambda: scene_at,
             **services,
         )
         self.url = f"http://127.0.0.1:{port}"

@@ -10,7 +10,9 @@ from viser import SceneApi
 from dashboard.scene.drawing import geometry as geo
 from dashboard.scene.drawing.palette import AXES, GREY, SKY, VERMILLION, YELLOW, rgb
 from messages.contract import gyrofree_pb2 as pb
+from messages.text import plain
 
+MOST = 64  # axes drawn
 LENGTH, LABEL_AT = 0.42, 0.5  # half sides
 DOUBTFUL, BAD = 2.0, 4.0  # |residual| over its sigma
 CUBE_NAMES = tuple(f"a{i // 3 + 1}{i % 3 + 1}" for i in range(12))
@@ -53,24 +55,28 @@ class AxisArrows:
         """
         if health is None or not health.axes:
             return
-        colours = [residual_colour(axis) for axis in health.axes]
-        out = tuple(axis.excluded for axis in health.axes)
+        axes = health.axes[:MOST]
+        colours = [residual_colour(axis) for axis in axes]
+        out = tuple(axis.excluded for axis in axes)
         key = (health.layout, tuple(colours), out)
         if key == self._sent:
             return
         self._sent = key
         placed = (
-            all(len(a.position_b_m) == 3 and len(a.direction_b) == 3 for a in health.axes)
+            all(len(a.position_b_m) == 3 and len(a.direction_b) == 3 for a in axes)
             and health.scale_m > 0
         )
         if placed:
-            r = np.array([a.position_b_m for a in health.axes]) / health.scale_m
-            theta = np.array([a.direction_b for a in health.axes])
-        elif len(health.axes) == 12:
+            r = np.array([a.position_b_m for a in axes]) / health.scale_m
+            theta = np.array([a.direction_b for a in axes])
+            known = np.isfinite(r).all() and np.isfinite(theta).all()
+            if not known or not np.linalg.norm(theta, axis=1).all():
+                return  # a place that is not known is not drawn somewhere
+        elif len(axes) == 12:
             r, theta = geo.SENSORS_B, geo.DIRECTIONS_B
         else:
             return
-        self._draw(tuple(a.name for a in health.axes), r, theta, colours, out)
+        self._draw(tuple(plain(a.name, 16) for a in axes), r, theta, colours, out)
 
     def _draw(
         self,
@@ -111,7 +117,7 @@ class AxisArrows:
                 label.remove()
             self._labels = {
                 name: self._scene.add_label(
-                    f"{self._group}/{name}",
+                    f"{self._group}/label-{i}",
                     name,
                     position=tuple(r[i] + LABEL_AT * theta[i]),
                     anchor="center-center",

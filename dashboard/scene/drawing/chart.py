@@ -14,6 +14,7 @@ import numpy as np
 import viser
 
 from dashboard.scene.drawing import series
+from dashboard.scene.drawing.page import tag
 from dashboard.scene.drawing.palette import number, rgba
 
 LATE_HEIGHT = 0.035  # of the strip that marks filled-in data, of the chart's height
@@ -70,6 +71,17 @@ class Chart:
         with folder:
             self._heading = client.gui.add_html("", order=order)
 
+    def name(self, title: str, unit: str, digits: int) -> None:
+        """What it shows; for another device that may be something else."""
+        self._title, self._unit, self._digits = title, unit, digits
+
+    def clear(self) -> None:
+        """Nothing is shown."""
+        if self._heading.content:
+            self._heading.content = ""
+        if self._plot is not None and self._plot.visible:
+            self._plot.visible = False
+
     def show(
         self,
         curves: Sequence[Curve],
@@ -125,22 +137,18 @@ class Chart:
             )
             mark = "gf-dash" if curve.dash else "gf-line"
             stale = " gf-stale" if curve.stale else ""
+            sample = tag("i", class_=mark, style=f"border-color:{curve.colour}")
             items.append(
-                f'<span class="gf-item{stale}"><i class="{mark}"'
-                f' style="border-color:{curve.colour}"></i>{curve.label} <b>{value}</b></span>'
+                tag("span", sample, curve.label, " ", tag("b", value), class_=f"gf-item{stale}")
             )
         for shade in shades:
             if shade.on.any():
-                items.append(
-                    f'<span class="gf-item"><i class="gf-line" style="border-color:{shade.colour};'
-                    f'border-width:8px"></i>{shade.label}</span>'
-                )
-        empty = "" if items else '<span class="gf-item gf-stale">no data yet</span>'
-        return (
-            f'<div class="gf-chart"><span class="gf-title">{self._title}'
-            f" <em>{self._unit}</em></span><span"
-            f' class="gf-legend">{"".join(items)}{empty}</span></div>'
-        )
+                style = f"border-color:{shade.colour};border-width:8px"
+                sample = tag("i", class_="gf-line", style=style)
+                items.append(tag("span", sample, shade.label, class_="gf-item"))
+        items = items or [tag("span", "no data yet", class_="gf-item gf-stale")]
+        title = tag("span", self._title, " ", tag("em", self._unit), class_="gf-title")
+        return str(tag("div", title, tag("span", *items, class_="gf-legend"), class_="gf-chart"))
 
     def _build(
         self,
@@ -175,7 +183,7 @@ def _lines(
     bands: list[dict] = []
     for curve in curves:
         line = {
-            "label": curve.label,
+            "label": str(curve.label),
             "stroke": curve.colour,
             "width": curve.width,
             "points": {"show": False},

@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from inertial.rotation import to_matrix
 
@@ -16,8 +17,11 @@ def between(q: Any, p: Any) -> float:
     return math.atan2(float(np.linalg.norm(np.cross(down, other))), float(np.dot(down, other)))
 
 
-def horizon_svg(roll: float, pitch: float, stale: bool, size: int = 190) -> str:
-    """An artificial horizon: the aircraft's symbol stands, sky and ground move. Angles in rad."""
+def horizon_svg(roll: float, pitch: float, stale: bool, size: int = 190) -> Markup:
+    """An artificial horizon: the aircraft's symbol stands, sky and ground move. Angles in rad.
+
+    Only numbers and our own constants are written into it.
+    """
     r, per_degree = size / 2.0, size / 90.0
     lift = max(-89.0, min(89.0, math.degrees(pitch))) * per_degree
     ladder = "".join(
@@ -33,7 +37,7 @@ def horizon_svg(roll: float, pitch: float, stale: bool, size: int = 190) -> str:
         for a in (-60, -45, -30, -20, -10, 0, 10, 20, 30, 45, 60)
     )
     words = f"roll {math.degrees(roll):+.1f} degrees, pitch {math.degrees(pitch):+.1f} degrees"
-    return (
+    return Markup(
         f'<svg class="gf-horizon{" gf-stale" if stale else ""}" role="img" aria-label="artificial'
         f' horizon: {words}" width="{size}" height="{size}" viewBox="{-r} {-r} {size} {size}"'
         ' style="display:block;margin:6px auto"><defs><clipPath id="gf-h"><circle'

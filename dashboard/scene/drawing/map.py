@@ -6,7 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from dashboard.scene.drawing.palette import FIX, REJECTED, escape, truth_colour
+from dashboard.scene.drawing.page import Markup, joined, note, tag
+from dashboard.scene.drawing.palette import FIX, REJECTED, truth_colour
 
 WIDTH, HEIGHT, MARGIN = 360, 300, 14
 POINTS = 300  # of each line
@@ -25,7 +26,7 @@ def map_svg(
     rejected: np.ndarray,
     sigma: tuple[float, float] | None,
     dark: bool,
-) -> str:
+) -> Markup:
     """North up. ways: (title, colour, (n, 3) NED m), the first on top; fixes and rejected (n, 3)
     NED m.
 
@@ -41,7 +42,7 @@ def map_svg(
     )
     points = points[np.isfinite(points).all(axis=1)]
     if len(points) < 2:
-        return ""
+        return Markup()
     low, high = points.min(axis=0), points.max(axis=0)
     scale = min(
         (WIDTH - 2 * MARGIN) / max(high[1] - low[1], 5.0),
@@ -55,35 +56,34 @@ def map_svg(
         )
 
     ink = truth_colour(dark)
-    out = [
-        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" width="100%" role="img" aria-label="map of the way,'
-        ' north up">'
-    ]
+    out = []
     for group, colour, size in ((thin(fixes), FIX, 2.0), (thin(rejected), REJECTED, 3.2)):
         for x, y in at(group) if len(group) else ():
-            out.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{size}" fill="{colour}"/>')
+            out.append(tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=size, fill=colour))
     for _, colour, way in reversed(ways):
         line = " ".join(f"{x:.1f},{y:.1f}" for x, y in at(way))
-        out.append(f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="1.6"/>')
+        out.append(tag("polyline", points=line, fill="none", stroke=colour, stroke_width=1.6))
     if ways:
         x, y = at(ways[0][2][-1:])[0]
         if sigma is not None and np.isfinite(sigma).all():
             rx, ry = (min(3.0 * s * scale, 2.0 * WIDTH) for s in (sigma[1], sigma[0]))
-            out.append(
-                f'<ellipse cx="{x:.1f}" cy="{y:.1f}" rx="{rx:.1f}" ry="{ry:.1f}"'
-                f' fill="{ways[0][1]}" fill-opacity="0.2" stroke="{ways[0][1]}"/>'
-            )
-        out.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{ink}"/>')
+            size = {"rx": f"{rx:.1f}", "ry": f"{ry:.1f}"}
+            look = {"fill": ways[0][1], "fill_opacity": 0.2, "stroke": ways[0][1]}
+            out.append(tag("ellipse", cx=f"{x:.1f}", cy=f"{y:.1f}", **size, **look))
+        out.append(tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=4, fill=ink))
     bar = max((s for s in STEPS if s * scale < WIDTH / 3), default=1)
     y = HEIGHT - 8
-    out.append(f'<path d="M{MARGIN} {y}h{bar * scale:.1f}" stroke="{ink}" stroke-width="2"/>')
-    out.append(f'<text x="{MARGIN}" y="{y - 5}" font-size="11" fill="{ink}">{bar} m</text>')
-    out.append(f'<text x="{WIDTH - 22}" y="16" font-size="12" fill="{ink}">N ↑</text></svg>')
-    legend = "".join(
-        f'<span style="color:{colour}">━</span> {escape(title)} &nbsp; '
-        for title, colour, _ in ways
+    out += [
+        tag("path", d=f"M{MARGIN} {y}h{bar * scale:.1f}", stroke=ink, stroke_width=2),
+        tag("text", f"{bar} m", x=MARGIN, y=y - 5, font_size=11, fill=ink),
+        tag("text", "N ↑", x=WIDTH - 22, y=16, font_size=12, fill=ink),
+    ]
+    box = {"viewBox": f"0 0 {WIDTH} {HEIGHT}", "width": "100%", "role": "img"}
+    drawing = tag("svg", *out, aria_label="map of the way, north up", **box)
+    signs = [("━", colour, title) for title, colour, _ in ways]
+    signs += [("●", FIX, "fix"), ("●", REJECTED, "not believed")]
+    legend = (
+        joined([tag("span", sign, style=f"color:{colour}"), f" {title}"])
+        for sign, colour, title in signs
     )
-    return (
-        "".join(out) + f'<p class="gf-note">{legend}<span style="color:{FIX}">●</span> fix &nbsp; '
-        f'<span style="color:{REJECTED}">●</span> not believed</p>'
-    )
+    return drawing + note(joined(legend, " \u00a0 "))

@@ -2,11 +2,11 @@
 formats.
 """
 
-import html
 import math
 from collections.abc import Iterable
 
 from messages.contract import gyrofree_pb2 as pb
+from messages.text import plain
 
 ORANGE, SKY, GREEN, YELLOW = "#E69F00", "#56B4E9", "#009E73", "#F0E442"
 BLUE, VERMILLION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#8C8C8C"
@@ -68,10 +68,8 @@ def estimator_colour(name: str, among: Iterable[str] = ()) -> str:
 def estimator_title(name: str) -> str:
     """The estimator's name for people."""
     if name.startswith(GYRO_FREE):
-        return (
-            f"gyro-free, {_TITLES.get(name.removeprefix(GYRO_FREE), name.removeprefix(GYRO_FREE))}"
-        )
-    return _TITLES.get(name, name)
+        return f"gyro-free, {estimator_title(name.removeprefix(GYRO_FREE))}"
+    return _TITLES.get(name) or plain(name, 40)
 
 
 def rgb(colour: str) -> tuple[int, int, int]:
@@ -96,19 +94,6 @@ def number(value: float | None, digits: int = 1, unit: str = "", sign: bool = Fa
     value = round(value, digits) + 0.0  # + 0.0: no minus before a zero
     text = f"{value:{'+' if sign else ''},.{digits}f}".replace(",", "\u202f").replace("-", "\u2212")
     return f"{text} {unit}".rstrip()
-
-
-def escape(text: str) -> str:
-    """Text from outside, safe inside HTML."""
-    return html.escape(text, quote=True)
-
-
-def rows(items: Iterable[tuple[str, str]], stale: bool = False) -> str:
-    """A two-column table as HTML; values may carry markup, so callers escape what comes from
-    outside.
-    """
-    body = "".join(f"<tr><td>{label}</td><td>{value}</td></tr>" for label, value in items)
-    return f'<table class="gf-rows{" gf-stale" if stale else ""}">{body}</table>'
 
 
 def age(seconds: float) -> str:

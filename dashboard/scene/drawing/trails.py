@@ -34,6 +34,8 @@ class Trails:
                 self._track("/world/fixes/rejected", track, rgb(REJECTED), REJECTED_SIZE)
             else:
                 estimator = name.split("/", 1)[1]
+                if f"/world/estimate/{estimator}/body" not in self._nodes:
+                    continue  # one too many to be drawn
                 colour = rgb(estimator_colour(estimator, device.estimators("nav")))
                 self._track(f"/world/estimate/{estimator}/trajectory", track, colour)
 

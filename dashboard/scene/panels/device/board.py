@@ -7,10 +7,12 @@ import time
 
 import viser
 
-from dashboard.scene.drawing.palette import age, escape, number, rows
+from dashboard.scene.drawing.page import Markup, joined, note, rows, tag
+from dashboard.scene.drawing.palette import age, number
 from dashboard.scene.panels.base import Input, Panel, Snapshot
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
+from messages.text import plain
 
 log = logging.getLogger(__name__)
 
@@ -46,17 +48,16 @@ COUNTERS = (  # of STATUS, under the words that people read
 )
 
 
-def faults(found: list[pb.Fault], now_ns: int) -> str:
+def faults(found: list[pb.Fault], now_ns: int) -> Markup:
     """Faults as HTML: those present first, those gone greyed."""
     parts = []
     for fault in sorted(found, key=lambda fault: (not fault.active, -fault.since_utc_ns)):
         since = max(0.0, (now_ns - fault.since_utc_ns) / 1e9)
         when = f"for {age(since)}" if fault.active else f"began {age(since)} ago, over now"
         style = "gf-alert" if fault.active else "gf-note gf-stale"
-        parts.append(
-            f'<p class="{style}"><b>{escape(fault.name)}</b> {escape(fault.text)} · {when}</p>'
-        )
-    return "".join(parts)
+        words = f" {fault.text} · {when}"
+        parts.append(tag("p", tag("b", fault.name), words, class_=style))
+    return joined(parts)
 
 
 class Board(Panel):
@@ -97,16 +98,14 @@ class Board(Panel):
         self._device = s.device.name
         latest = s.device.get("board")
         if latest is None:
-            self._table = self.html(
-                '<p class="gf-note">The board has not said yet who it is.</p>', self._table
-            )
+            self._table = self.html(note("The board has not said yet who it is."), self._table)
             return
         m = latest.message
-        said = faults(list(m.faults), time.time_ns()) or '<p class="gf-note">✓ no faults</p>'
+        said = faults(list(m.faults), time.time_ns()) or note("✓ no faults")
         busy = number(m.status["cpu_permille"] / 10, 1, "%") if "cpu_permille" in m.status else "–"
         items = [
-            ("firmware", escape(m.firmware)),
-            ("serial number", escape(m.uid)),
+            ("firmware", m.firmware),
+            ("serial number", m.uid),
             ("axes · sample period", f"{m.axes} · {number(m.sample_period_s * 1e3, 3, 'ms')}"),
             ("processor busy", busy),
         ]
@@ -127,5 +126,5 @@ class Board(Panel):
             texts, good = [*texts, str(error)], False
         title = "Board" if good else "The board did not do it"
         self.client.add_notification(
-            title, " · ".join(texts), color="teal" if good else "red", auto_close_seconds=8.0
+            title, plain(" · ".join(texts)), color="teal" if good else "red", auto_close_seconds=8.0
         )

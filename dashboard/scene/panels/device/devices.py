@@ -2,6 +2,7 @@
 looks for first.
 """
 
+import math
 import re
 import time
 
@@ -9,16 +10,15 @@ import numpy as np
 
 from dashboard.data.pose import roll_pitch
 from dashboard.scene.drawing.geometry import MODES
+from dashboard.scene.drawing.page import Markup, alert, bad, joined, note, rows, tag
 from dashboard.scene.drawing.palette import (
     FIX,
     REFERENCE,
     SOURCES,
     age,
-    escape,
     estimator_colour,
     estimator_title,
     number,
-    rows,
 )
 from dashboard.scene.panels.base import DEG, Panel, Snapshot
 from messages.contract import gyrofree_pb2 as pb
@@ -46,21 +46,18 @@ class Devices(Panel):
 
     def waiting(self, text: str) -> None:
         """There is no device yet."""
-        badge = '<span class="gf-badge" style="background:#8C8C8C">WAITING</span>'
-        self._table = self.html(
-            f'<div class="gf-head">{badge}</div><p class="gf-note">{escape(text)}</p>', self._table
-        )
+        badge = tag("span", "WAITING", class_="gf-badge", style="background:#8C8C8C")
+        self._table = self.html(tag("div", badge, class_="gf-head") + note(text), self._table)
 
-    def _content(self, s: Snapshot) -> str:
+    def _content(self, s: Snapshot) -> Markup:
         device = s.device
         text, colour = SOURCES[self._source(s)]
         data = "imu" if device.is_vehicle else "accel"
         newest = device.get(data) or max(device.latest.values(), key=lambda latest: latest.arrived)
         state = self._state(s, newest.age(s.now))
-        head = (
-            f'<div class="gf-head"><span class="gf-badge" style="background:{colour}">{text}</span>'
-            f'<span class="gf-name">{escape(device.name)}</span>{state}</div>'
-        )
+        badge = tag("span", text, class_="gf-badge", style=f"background:{colour}")
+        name = tag("span", device.name, class_="gf-name")
+        head = tag("div", badge, name, state, class_="gf-head")
         body = {"nav": self._vehicle, "attitude": self._board, "rate": self._cube}[device.body](s)
         return (
             head
@@ -72,18 +69,18 @@ class Devices(Panel):
         )
 
     @staticmethod
-    def _state(s: Snapshot, old: float) -> str:
+    def _state(s: Snapshot, old: float) -> Markup:
         """Live, stale, or what the replay does that these data are of."""
         replay = s.store.replay.state(s.device.name, time.monotonic())
         if replay == "ended":
-            return '<b class="gf-bad">■ replay ended</b>'
+            return bad("■ replay ended")
         if replay == "paused":
-            return '<b class="gf-replay">❚❚ replay paused</b>'
+            return tag("b", "❚❚ replay paused", class_="gf-replay")
         if old >= 1.0:
-            return f'<b class="gf-bad">■ stale, {age(old)}</b>'
-        return (
-            '<b class="gf-replay">▶ replay</b>' if replay else '<span class="gf-live">● live</span>'
-        )
+            return bad(f"■ stale, {age(old)}")
+        if replay:
+            return tag("b", "▶ replay", class_="gf-replay")
+        return tag("span", "● live", class_="gf-live")
 
     @staticmethod
     def _source(s: Snapshot) -> int:
@@ -94,7 +91,7 @@ class Devices(Panel):
         return pb.SOURCE_UNKNOWN
 
     @staticmethod
-    def _cube(s: Snapshot) -> str:
+    def _cube(s: Snapshot) -> Markup:
         tiles = []
         for name in s.device.estimators("rate"):
             m = rates.row(s.device.get("rate", name).message, -1)
@@ -115,14 +112,14 @@ class Devices(Panel):
                     stale,
                 )
             )
-        return f'<div class="gf-tiles">{"".join(tiles)}</div>'
+        return tag("div", *tiles, class_="gf-tiles")
 
     @staticmethod
-    def _vehicle(s: Snapshot) -> str:
+    def _vehicle(s: Snapshot) -> Markup:
         tiles = []
         for name in s.device.estimators("nav"):
             m = s.device.get("nav", name).message
-            speed = float(np.linalg.norm(m.v_n_mps)) * 3.6 if len(m.v_n_mps) == 3 else None
+            speed = float(np.hypot(*m.v_n_mps[:2])) * 3.6 if len(m.v_n_mps) == 3 else None
             sigma = float(np.hypot(m.sigma[6], m.sigma[7])) if len(m.sigma) >= 8 else None
             sub = f"{MODES.get(m.mode, '')} · 1σ {number(sigma, 2, 'm')}"
             tiles.append(_tile(s, name, "nav", number(speed, 1), "km/h", sub))
@@ -134,12 +131,16 @@ class Devices(Panel):
                 .replace("_", " ")
                 .lower()
             )
+            if fix.message.quality and math.isnan(fix.message.height_m):
+                quality += " · no height"
+            if fix.message.quality and not fix.message.v_n_mps:
+                quality += " · no velocity"
             satellites = str(fix.message.satellites) if fix.message.satellites else "–"
             tiles.append(_raw_tile("GNSS", FIX, satellites, "satellites", quality, s.stale("gnss")))
-        return f'<div class="gf-tiles">{"".join(tiles)}</div>'
+        return tag("div", *tiles, class_="gf-tiles")
 
     @staticmethod
-    def _board(s: Snapshot) -> str:
+    def _board(s: Snapshot) -> Markup:
         tiles = []
         for name in s.device.estimators("attitude"):
             roll, pitch = (
@@ -147,10 +148,10 @@ class Devices(Panel):
                 for angle in roll_pitch(s.device.get("attitude", name).message.q_nb)
             )
             tiles.append(_tile(s, name, "attitude", f"{roll} / {pitch}", "°", "roll / pitch"))
-        return f'<div class="gf-tiles">{"".join(tiles)}</div>'
+        return tag("div", *tiles, class_="gf-tiles")
 
     @staticmethod
-    def _alerts(s: Snapshot) -> str:
+    def _alerts(s: Snapshot) -> Markup:
         found = [s.device.get("link")] + [
             s.device.get("estimator", n) for n in s.device.estimators("estimator")
         ]
@@ -168,20 +169,21 @@ class Devices(Panel):
         if s.store.dropped:
             texts.append(f"the dashboard could not keep up: {s.store.dropped} messages not shown")
         if s.store.refused:
-            texts.append(f"{s.store.refused} messages of too many or nameless devices not shown")
-        return "".join(f'<p class="gf-alert">{escape(text)}</p>' for text in texts)
+            kinds = ", ".join(f"{kind} {n}" for kind, n in sorted(s.store.door.counts().items()))
+            texts.append(f"{s.store.refused} messages refused and not shown ({kinds}): see the log")
+        return joined(alert(text) for text in texts)
 
     @staticmethod
-    def _health(s: Snapshot) -> list[tuple[str, str]]:
-        items = []
+    def _health(s: Snapshot) -> list[tuple[str, object]]:
+        items: list[tuple[str, object]] = []
         link, board, accel = s.device.get("link"), s.device.get("board"), s.device.get("accel")
         if link is not None:
             m = link.message
-            lost = f'<b class="gf-bad">{m.lost_samples}</b>' if m.lost_samples else "0"
+            lost = bad(m.lost_samples) if m.lost_samples else "0"
             items += [
-                ("link", "connected" if m.connected else '<b class="gf-bad">not connected</b>'),
+                ("link", "connected" if m.connected else bad("not connected")),
                 ("sample rate", number(m.sample_rate_hz, 1, "Hz")),
-                ("lost · bad bytes", f"{lost} · {m.bad_bytes}"),
+                ("lost · bad bytes", joined([lost, f" · {m.bad_bytes}"])),
                 ("latency p99", number(m.latency_p99_s * 1e3, 2, "ms")),
                 ("clock skew", number(m.clock_skew_ppm, 1, "ppm", sign=True)),
             ]
@@ -193,53 +195,46 @@ class Devices(Panel):
         for name in s.device.estimators("estimator"):
             m = s.device.get("estimator", name).message
             if s.stale("estimator", name):
-                items.append((estimator_title(name), '<b class="gf-bad">silent</b>'))
+                items.append((estimator_title(name), bad("silent")))
                 continue
             state = m.state.partition(":")[
                 0
             ]  # what a person should do stands after the colon, see _advice
-            items.append(
-                (estimator_title(name), f"{escape(state)} · {number(m.us_per_sample, 0, 'µs')}")
-            )
+            items.append((estimator_title(name), f"{state} · {number(m.us_per_sample, 0, 'µs')}"))
             items += [
                 (f"fixes {what}", number(count, 0))
                 for what, count in (counts(m.message) or {}).items()
             ]
         if board is not None:
-            items.append(("firmware", escape(board.message.firmware)))
+            items.append(("firmware", board.message.firmware))
         return items
 
     @staticmethod
-    def _advice(s: Snapshot) -> str:
+    def _advice(s: Snapshot) -> Markup:
         """What an estimator waits for the person to do, such as 'levelling: stand still for 10
         s'.
         """
         states = [
             s.device.get("estimator", n).message.state for n in s.device.estimators("estimator")
         ]
-        return "".join(
-            f'<p class="gf-note">{escape(text)}</p>'
-            for text in dict.fromkeys(states)
-            if ":" in text
-        )
+        return joined(note(text) for text in dict.fromkeys(states) if ":" in text)
 
     @staticmethod
-    def _logs(s: Snapshot) -> str:
+    def _logs(s: Snapshot) -> Markup:
         lines = [
             text
             for arrived, name, text in s.store.logs
             if name == s.device.name and s.now - arrived < 60
         ][-2:]
-        return "".join(f'<p class="gf-note">{escape(text)}</p>' for text in lines)
+        return joined(note(text) for text in lines)
 
 
-def _tile(s: Snapshot, name: str, topic: str, value: str, unit: str, sub: str) -> str:
+def _tile(s: Snapshot, name: str, topic: str, value: str, unit: str, sub: str) -> Markup:
     colour = estimator_colour(name, s.device.estimators(topic))
     return _raw_tile(estimator_title(name), colour, value, unit, sub, s.stale(topic, name))
 
 
-def _raw_tile(title: str, colour: str, value: str, unit: str, sub: str, stale: bool) -> str:
-    return (
-        f'<div class="gf-tile{" gf-stale" if stale else ""}" style="border-left-color:{colour}">'
-        f"<span>{title}</span><b>{value}</b> <em>{unit}</em><small>{sub}</small></div>"
-    )
+def _raw_tile(title: str, colour: str, value: str, unit: str, sub: str, stale: bool) -> Markup:
+    inside = [tag("span", title), tag("b", value), " ", tag("em", unit), tag("small", sub)]
+    kind = "gf-tile gf-stale" if stale else "gf-tile"
+    return tag("div", *inside, class_=kind, style=f"border-left-color:{colour}")

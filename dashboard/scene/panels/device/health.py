@@ -3,7 +3,8 @@ does not.
 """
 
 from dashboard.scene.drawing.axis_arrows import BAD, residual_colour
-from dashboard.scene.drawing.palette import age, escape, number
+from dashboard.scene.drawing.page import Markup, alert, bad, joined, note, tag
+from dashboard.scene.drawing.palette import age, number
 from dashboard.scene.panels.base import Panel, Snapshot
 from messages.contract import gyrofree_pb2 as pb
 
@@ -18,6 +19,7 @@ WORDS = {
     pb.AxisHealth.STATE_STALE: "not fresh",
     pb.AxisHealth.STATE_SUSPECT: "suspect",
 }
+MOST = 64  # axes in the table
 FULL = 2.0 * BAD  # sigmas that fill a bar
 
 
@@ -34,50 +36,40 @@ class Health(Panel):
                 "No axis health: this device has no accelerometer axes, or its estimator has not"
                 " spoken yet."
             )
-            self._table = self.html(f'<p class="gf-note">{text}</p>', self._table)
+            self._table = self.html(note(text), self._table)
             return
         m = latest.message
-        alert = f'<p class="gf-alert">{escape(m.message)}</p>' if m.message else ""
         used = sum(not axis.excluded for axis in m.axes)
         ratio = number(m.chi2, 1) if m.dof else "–"
-        head = (
-            f'<p class="gf-title">{escape(m.layout)}: {used} of {len(m.axes)} axes in use · '
-            f"χ² {ratio}, {m.dof} conditions</p>"
-        )
-        body = "".join(_row(axis, m.header.utc_ns) for axis in m.axes)
-        stale = " gf-stale" if s.stale("axes") else ""
-        note = (
-            '<p class="gf-note">Bar: residual against the other axes over its σ, full at 8 σ; gate'
-            " at 4 σ.</p>"
-        )
-        table = f'<table class="gf-rows{stale}">{_HEAD}{body}</table>'
-        self._table = self.html(alert + head + table + note, self._table)
+        words = f"{m.layout}: {used} of {len(m.axes)} axes in use · χ² {ratio}, {m.dof} conditions"
+        body = (_row(axis, m.header.utc_ns) for axis in m.axes[:MOST])
+        kind = "gf-rows gf-stale" if s.stale("axes") else "gf-rows"
+        table = tag("table", _HEAD, *body, class_=kind)
+        more = note(f"and {len(m.axes) - MOST} axes more") if len(m.axes) > MOST else ""
+        bar = note("Bar: residual against the other axes over its σ, full at 8 σ; gate at 4 σ.")
+        parts = [alert(m.message), tag("p", words, class_="gf-title"), table, more, bar]
+        self._table = self.html(joined(parts), self._table)
 
 
-_HEAD = "<tr><td><b>axis</b></td><td>state</td><td>residual, m/s²</td><td></td><td>since</td></tr>"
+_HEAD = Markup(
+    "<tr><td><b>axis</b></td><td>state</td><td>residual, m/s²</td><td></td><td>since</td></tr>"
+)
 
 
-def _row(axis: pb.AxisHealth.Axis, now_ns: int) -> str:
+def _row(axis: pb.AxisHealth.Axis, now_ns: int) -> Markup:
     colour = residual_colour(axis)
     sigma = axis.residual_sigma_mps2
     ratio = abs(axis.residual_mps2) / sigma if sigma > 0.0 else 0.0
-    width = round(100.0 * min(ratio / FULL, 1.0))
-    bar = (
-        '<div style="width:64px;height:8px;border:1px solid #8C8C8C;border-radius:2px">'
-        f'<div style="width:{width}%;height:100%;background:{colour}"></div></div>'
-    )
+    width = round(100.0 * min(ratio / FULL, 1.0)) if ratio == ratio else 0
+    filled = tag("div", style=f"width:{width}%;height:100%;background:{colour}")
+    frame = "width:64px;height:8px;border:1px solid #8C8C8C;border-radius:2px"
+    bar = tag("div", filled, style=frame)
     word = WORDS.get(axis.state, "unknown")
     good = axis.state == pb.AxisHealth.STATE_GOOD
-    state = word if good else f'<b class="gf-bad">{word}{", not used" if axis.excluded else ""}</b>'
+    state = word if good else bad(word, ", not used" if axis.excluded else "")
     since = "" if good else age(max(0.0, (now_ns - axis.since_utc_ns) * 1e-9))
     residual = number(axis.residual_mps2, 3, sign=True)
-    row = (
-        f"<tr><td>{escape(axis.name)}</td><td>{state}</td><td>{residual}</td>"
-        f"<td>{bar}</td><td>{since}</td></tr>"
-    )
-    text = (
-        f'<tr><td></td><td colspan="4"><small>{escape(axis.text)}</small></td></tr>'
-        if axis.text
-        else ""
-    )
-    return row + text
+    row = tag("tr", *(tag("td", cell) for cell in (axis.name, state, residual, bar, since)))
+    if not axis.text:
+        return row
+    return row + tag("tr", tag("td"), tag("td", tag("small", axis.text), colspan=4))

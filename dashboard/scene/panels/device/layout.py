@@ -9,7 +9,8 @@ import numpy as np
 import viser
 
 from dashboard.scene.drawing import geometry as geo
-from dashboard.scene.drawing.palette import GREY, ORANGE, SKY, number, rgb, rows
+from dashboard.scene.drawing.page import EMPTY, Markup, html, joined, note, rows, tag
+from dashboard.scene.drawing.palette import GREY, ORANGE, SKY, number, rgb
 from dashboard.scene.panels.base import DEG, Panel, Snapshot
 from inertial.constants import MILLI_G
 from inertial.layouts import catalogue
@@ -192,16 +193,20 @@ class LayoutBench(Panel):
         )
 
 
-def figures(q: Quality, cube: Quality) -> str:
+def figures(q: Quality, cube: Quality) -> Markup:
     """The figures of a layout beside the cube's, as HTML."""
 
-    def pair(a: float, b: float, digits: int, unit: str = "") -> str:
-        return f"{number(a, digits, unit)} <small>(cube {number(b, digits)})</small>"
+    def pair(a: float, b: float, digits: int, unit: str = "") -> Markup:
+        beside = tag("small", f"(cube {number(b, digits)})")
+        return joined([number(a, digits, unit), " ", beside])
 
     feedback = {(0, 0): "none", (1, 0): "in ω′", (0, 1): "in p", (1, 1): "in ω′ and p"}
-    seen = " ".join(
-        f'<span style="white-space:nowrap">{MARKS[g]} {n}</span>'
-        for n, g in zip(UNKNOWNS, q.seen, strict=True)
+    seen = joined(
+        (
+            tag("span", MARKS[g], " ", html(n), style="white-space:nowrap")
+            for n, g in zip(UNKNOWNS, q.seen, strict=True)
+        ),
+        " ",
     )
     items = [
         ("κ", pair(q.kappa, cube.kappa, 3)),
@@ -235,13 +240,8 @@ def figures(q: Quality, cube: Quality) -> str:
             pair(float(q.sigma_rate.max()) * DEG, float(cube.sigma_rate.max()) * DEG, 2, "°/s"),
         ),
     ]
-    note = (
-        '<p class="gf-note">● seen ◐ weak ○ not seen alone. Orange: how noise of ω′ spreads over'
-        " its directions.</p>"
+    mixed = note(f"Of the products only: {', '.join(q.mixtures)}") if q.mixtures else EMPTY
+    legend = note(
+        "● seen ◐ weak ○ not seen alone. Orange: how noise of ω′ spreads over its directions."
     )
-    mixed = (
-        f'<p class="gf-note">Of the products only: {", ".join(q.mixtures)}</p>'
-        if q.mixtures
-        else ""
-    )
-    return rows(items) + f"<p>{seen}</p>" + mixed + note
+    return rows(items) + tag("p", seen) + mixed + legend

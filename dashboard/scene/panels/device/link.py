@@ -2,8 +2,11 @@
 were bad.
 """
 
-from dashboard.scene.drawing.palette import escape, number, rows
+from dashboard.scene.drawing.page import alert, bad, note, rows, tag
+from dashboard.scene.drawing.palette import number
 from dashboard.scene.panels.base import Panel, Snapshot
+
+MOST = 30  # reasons in the table
 
 
 class Link(Panel):
@@ -15,14 +18,13 @@ class Link(Panel):
     def update(self, s: Snapshot) -> None:
         latest = s.device.get("link")
         if latest is None:
-            self._table = self.html(
-                '<p class="gf-note">The gateway has not spoken of this line yet.</p>', self._table
-            )
+            text = "The gateway has not spoken of this line yet."
+            self._table = self.html(note(text), self._table)
             return
         m = latest.message
         items = [
-            ("state", "connected" if m.connected else '<b class="gf-bad">not connected</b>'),
-            ("port", escape(m.port)),
+            ("state", "connected" if m.connected else bad("not connected")),
+            ("port", m.port),
             ("samples", number(m.sample_rate_hz, 1, "Hz")),
             ("frames", number(m.frame_rate_hz, 1, "Hz")),
             (
@@ -47,15 +49,14 @@ class Link(Panel):
             ("GNSS good · bad", f"{m.gnss_good} · {m.gnss_bad}"),
         ]
         content = rows(items, s.stale("link"))
-        if m.damage:
-            reasons = sorted(m.damage.items(), key=lambda item: -item[1])
-            content += '<p class="gf-title">Damage by reason</p>'
-            content += rows([(escape(reason), number(count, 0)) for reason, count in reasons])
-        if m.message:
-            content = f'<p class="gf-alert">{escape(m.message)}</p>' + content
-        self._table = self.html(content, self._table)
+        for title, counts in (("Left out, by reason", m.refused), ("Damage by reason", m.damage)):
+            if counts:
+                reasons = sorted(counts.items(), key=lambda item: -item[1])[:MOST]
+                content += tag("p", title, class_="gf-title")
+                content += rows([(reason, number(count, 0)) for reason, count in reasons])
+        self._table = self.html(alert(m.message) + content, self._table)
 
 
-def _count(value: int, after: str = "") -> str:
+def _count(value: int, after: str = "") -> object:
     text = number(value, 0) + after
-    return f'<b class="gf-bad">{text}</b>' if value else text
+    return bad(text) if value else text

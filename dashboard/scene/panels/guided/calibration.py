@@ -5,7 +5,8 @@ for operators.
 import numpy as np
 import viser
 
-from dashboard.scene.drawing.palette import AXES, GREEN, escape, number, rgba, rows
+from dashboard.scene.drawing.page import EMPTY, Markup, joined, note, rows, tag
+from dashboard.scene.drawing.palette import AXES, GREEN, number, rgba
 from dashboard.scene.panels.base import Snapshot
 from dashboard.scene.panels.guided.guided import Guided, guidance, head, silent
 from dashboard.scene.panels.guided.solid import Camera
@@ -73,15 +74,15 @@ class Calibration(Guided):
         self.order_estimator("Calibration", command)
 
 
-def content(m: pb.CalibrationStatus, gone: bool, dark: bool, card: str) -> str:
+def content(m: pb.CalibrationStatus, gone: bool, dark: bool, card: str) -> Markup:
     """The panel's HTML."""
-    items = [("card in use", escape(card) if card else "none: nominal scale and positions")]
+    items = [("card in use", card if card else "none: nominal scale and positions")]
     if m.state == STATE.STATE_IDLE:
         text = (
             "Set the body down in nine and more poses, let go each time; the page says which one"
             " next."
         )
-        return f'<p class="gf-note">{text}</p>' + rows(items)
+        return note(text) + rows(items)
     if m.bias_sigma_mps2:
         items += [
             ("bias known to", number(max(m.bias_sigma_mps2) / MILLI_G, 2, "mg")),
@@ -89,14 +90,18 @@ def content(m: pb.CalibrationStatus, gone: bool, dark: bool, card: str) -> str:
             ("residual of the fit", number(m.residual_mps2 / MILLI_G, 2, "mg")),
         ]
     if m.card:
-        items.append(("saved as", escape(m.card)))
-    good = f'<b style="color:{GREEN}">✓ good enough</b>' if m.good_enough else "not yet good enough"
-    first = head(STATES.get(m.state, ""), f"{len(m.poses)} poses · {good}", gone)
+        items.append(("saved as", m.card))
+    good = (
+        tag("b", "✓ good enough", style=f"color:{GREEN}")
+        if m.good_enough
+        else "not yet good enough"
+    )
+    first = head(STATES.get(m.state, ""), joined([f"{len(m.poses)} poses · ", good]), gone)
     wanted = np.array(m.next_up_b) if len(m.next_up_b) == 3 else None
     shown = wanted if m.state in (STATE.STATE_WAITING, STATE.STATE_FITTED) else None
     if m.state == STATE.STATE_TAKING and wanted is not None:
         shown = wanted
-    drawing = picture(shown, dark) if shown is not None else ""
+    drawing = picture(shown, dark) if shown is not None else EMPTY
     return first + guidance(m.instruction, drawing, m.progress, m.message) + rows(items, stale=gone)
 
 
@@ -127,7 +132,7 @@ def facing(up_b: np.ndarray, camera: np.ndarray) -> np.ndarray:
     return turned(max(range(24), key=seen))
 
 
-def picture(up_b: np.ndarray, dark: bool) -> str:
+def picture(up_b: np.ndarray, dark: bool) -> Markup:
     """The cube as it should stand, an arrow up, as SVG: visible faces with the names of their
     axes.
     """
@@ -138,22 +143,23 @@ def picture(up_b: np.ndarray, dark: bool) -> str:
         float((R @ np.array([x, y, z]))[2]) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)
     )
     x, y = camera.screen(np.array([0.0, 0.0, lowest]))
-    parts = [f'<ellipse cx="{x:.0f}" cy="{y:.0f}" rx="92" ry="30" fill="rgba(128,128,128,.22)"/>']
+    shadow = {"rx": 92, "ry": 30, "fill": "rgba(128,128,128,.22)"}
+    parts = [tag("ellipse", cx=f"{x:.0f}", cy=f"{y:.0f}", **shadow)]
+    edge = {"stroke": line, "stroke_width": 1.5, "stroke_linejoin": "round"}
+    word = {"text_anchor": "middle", "font_size": 16, "font_weight": 700, "fill": "#000"}
     for face in camera.faces(R, np.ones(3)):
         u, v = face.middle
-        parts.append(
-            f'<polygon points="{face.points}" fill="{rgba(AXES[face.axis], 0.85)}" stroke="{line}"'
-            f' stroke-width="1.5" stroke-linejoin="round"/><text x="{u:.0f}" y="{v + 5:.0f}"'
-            ' text-anchor="middle" font-size="16" font-weight="700"'
-            f' fill="#000">{"+" if face.sign > 0 else "−"}{"xyz"[face.axis]}</text>'
-        )
+        name = f"{'+' if face.sign > 0 else '−'}{'xyz'[face.axis]}"
+        parts += [
+            tag("polygon", points=face.points, fill=rgba(AXES[face.axis], 0.85), **edge),
+            tag("text", name, x=f"{u:.0f}", y=f"{v + 5:.0f}", **word),
+        ]
     x, tip = 206.0, 40.0
-    parts.append(
-        f'<path d="M{x},150 V{tip + 12} M{x - 8},{tip + 14} L{x},{tip} L{x + 8},{tip + 14}"'
-        f' fill="none" stroke="{line}" stroke-width="4" stroke-linecap="round"/><text x="{x}"'
-        f' y="172" text-anchor="middle" font-size="13" fill="{line}">up</text>'
-    )
-    return (
-        '<svg class="gf-pose" viewBox="0 0 230 210" width="230" height="210" role="img" '
-        f'style="display:block;margin:.2em auto">{"".join(parts)}</svg>'
-    )
+    way = f"M{x},150 V{tip + 12} M{x - 8},{tip + 14} L{x},{tip} L{x + 8},{tip + 14}"
+    parts += [
+        tag("path", d=way, fill="none", stroke=line, stroke_width=4, stroke_linecap="round"),
+        tag("text", "up", x=x, y=172, text_anchor="middle", font_size=13, fill=line),
+    ]
+    style = "display:block;margin:.2em auto"
+    box = {"viewBox": "0 0 230 210", "width": 230, "height": 210}
+    return tag("svg", *parts, class_="gf-pose", role="img", style=style, **box)

@@ -6,7 +6,8 @@ from typing import Any
 
 import viser
 
-from dashboard.scene.drawing.palette import GREEN, escape
+from dashboard.scene.drawing.page import EMPTY, Markup, alert, note, tag
+from dashboard.scene.drawing.palette import GREEN
 from dashboard.scene.panels.base import Input, Panel, Snapshot
 
 GONE_S = 3.0  # s without a word of a running guidance
@@ -44,9 +45,9 @@ class Guided(Panel):
             if button.visible != (action in actions):
                 button.visible = action in actions
 
-    def _not_here(self, note: str) -> None:
+    def _not_here(self, text: str) -> None:
         """This device has nothing to guide."""
-        self._status = self.html(f'<p class="gf-note">{note}</p>', self._status)
+        self._status = self.html(note(text), self._status)
         self._show(set())
 
     def _order(self, action: int) -> None:
@@ -60,26 +61,18 @@ def silent(s: Snapshot, topic: str, running: bool) -> bool:
     return running and latest is not None and latest.age(s.now) > GONE_S
 
 
-def head(state: str, detail: str, gone: bool) -> str:
+def head(state: str, detail: str, gone: bool) -> Markup:
     """The first line: state and counts, with an alarm above when the estimator is silent."""
-    alarm = '<p class="gf-alert">the estimator is silent: does it still run?</p>' if gone else ""
-    return (
-        f'{alarm}<div class="gf-head"><span'
-        f' class="gf-name">{state}</span><span>{detail}</span></div>'
-    )
+    alarm = alert("the estimator is silent: does it still run?") if gone else EMPTY
+    words = tag("span", state, class_="gf-name"), tag("span", detail)
+    return alarm + tag("div", *words, class_="gf-head")
 
 
-def guidance(instruction: str, drawing: str, progress: float, message: str) -> str:
+def guidance(instruction: str, drawing: Markup, progress: float, message: str) -> Markup:
     """What to do, as words and picture, how far it has come (0 to 1), and what was said last."""
-    lead = (
-        f'<p style="margin:.2em .75em;font-size:1.15em;font-weight:600">{escape(instruction)}</p>'
-    )
-    bar = (
-        '<div style="margin:.3em'
-        ' .75em;height:.5em;border-radius:.25em;background:rgba(128,128,128,.25)">'
-        "<div"
-        f' style="height:100%;border-radius:.25em;width:{100 * min(max(progress, 0.0), 1.0):.0f}%;'
-        f'background:{GREEN}"></div></div>'
-    )
-    said = f'<p class="gf-note">{escape(message)}</p>' if message else ""
-    return lead + drawing + bar + said
+    lead = tag("p", instruction, style="margin:.2em .75em;font-size:1.15em;font-weight:600")
+    share = min(max(progress, 0.0), 1.0) if progress == progress else 0.0
+    round_ = "height:100%;border-radius:.25em"
+    done = tag("div", style=f"{round_};width:{100 * share:.0f}%;background:{GREEN}")
+    around = "margin:.3em .75em;height:.5em;border-radius:.25em;background:rgba(128,128,128,.25)"
+    return lead + drawing + tag("div", done, style=around) + note(message)

@@ -6,7 +6,8 @@ import numpy as np
 import viser
 from scipy.spatial.transform import Rotation
 
-from dashboard.scene.drawing.palette import AXES, GREEN, VERMILLION, escape, number, rgba, rows
+from dashboard.scene.drawing.page import EMPTY, Markup, joined, note, rows, tag
+from dashboard.scene.drawing.palette import AXES, GREEN, GREY, VERMILLION, number, rgba
 from dashboard.scene.panels.base import DEG, Snapshot
 from dashboard.scene.panels.guided.guided import Guided, guidance, head, silent
 from dashboard.scene.panels.guided.solid import Camera
@@ -71,26 +72,26 @@ class Wiring(Guided):
         self.order_estimator("Wiring", pb.EstimatorCommand(action=action, device=self._device))
 
 
-def content(m: pb.WiringStatus, gone: bool, dark: bool) -> str:
+def content(m: pb.WiringStatus, gone: bool, dark: bool) -> Markup:
     """The panel's HTML."""
-    used = [("axis map in use", escape(m.map) if m.map else "none: the board's own axes")]
+    used = [("axis map in use", m.map if m.map else "none: the board's own axes")]
     if m.state == STATUS.STATE_IDLE:
         text = (
             "Which input is which axis, and with which sign: tip the board nose up, right side down"
             " and turn it to the right, each time from level; this page says when. What is found"
             " can be saved and is used at once."
         )
-        return f'<p class="gf-note">{text}</p>' + rows(used)
+        return note(text) + rows(used)
     first = head(
         STATES.get(m.state, ""),
         f"{len(m.turns)} turns · {_found(m)} of {len(m.inputs)} inputs known",
         gone,
     )
     drawing = (
-        picture(m.pose, dark) if m.state in (STATUS.STATE_WAITING, STATUS.STATE_MOVING) else ""
+        picture(m.pose, dark) if m.state in (STATUS.STATE_WAITING, STATUS.STATE_MOVING) else EMPTY
     )
     saved = m.state == STATUS.STATE_SAVED
-    todo = "" if saved else guidance(m.instruction, drawing, m.progress, m.message)
+    todo = EMPTY if saved else guidance(m.instruction, drawing, m.progress, m.message)
     return first + todo + _inputs(m, gone) + _turns(m) + rows(used)
 
 
@@ -98,22 +99,22 @@ def _found(m: pb.WiringStatus) -> int:
     return sum(bool(one.axis) for one in m.inputs)
 
 
-def _inputs(m: pb.WiringStatus, stale: bool) -> str:
+def _inputs(m: pb.WiringStatus, stale: bool) -> Markup:
     """What every input reads now and what it was found to be."""
     items = []
     for one in m.inputs:
         digits = 3 if one.unit == "V" else 1
-        found = '<span style="opacity:.6">unused</span>' if one.unused else "–"
+        found: object = tag("span", "unused", style="opacity:.6") if one.unused else "–"
         if one.axis:
-            colour = AXES["xyz".index(one.axis[-1])]
-            found = (
-                f'<b style="color:{colour}">■</b> {"−" if one.inverted else "+"} {escape(one.axis)}'
-            )
-        items.append((escape(one.name), f"{number(one.reading, digits, one.unit)} &nbsp; {found}"))
+            axis = "xyz".find(one.axis[-1])  # -1 is grey: an estimator of another version
+            mark = tag("b", "■", style=f"color:{(*AXES, GREY)[axis]}")
+            found = joined([mark, " −" if one.inverted else " +", f" {one.axis}"])
+        reading = number(one.reading, digits, one.unit)
+        items.append((one.name, joined([reading, "\u00a0 ", found])))
     return rows(items, stale)
 
 
-def _turns(m: pb.WiringStatus) -> str:
+def _turns(m: pb.WiringStatus) -> Markup:
     """The same angle by both sensors: a wrong sensitivity is seen here."""
     items = []
     for turn in m.turns:
@@ -125,35 +126,39 @@ def _turns(m: pb.WiringStatus) -> str:
             turn.by_force_rad == turn.by_force_rad
             and abs(turn.by_rate_rad / (turn.by_force_rad or 1.0) - 1.0) > 0.15
         )
-        mark = f' <b style="color:{VERMILLION}">≠</b> ' if off else " · "
-        items.append(
-            (f"turn about {escape(turn.about)}: gyro · accelerometer", by_rate + mark + by_force)
-        )
-    return rows(items) if items else ""
+        mark = tag("b", " ≠ ", style=f"color:{VERMILLION}") if off else " · "
+        both = joined([by_rate, mark, by_force])
+        items.append((f"turn about {turn.about}: gyro · accelerometer", both))
+    return rows(items) if items else EMPTY
 
 
-def picture(pose: int, dark: bool) -> str:
+def picture(pose: int, dark: bool) -> Markup:
     """The board level, an arrow, and as it should lie, as SVG; only level where that is wanted."""
     line = "#e8e8e8" if dark else "#333333"
     if pose == STATUS.POSE_LEVEL:
         inner = _board(np.eye(3), 170.0, line)
     else:
-        arrow = (
-            f'<path d="M152,82 H184 M174,72 L186,82 L174,92" fill="none" stroke="{line}"'
-            ' stroke-width="3" stroke-linecap="round"/>'
-        )
+        way = "M152,82 H184 M174,72 L186,82 L174,92"
+        ink = {"stroke": line, "stroke_width": 3, "stroke_linecap": "round"}
+        arrow = tag("path", d=way, fill="none", **ink)
         inner = (
             _board(np.eye(3), 78.0, line)
             + arrow
             + _board(Rotation.from_rotvec(TURNS[pose]).as_matrix(), 264.0, line)
         )
-    return (
-        '<svg class="gf-pose" viewBox="0 0 352 160" width="100%" role="img" aria-label="the board'
-        f' as it should lie" style="display:block;margin:.2em auto;max-width:420px">{inner}</svg>'
+    return tag(
+        "svg",
+        inner,
+        class_="gf-pose",
+        viewBox="0 0 352 160",
+        width="100%",
+        role="img",
+        aria_label="the board as it should lie",
+        style="display:block;margin:.2em auto;max-width:420px",
     )
 
 
-def _board(R: np.ndarray, middle: float, line: str) -> str:
+def _board(R: np.ndarray, middle: float, line: str) -> Markup:
     """A flat board with its nose marked, at the horizontal place `middle` of the picture; R turns b
     into n.
     """
@@ -163,16 +168,13 @@ def _board(R: np.ndarray, middle: float, line: str) -> str:
         shade = {(2, -1.0): rgba(GREEN, 0.85), (2, 1.0): "rgba(128,128,128,.85)"}.get(
             (face.axis, face.sign), rgba(GREEN, 0.5)
         )
-        edge = f'stroke="{line}" stroke-width="1.5" stroke-linejoin="round"'
-        parts.append(f'<polygon points="{face.points}" fill="{shade}" {edge}/>')
+        edge = {"stroke": line, "stroke_width": 1.5, "stroke_linejoin": "round"}
+        parts.append(tag("polygon", points=face.points, fill=shade, **edge))
     screen = camera.screen
     nose = [screen(R @ np.array(p)) for p in ((1.6, 0.0, 0.0), (1.2, 0.28, 0.0), (1.2, -0.28, 0.0))]
-    parts.append(
-        f'<polygon points="{" ".join(f"{u:.1f},{v:.1f}" for u, v in nose)}" fill="{AXES[0]}"/>'
-    )
+    corners = " ".join(f"{u:.1f},{v:.1f}" for u, v in nose)
+    parts.append(tag("polygon", points=corners, fill=AXES[0]))
     u, v = screen(R @ np.array([1.75, 0.0, 0.0]))
-    parts.append(
-        f'<text x="{u:.0f}" y="{v:.0f}" text-anchor="middle" font-size="12"'
-        f' fill="{line}">nose</text>'
-    )
-    return "".join(parts)
+    word = {"text_anchor": "middle", "font_size": 12, "fill": line}
+    parts.append(tag("text", "nose", x=f"{u:.0f}", y=f"{v:.0f}", **word))
+    return joined(parts)

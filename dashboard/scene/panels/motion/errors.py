@@ -5,7 +5,8 @@ unseen fixes.
 import numpy as np
 
 from dashboard.scene.drawing.chart import Curve
-from dashboard.scene.drawing.palette import AXES, estimator_title, number, rows
+from dashboard.scene.drawing.page import joined, note, rows, sub
+from dashboard.scene.drawing.palette import AXES, estimator_title, number
 from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
 
 
@@ -42,7 +43,7 @@ class Errors(Panel):
                 ):  # it would be scored by its own aid
                     rms.append(
                         (
-                            f"RMS ω<sub>{axis}</sub>, {estimator_title(name)}",
+                            joined(["RMS ", sub("ω", axis), ", ", estimator_title(name)]),
                             "aided by the tachometer",
                         )
                     )
@@ -63,13 +64,15 @@ class Errors(Panel):
                 curves.append(curve)
                 if len(error):
                     value = number(float(np.sqrt(np.nanmean(error**2))), 2, "°/s")
-                    rms.append((f"RMS ω<sub>{axis}</sub>, {estimator_title(name)}", value))
-            title = f"Error of ω<sub>{axis}</sub> against {reference}"
+                    rms.append(
+                        (joined(["RMS ", sub("ω", axis), ", ", estimator_title(name)]), value)
+                    )
+            title = joined(["Error of ", sub("ω", axis), f" against {reference}"])
             self.show(
                 f"error{axis}", title, "°/s", curves, s, height=215 if k == 2 else 150, digits=2
             )
         self._table = self.html(
-            rows(rms) if rms else _nothing("no reference yet: neither truth nor tachometer"),
+            rows(rms) if rms else note("no reference yet: neither truth nor tachometer"),
             self._table,
         )
 
@@ -108,7 +111,7 @@ class Errors(Panel):
                     ("RMS height", number(float(np.sqrt(np.nanmean(error[:, 2] ** 2))), 2, "m"))
                 ]
                 items += [("fixes in the window", str(len(error)))]
-        self._table = self.html(rows(items) if items else _nothing("no fixes yet"), self._table)
+        self._table = self.html(rows(items) if items else note("no fixes yet"), self._table)
 
 
 def _three_sigma(s: Snapshot, name: str, t: np.ndarray) -> list[np.ndarray | None]:
@@ -119,7 +122,3 @@ def _three_sigma(s: Snapshot, name: str, t: np.ndarray) -> list[np.ndarray | Non
     if len(at) < 2:
         return [None] * 3
     return [3 * np.interp(t, at, r["sigma_p_n"][:, k]) for k in range(3)]
-
-
-def _nothing(text: str) -> str:
-    return f'<p class="gf-note">{text}</p>'

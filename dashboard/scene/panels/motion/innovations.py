@@ -7,7 +7,8 @@ import viser
 from scipy.stats import chi2
 
 from dashboard.scene.drawing.chart import Curve
-from dashboard.scene.drawing.palette import AXES, GREY, estimator_title, number, rows
+from dashboard.scene.drawing.page import note, rows, sub
+from dashboard.scene.drawing.palette import AXES, GREY, estimator_title, number
 from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve
 from inertial.layouts.layout import PRODUCTS
 
@@ -49,11 +50,8 @@ class Innovations(Panel):
             count = dof if topic == "innovation" else int(np.max(dof[good]))
             items += self._nis(s, topic, name, t[good], nis[good], count)
             self._innovations(s, topic, name, (t[good], value[good], sigma[good]), labels, unit)
-        note = (
-            '<p class="gf-note">No corrections yet: a filter without measurements has no'
-            " innovations.</p>"
-        )
-        self._table = self.html(rows(items) if items else note, self._table)
+        nothing = note("No corrections yet: a filter without measurements has no innovations.")
+        self._table = self.html(rows(items) if items else nothing, self._table)
 
     def _nis(
         self, s: Snapshot, topic: str, name: str, t: np.ndarray, nis: np.ndarray, dof: int
@@ -110,6 +108,4 @@ class Innovations(Panel):
 
 
 # The products w_i w_j in the estimators' order.
-_PRODUCTS = [
-    f"ω<sub>{'xyz'[i]}</sub>ω<sub>{'xyz'[j]}</sub>" for i, j in zip(*PRODUCTS, strict=True)
-]
+_PRODUCTS = [sub("ω", "xyz"[i]) + sub("ω", "xyz"[j]) for i, j in zip(*PRODUCTS, strict=True)]

@@ -4,14 +4,15 @@ step costs.
 
 import numpy as np
 
-from dashboard.scene.drawing.palette import escape, estimator_colour, estimator_title, number
+from dashboard.scene.drawing.page import Markup, joined, note, tag
+from dashboard.scene.drawing.palette import estimator_colour, estimator_title, number
 from dashboard.scene.panels.base import DEG, Panel, Snapshot
 
-HEAD = (
+HEAD = Markup(
     "<tr><td><b>estimator</b></td><td>RMS ω<sub>z</sub>, °/s</td><td>NIS over its"
     " freedom</td><td>µs per step</td><td>state</td></tr>"
 )
-NOTE = (
+NOTE = Markup(
     "RMS of ω<sub>z</sub> against the tachometer over the window shown; NIS over its degrees of"
     " freedom is 1 for a filter whose innovations are as large as it says."
 )
@@ -28,15 +29,12 @@ class Race(Panel):
     def update(self, s: Snapshot) -> None:
         names = s.device.estimators("rate")
         if not names:
-            self._table = self.html(
-                '<p class="gf-note">No rate estimators run for this device.</p>', self._table
-            )
+            self._table = self.html(note("No rate estimators run for this device."), self._table)
             return
         found = sorted((_error(s, name), name) for name in names)
-        body = "".join(_row(s, name, error) for error, name in found)
-        self._table = self.html(
-            f'<table class="gf-rows">{HEAD}{body}</table><p class="gf-note">{NOTE}</p>', self._table
-        )
+        body = (_row(s, name, error) for error, name in found)
+        table = tag("table", HEAD, *body, class_="gf-rows")
+        self._table = self.html(table + note(NOTE), self._table)
 
 
 def _error(s: Snapshot, name: str) -> float:
@@ -67,19 +65,17 @@ def _aid(s: Snapshot, name: str) -> str:
     return newest.message.aid if newest else ""
 
 
-def _row(s: Snapshot, name: str, error: float) -> str:
+def _row(s: Snapshot, name: str, error: float) -> Markup:
     _, rows = s.rows("rate", name)
     ratio = rows["nis"] / np.maximum(rows["nis_dof"], 1.0)
     ratio = ratio[np.isfinite(ratio)]
     status = s.device.get("estimator", name)
     cost = status.message.us_per_sample if status else float("nan")
-    state = escape(status.message.state) if status else "–"
+    state = status.message.state if status else "–"
     aid = _aid(s, name)
-    score = f"not scored: aided by the {escape(aid)}" if aid else number(error, 2)
-    stale = ' class="gf-stale"' if s.stale("rate", name) else ""
+    score = f"not scored: aided by the {aid}" if aid else number(error, 2)
     colour = estimator_colour(name, s.device.estimators("rate"))
-    return (
-        f'<tr{stale}><td><span style="color:{colour}">■</span> {escape(estimator_title(name))}</td>'
-        f"<td>{score}</td><td>{number(float(ratio.mean()) if len(ratio) else None, 2)}</td>"
-        f"<td>{number(cost, 0)}</td><td>{state}</td></tr>"
-    )
+    title = joined([tag("span", "■", style=f"color:{colour}"), " ", estimator_title(name)])
+    honest = number(float(ratio.mean()) if len(ratio) else None, 2)
+    cells = (tag("td", cell) for cell in (title, score, honest, number(cost, 0), state))
+    return tag("tr", *cells, class_="gf-stale" if s.stale("rate", name) else "")

@@ -5,13 +5,13 @@ gyroscope.
 import numpy as np
 
 from dashboard.scene.drawing.chart import Curve, Shade
+from dashboard.scene.drawing.page import joined, note, sub
 from dashboard.scene.drawing.palette import (
     AXES,
     GREY,
     REFERENCE,
     VERMILLION,
     YELLOW,
-    escape,
     truth_colour,
 )
 from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
@@ -55,7 +55,7 @@ class Rates(Panel):
                 curves.append(line)
             self.show(
                 f"omega{axis}",
-                f"ω<sub>{axis}</sub> with 3σ",
+                joined([sub("ω", axis), " with 3σ"]),
                 "°/s",
                 curves,
                 s,
@@ -68,9 +68,7 @@ class Rates(Panel):
         first = _best(s)
         latest = s.device.get("rate", first) if first else None
         reason = latest.message.sight_reason if latest else ""
-        self._note = self.html(
-            f'<p class="gf-note">{escape(reason)}</p>' if reason else "", self._note
-        )
+        self._note = self.html(note(reason), self._note)
 
     @staticmethod
     def _estimates(s: Snapshot, k: int) -> list[Curve]:

@@ -4,7 +4,8 @@ side.
 
 from dashboard.data.pose import roll_pitch
 from dashboard.scene.drawing.horizon import between, horizon_svg
-from dashboard.scene.drawing.palette import estimator_title, number, rows
+from dashboard.scene.drawing.page import Markup, note, rows
+from dashboard.scene.drawing.palette import estimator_title, number
 from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
 
 BEST = "vqf"  # drawn as the horizon where it runs
@@ -29,12 +30,9 @@ class Tilt(Panel):
                 self.show(column, title, "°", curves, s, height=190, digits=1)
 
     @staticmethod
-    def _head(s: Snapshot, names: list[str]) -> str:
+    def _head(s: Snapshot, names: list[str]) -> Markup:
         if not names:
-            return (
-                '<p class="gf-note">No tilt yet: it needs a board with accelerometers and'
-                " gyroscopes.</p>"
-            )
+            return note("No tilt yet: it needs a board with accelerometers and gyroscopes.")
         latest = {name: s.device.get("attitude", name).message for name in names}
         first = latest[names[0]]
         items = []
@@ -48,7 +46,7 @@ class Tilt(Panel):
             )
             if name != names[0]:
                 items.append(
-                    ("&nbsp; off the first by", number(between(m.q_nb, first.q_nb) * DEG, 2, "°"))
+                    ("\u00a0 off the first by", number(between(m.q_nb, first.q_nb) * DEG, 2, "°"))
                 )
         bias = first.bias_omega_b_radps
         if len(bias) == 3:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dashboard.scene.drawing.chart import Curve
+from dashboard.scene.drawing.page import joined, tag
 from dashboard.scene.drawing.palette import GREY, VERMILLION, number
 from dashboard.scene.panels.base import DEG, Snapshot
 from inertial.constants import MILLI_G
@@ -90,14 +91,17 @@ def curves_of(u: Unaided) -> list[Curve]:
     ]
 
 
-def table_of(u: Unaided) -> list[tuple[str, str]]:
+def table_of(u: Unaided) -> list[tuple[object, str]]:
     """The same in numbers."""
     seconds = number(float(u.t[-1] - u.since), 0, "s")
     return [
-        (f"<b>without fixes</b>, off after {seconds}", number(float(u.error[-1]), 1, "m")),
+        (
+            joined([tag("b", "without fixes"), f", off after {seconds}"]),
+            number(float(u.error[-1]), 1, "m"),
+        ),
         ("by equation (27)", number(float(u.predicted[-1]), 1, "m")),
         (
-            "&nbsp; of bias · drift",
+            "\u00a0 of bias · drift",
             f"{number(u.bias / MILLI_G, 1, 'mg')} · {number(u.drift * DEG, 2, '°/s')}",
         ),
         ("drift that explains it", number(u.equivalent * DEG * HOUR, 0, "°/h")),

@@ -7,21 +7,20 @@ import viser
 
 from dashboard.scene.drawing.chart import Curve
 from dashboard.scene.drawing.map import map_svg
+from dashboard.scene.drawing.page import EMPTY, Markup, alert, joined, note, rows, tag
 from dashboard.scene.drawing.palette import (
     GREY,
     GYRO_FREE,
-    escape,
     estimator_colour,
     estimator_title,
     number,
-    rows,
 )
 from dashboard.scene.panels.base import Input, Panel, Snapshot, estimator_curve
 from dashboard.scene.panels.navigation import drift
 from messages.contract import gyrofree_pb2 as pb
 
 OUTAGE_S = 30.0
-HEAD = ("<b>race</b>, horizontal RMS, m", "unseen fix", "prediction", "fed fix", "NIS")
+HEAD = (Markup("<b>race</b>, horizontal RMS, m"), "unseen fix", "prediction", "fed fix", "NIS")
 METRICS = (
     "Three metrics, not to be mixed up: error on fixes held back from the filter; its prediction"
     " against the next fix, before that is used; and what is left to a fix after it was used, which"
@@ -58,12 +57,12 @@ class Navigation(Panel):
         self._device = s.device.name
         names = s.device.estimators("nav")
         if not names:
-            note = (
+            text = (
                 "No navigation yet: it needs a GNSS receiver, and a six-axis board, or a cube for"
                 " which "
             )
-            note += "[estimator] gyro_free_navigation names filters."
-            self._top = self.html(f'<p class="gf-note">{note}</p>', self._top)
+            text += "[estimator] gyro_free_navigation names filters."
+            self._top = self.html(note(text), self._top)
             return
         messages = {name: s.device.get("nav", name).message for name in names}
         self._muted = any(m.gnss_muted for m in messages.values())
@@ -73,7 +72,7 @@ class Navigation(Panel):
         if not self._button.visible:
             self._button.visible = True
         alone = self._alone(s, names)
-        drifted = rows(drift.table_of(alone)) if alone else ""
+        drifted = rows(drift.table_of(alone)) if alone else EMPTY
         self._top = self.html(self._map(s, names) + self._race(s, names) + drifted, self._top)
         if alone:
             title = "Without fixes since it began to move: horizontal error"
@@ -110,7 +109,7 @@ class Navigation(Panel):
         lead = next((name for name in names if name.startswith(GYRO_FREE)), "")
         return drift.unaided(s, rates[0], lead) if rates and lead else None
 
-    def _map(self, s: Snapshot, names: list[str]) -> str:
+    def _map(self, s: Snapshot, names: list[str]) -> Markup:
         ways = []
         for name in names:
             _, r = s.rows("nav", name)
@@ -122,20 +121,12 @@ class Navigation(Panel):
         _, lead = s.rows("nav", names[0])
         sigma = tuple(lead["sigma_p_n"][-1, :2]) if len(lead) else None
         drawn = map_svg(ways, fixes["p_n"], rejected, sigma, s.dark)
-        alarm = (
-            '<p class="gf-alert">GNSS is muted: the filters go on without fixes.</p>'
-            if self._muted
-            else ""
-        )
+        alarm = alert("GNSS is muted: the filters go on without fixes.") if self._muted else EMPTY
         m = s.device.get("nav", names[0]).message
-        waits = (
-            f'<p class="gf-note">{escape(m.alignment)}</p>'
-            if m.mode != pb.NavSolution.MODE_NAVIGATING
-            else ""
-        )
+        waits = note(m.alignment) if m.mode != pb.NavSolution.MODE_NAVIGATING else EMPTY
         return alarm + waits + drawn
 
-    def _race(self, s: Snapshot, names: list[str]) -> str:
+    def _race(self, s: Snapshot, names: list[str]) -> Markup:
         """Three metrics, which are not the same: see docs/navigation.md."""
         found = []
         for name in names:
@@ -150,16 +141,13 @@ class Navigation(Panel):
         for error, ahead, left, name, nis in sorted(
             found, key=lambda f: (np.nan_to_num(f[0], nan=1e9), f[3])
         ):
-            dot = (
-                f'<span style="color:{estimator_colour(name, names)}">●</span>'
-                f" {estimator_title(name)}"
-            )
+            dot = tag("span", "●", style=f"color:{estimator_colour(name, names)}")
             honest = number(float(np.mean(nis)), 1) if len(nis) else "–"
             cells = [number(v, 3) for v in (error, ahead, left)] + [honest]
-            items.append("".join(f"<td>{cell}</td>" for cell in [dot, *cells]))
-        head = "".join(f"<td>{text}</td>" for text in HEAD)
-        body = "".join(f"<tr>{row}</tr>" for row in [head, *items])
-        return f'<table class="gf-rows">{body}</table><p class="gf-note">{METRICS}</p>'
+            title = joined([dot, " ", estimator_title(name)])
+            items.append([title, *cells])
+        body = (tag("tr", *(tag("td", cell) for cell in row)) for row in [HEAD, *items])
+        return tag("table", *body, class_="gf-rows") + note(METRICS)
 
     def _order(self) -> None:
         seconds = 0.0 if self._muted else OUTAGE_S

@@ -5,7 +5,8 @@ that.
 import numpy as np
 
 from dashboard.scene.drawing.chart import Curve
-from dashboard.scene.drawing.palette import AXES, estimator_title, number, rows
+from dashboard.scene.drawing.page import EMPTY, Markup, note, rows, tag
+from dashboard.scene.drawing.palette import AXES, estimator_title, number
 from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve
 from inertial.navigation.fuzzy import MEMBERSHIPS, RULES, membership
 
@@ -13,7 +14,7 @@ WIDTH, HEIGHT = 170, 90
 UNITS = ("m/s²", "rad/s")
 
 
-def sets_svg(points: tuple[float, float, float], value: float, unit: str) -> str:
+def sets_svg(points: tuple[float, float, float], value: float, unit: str) -> Markup:
     """The three sets over their input, and where the input is now."""
     span = points[2] - points[0]
     low, high = points[0] - 0.25 * span, points[2] + 0.25 * span
@@ -24,15 +25,17 @@ def sets_svg(points: tuple[float, float, float], value: float, unit: str) -> str
         for k in range(3):
             y = HEIGHT - 18 - out[k] * (HEIGHT - 26)
             lines[k] += f"{(x - low) / (high - low) * WIDTH:.1f},{y:.1f} "
-    svg = f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" width="48%" role="img" aria-label="fuzzy sets">'
-    for k in range(3):
-        svg += f'<polyline points="{lines[k]}" fill="none" stroke="{AXES[k]}" stroke-width="1.6"/>'
+    parts = [
+        tag("polyline", points=lines[k], fill="none", stroke=AXES[k], stroke_width=1.6)
+        for k in range(3)
+    ]
     x = float(np.clip((value - low) / (high - low), 0.0, 1.0)) * WIDTH
-    svg += f'<path d="M{x:.1f} 4V{HEIGHT - 18}" stroke="#8C8C8C" stroke-width="2"/>'
-    return (
-        svg + f'<text x="4" y="{HEIGHT - 4}" font-size="11"'
-        f' fill="#8C8C8C">{number(value, 2, unit)}</text></svg>'
-    )
+    parts += [
+        tag("path", d=f"M{x:.1f} 4V{HEIGHT - 18}", stroke="#8C8C8C", stroke_width=2),
+        tag("text", number(value, 2, unit), x=4, y=HEIGHT - 4, font_size=11, fill="#8C8C8C"),
+    ]
+    size = f"0 0 {WIDTH} {HEIGHT}"
+    return tag("svg", *parts, viewBox=size, width="48%", role="img", aria_label="fuzzy sets")
 
 
 class Horizon(Panel):
@@ -48,10 +51,10 @@ class Horizon(Panel):
             if s.device.get("nav", n).message.HasField("horizon")
         ]
         if not names:
-            note = "No moving horizon runs: add fpe-fuzzy or mhe-robust to [estimator] navigators."
-            self._top = self.html(f'<p class="gf-note">{note}</p>', self._top)
+            text = "No moving horizon runs: add fpe-fuzzy or mhe-robust to [estimator] navigators."
+            self._top = self.html(note(text), self._top)
             return
-        items, drawing = [], ""
+        items, drawing = [], EMPTY
         curves = []
         for name in names:
             m = s.device.get("nav", name).message.horizon
@@ -68,13 +71,9 @@ class Horizon(Panel):
                     RULES.rate, m.inputs[1], UNITS[1]
                 )
                 self._fuzzy(s, name)
-        legend = (
-            '<p class="gf-note">small · medium · high in the colours below; grey: the vehicle'
-            " now</p>"
-        )
-        self._top = self.html(
-            drawing + (legend if drawing else "") + rows(items, s.stale("nav", names[0])), self._top
-        )
+        if drawing:
+            drawing += note("small · medium · high in the colours below; grey: the vehicle now")
+        self._top = self.html(drawing + rows(items, s.stale("nav", names[0])), self._top)
         self.show("n", "Fixes looked back", "N", curves, s, height=170, digits=0)
 
     def _fuzzy(self, s: Snapshot, name: str) -> None:

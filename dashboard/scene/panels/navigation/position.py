@@ -1,11 +1,15 @@
 """Position in north, east, down with its 3-sigma band, and the numbers of a trajectory."""
 
+import math
+
 import numpy as np
 
 from dashboard.scene.drawing.chart import Curve
 from dashboard.scene.drawing.geometry import MODES
-from dashboard.scene.drawing.palette import FIX, escape, number, rows
+from dashboard.scene.drawing.page import Markup, note, rows
+from dashboard.scene.drawing.palette import FIX, number
 from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
+from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
 
 NAMES = ("North", "East", "Down")
@@ -40,7 +44,7 @@ class Position(Panel):
             self.show(axis, axis, "m", curves, s, height=150, digits=2)
 
     @staticmethod
-    def _numbers(s: Snapshot) -> str:
+    def _numbers(s: Snapshot) -> Markup:
         names = s.device.estimators("nav")
         if not names:
             return rows([("solution", "none yet")], stale=True)
@@ -56,12 +60,12 @@ class Position(Panel):
         course = float(np.degrees(np.arctan2(v[1], v[0]))) % 360
         items = [
             ("mode", MODES.get(m.mode, "unknown")),
-            ("alignment", escape(m.alignment) or "–"),
+            ("alignment", m.alignment or "–"),
             (
                 "latitude, longitude",
                 f"{number(m.latitude_deg, 7, '°')}, {number(m.longitude_deg, 7, '°')}",
             ),
-            ("height", number(m.height_m, 2, "m")),
+            ("height", height_text(m)),
             ("speed over ground", number(float(np.hypot(v[0], v[1])) * 3.6, 1, "km/h")),
             ("course", number(course, 1, "°") if np.hypot(v[0], v[1]) > 0.5 else "standing"),
             ("1σ north, east, down", " · ".join(number(float(x), 2) for x in sigma) + " m"),
@@ -72,14 +76,21 @@ class Position(Panel):
         return rows(items, s.stale("nav", names[0]))
 
 
-def _cube_note(s: Snapshot) -> str:
+def height_text(m: pb.NavSolution | pb.GnssFix) -> str:
+    """The height and what it counts from, or why there is none."""
+    if not math.isfinite(m.height_m):
+        return "– (the receiver gives no height)"
+    if m.height_reference == pb.HEIGHT_REFERENCE_SEA_LEVEL:
+        return f"{number(m.height_m, 2, 'm')} above sea level (no geoid: ± 110 m)"
+    return number(m.height_m, 2, "m")
+
+
+def _cube_note(s: Snapshot) -> Markup:
     names = s.device.estimators("rate")
     items = []
     for name in names:
         m = rates.row(s.device.get("rate", name).message, -1)
         if len(m.p_n_m) == 3:
             items.append((f"distance, {name}", number(float(np.linalg.norm(m.p_n_m)), 1, "m")))
-    return (
-        '<p class="gf-note">Inertial navigation from the start without any aid: it drifts by'
-        " nature.</p>" + rows(items)
-    )
+    text = "Inertial navigation from the start without any aid: it drifts by nature."
+    return note(text) + rows(items)

@@ -7,10 +7,12 @@ from collections.abc import Callable
 
 import viser
 
-from dashboard.scene.drawing.palette import escape, number, rows
+from dashboard.scene.drawing.page import Markup, alert, bad, rows, tag
+from dashboard.scene.drawing.palette import number
 from dashboard.scene.panels.base import Input
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
+from messages.text import plain
 
 log = logging.getLogger(__name__)
 
@@ -43,7 +45,7 @@ class Record:
         recording = latest is not None and latest.message.recording
         content = self._content(latest, stale, recording)
         if self._state.content != content:
-            self._state.content = content
+            self._state.content = str(content)
         for handle, visible in (
             (self._start, not recording),
             (self._name, not recording),
@@ -55,13 +57,14 @@ class Record:
             self._start.disabled = self._stop.disabled = stale
 
     @staticmethod
-    def _content(latest, stale: bool, recording: bool) -> str:
+    def _content(latest, stale: bool, recording: bool) -> Markup:
         if latest is None:
             return rows([("recorder", "not running")], stale=True)
         m = latest.message
-        items = [("recorder", '<b class="gf-rec">● recording</b>' if recording else "ready")]
+        state = tag("b", "● recording", class_="gf-rec") if recording else "ready"
+        items: list[tuple[str, object]] = [("recorder", state)]
         if m.session:
-            items.append(("session" if recording else "last session", escape(m.session)))
+            items.append(("session" if recording else "last session", m.session))
         if recording:
             items.append(("length", number(m.seconds, 0, "s")))
             items.append(
@@ -71,11 +74,18 @@ class Record:
                 )
             )
             items.append(("size", number(m.bytes / 1e6, 1, "MB")))
+        if m.clock_steps:
+            text = (
+                f"set {m.clock_steps} times, {m.clock_offset_s:+,.1f} s in all; times go on without"
+            )
+            items.append(("wall clock", f'<b class="gf-bad">{text}</b>'))
         lost = sum(m.lost.values())
         if lost:
-            items.append(("lost on the bus", f'<b class="gf-bad">{number(lost, 0)} messages</b>'))
-        alert = f'<p class="gf-alert">{escape(m.message)}</p>' if m.message else ""
-        return alert + rows(items, stale)
+            items.append(("lost on the bus", bad(f"{number(lost, 0)} messages")))
+        if m.refused:
+            kinds = ", ".join(f"{kind} {n}" for kind, n in sorted(m.refused.items()))
+            items.append(("refused on the bus", bad(kinds)))
+        return alert(m.message) + rows(items, stale)
 
     def _order(self, action: int) -> None:
         command = pb.RecorderCommand(action=action, name=self._name.value.strip())
@@ -92,5 +102,5 @@ class Record:
             else "The recorder did not do it"
         )
         self._client.add_notification(
-            title, text, color="teal" if good else "red", auto_close_seconds=6.0
+            title, plain(text), color="teal" if good else "red", auto_close_seconds=6.0
         )

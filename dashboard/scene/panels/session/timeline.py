@@ -11,10 +11,11 @@ import viser
 
 from dashboard.data.store import Store
 from dashboard.desk import Desk
-from dashboard.scene.drawing.palette import escape
+from dashboard.scene.drawing.page import EMPTY, Markup, joined, note, tag
 from dashboard.scene.panels.base import Input
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
+from messages.text import plain
 
 log = logging.getLogger(__name__)
 
@@ -87,7 +88,7 @@ class Timeline:
         content = self._replay_html(replay.status) if running else self._live_html(now)
         content += self._marks_html()
         if self._state.content != content:
-            self._state.content = content
+            self._state.content = str(content)
         if running and now - self._touched > HOLD_S:
             self._slide(replay.status)
 
@@ -105,7 +106,7 @@ class Timeline:
             self._slider.value = value
 
     @staticmethod
-    def _replay_html(m: pb.ReplayStatus) -> str:
+    def _replay_html(m: pb.ReplayStatus) -> Markup:
         loop = (
             f" · loop {clock(m.loop_from_s)} to {clock(m.loop_until_s)}"
             if m.loop_until_s > m.loop_from_s
@@ -113,36 +114,30 @@ class Timeline:
         )
         state = "❚❚ paused" if m.paused else f"▶ {m.speed:g}×"
         position = clock(m.position_s, 3 if m.paused else 1)  # a step is one sample
-        message = f" · <b>{escape(m.message)}</b>" if m.message else ""
-        return (
-            f'<p class="gf-note"><b>Replay</b> {escape(m.session)} · {position} of'
-            f" {clock(m.length_s)} · {state}{loop}{message}</p>"
-        )
+        said = joined([" · ", tag("b", m.message)]) if m.message else ""
+        words = f" {m.session} · {position} of {clock(m.length_s)} · {state}{loop}"
+        return note(tag("b", "Replay"), words, said)
 
-    def _live_html(self, now: float) -> str:
+    def _live_html(self, now: float) -> Markup:
         latest = self._store.recorder
         if latest is None or latest.age(now) > 3.0:
-            return '<p class="gf-note"><b>Live</b> · the recorder is not running</p>'
+            return note(tag("b", "Live"), " · the recorder is not running")
         m = latest.message
         if not m.recording:
-            return (
-                '<p class="gf-note"><b>Live</b> · not being recorded: notes are shown, but not'
-                " kept</p>"
-            )
+            text = " · not being recorded: notes are shown, but not kept"
+            return note(tag("b", "Live"), text)
         repaired = sum(m.repaired.values())
         filled = f" · {repaired} messages filled in after a loss" if repaired else ""
         holding = f" · filling a gap, {m.repairing} messages wait" if m.repairing else ""
-        return (
-            f'<p class="gf-note"><b>Live</b> <b class="gf-rec">●</b> {escape(m.session)} ·'
-            f" {clock(m.seconds)}{filled}{holding}</p>"
-        )
+        words = f" {m.session} · {clock(m.seconds)}{filled}{holding}"
+        return note(tag("b", "Live"), " ", tag("b", "●", class_="gf-rec"), words)
 
-    def _marks_html(self) -> str:
+    def _marks_html(self) -> Markup:
         device = self._store.device(self._chosen())
         if device is None or not device.marks:
-            return ""
-        rows = [f"{clock(at)} {escape(text or 'mark')}" for at, text in device.marks[-SHOWN_MARKS:]]
-        return f'<p class="gf-note">{" · ".join(rows)}</p>'
+            return EMPTY
+        shown = [f"{clock(at)} {text or 'mark'}" for at, text in device.marks[-SHOWN_MARKS:]]
+        return note(joined(shown, " · "))
 
     # --- what a person does
 
@@ -163,7 +158,7 @@ class Timeline:
             self._desk.replay(pb.ReplayCommand(action=action, value=value, until=until))
         except OrderError as error:
             self._client.add_notification(
-                "The replay did not do it", str(error), color="red", auto_close_seconds=6.0
+                "The replay did not do it", plain(error), color="red", auto_close_seconds=6.0
             )
 
     def _slid(self, event: Any) -> None:
@@ -223,7 +218,7 @@ class Timeline:
             self._note.value = ""
         except OrderError as error:
             self._client.add_notification(
-                "The note was not kept", str(error), color="red", auto_close_seconds=6.0
+                "The note was not kept", plain(error), color="red", auto_close_seconds=6.0
             )
 
 

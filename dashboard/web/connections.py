@@ -1,0 +1,176 @@
+"""How many connections there may be, and for how long one may say nothing.
+
+Anybody can open connections and let them hang, before any sign-in. So a connection has `request_s`
+to send a whole head of a request, and again after each answer; an address has room for
+`per_address` and all together for `most`. A new one is let in where an idle one can give way: first
+of the same address, then of the address that has most. People behind one address with whoever
+floods it still get in, because they ask at once and are answered.
+"""
+
+import asyncio
+import ipaddress
+import logging
+import resource
+import time
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from dashboard.settings import DashboardSettings
+from dashboard.web.auth import Backoff
+
+log = logging.getLogger(__name__)
+
+LOOK_S = 0.5  # s between two looks at all connections
+LINGER_S = 5.0  # s, for the rest of an answer after a connection was closed
+SPARED = 200  # open files of the process that are not connections
+
+
+@dataclass(eq=False)
+class Connection:
+    """One TCP connection, also after it has become a WebSocket."""
+
+    transport: asyncio.Transport
+    protocol: H11Protocol
+    address: str
+    idle_since: float | None  # s, monotonic; since its last answer, None while one is made
+    stuck_since: float | None = None  # s, while its client does not take what is sent
+
+    @property
+    def gone(self) -> bool:
+        """Its socket is closed."""
+        return self.transport.get_extra_info("socket").fileno() < 0
+
+    @property
+    def asked(self) -> bool:
+        """A request of it is being answered, or it is a WebSocket."""
+        cycle = self.protocol.cycle
+        upgraded = self.transport.get_protocol() is not self.protocol
+        return upgraded or (cycle is not None and not cycle.response_complete)
+
+
+class Connections:
+    """All of one server. Everything runs in its event loop."""
+
+    def __init__(self, settings: DashboardSettings) -> None:
+        files = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+        self._most = max(16, min(settings.connections, files - SPARED))
+        self._settings = settings
+        self._open: dict[Connection, None] = {}  # in the order of their beginning
+        self._looking: asyncio.TimerHandle | None = None
+        self.ended: Counter[str] = Counter()  # why -> connections that were ended here
+
+    def protocol(self) -> type[H11Protocol]:
+        """What uvicorn makes of every connection."""
+        connections = self
+
+        class Counted(H11Protocol):
+            _counted: Connection | None = None
+
+            def connection_made(self, transport: Any) -> None:
+                super().connection_made(transport)
+                self._counted = connections.enter(transport, self)
+
+            def on_response_complete(self) -> None:
+                super().on_response_complete()
+                if self._counted is not None:
+                    self._counted.idle_since = time.monotonic()
+
+            def connection_lost(self, exc: Exception | None) -> None:
+                connections.leave(self._counted)
+                super().connection_lost(exc)
+
+        return Counted
+
+    def enter(self, transport: asyncio.Transport, protocol: H11Protocol) -> Connection | None:
+        """Count a new connection, or end it when nobody can give way."""
+        address = _network(transport)
+        new = Connection(transport, protocol, address, time.monotonic())
+        if not self._exempt(address):
+            same = [one for one in self._open if one.address == address]
+            if len(same) >= self._settings.connections_per_address and not self._evict(same):
+                self._end(new, "too many of one address")
+                return None
+        if len(self._open) >= self._most:
+            [(crowd, _)] = Counter(one.address for one in self._open).most_common(1)
+            crowded = [one for one in self._open if one.address == crowd]
+            if not self._evict(crowded) and not self._evict(list(self._open)):
+                self._end(new, "too many")
+                return None
+        self._open[new] = None
+        if self._looking is None:
+            self._looking = asyncio.get_running_loop().call_later(LOOK_S, self._look)
+        return new
+
+    def leave(self, one: Connection | None) -> None:
+        """It is closed."""
+        if one is not None:
+            self._open.pop(one, None)
+
+    def __len__(self) -> int:
+        return len(self._open)
+
+    def _evict(self, among: list[Connection]) -> bool:
+        """End the one that has been idle longest; False when all are at work."""
+        idle = [one for one in among if not one.asked]
+        if not idle:
+            return False
+        self._end(min(idle, key=lambda one: one.idle_since or 0.0), "gave way")
+        return True
+
+    def _end(self, one: Connection, why: str) -> None:
+        self._open.pop(one, None)
+        if one.transport.get_write_buffer_size():
+            one.transport.abort()
+        else:
+            one.transport.close()
+        self.ended[why] += 1
+        n = self.ended[why]
+        if n & (n - 1) == 0:  # a flood stays readable
+            log.warning("connection of %s ended: %s (%d so far)", one.address, why, n)
+
+    def _look(self) -> None:
+        """End those that said nothing for too long, or take nothing."""
+        self._looking = None
+        now = time.monotonic()
+        for one in list(self._open):
+            if one.gone:
+                self._open.pop(one)
+                continue
+            full = one.transport.get_write_buffer_size() > 0
+            one.stuck_since = (one.stuck_since or now) if full else None
+            if one.asked:
+                one.idle_since = None
+            elif one.idle_since is None:
+                one.idle_since = now
+            if one.transport.is_closing():
+                self._after(one, one.stuck_since or now, LINGER_S, "took nothing", now)
+            elif one.idle_since is not None:
+                self._after(one, one.idle_since, self._settings.request_s, "asked nothing", now)
+            if one.stuck_since is not None:
+                self._after(one, one.stuck_since, self._settings.take_s, "took nothing", now)
+        if self._open:
+            self._looking = asyncio.get_running_loop().call_later(LOOK_S, self._look)
+
+    def _after(self, one: Connection, since: float, limit: float, why: str, now: float) -> None:
+        if one in self._open and now - since > limit:
+            self._end(one, why)
+
+    def _exempt(self, address: str) -> bool:
+        """A proxy of ours brings everybody's connections; it limits them itself."""
+        for trusted in self._settings.trusted_proxies:
+            try:
+                network = ipaddress.ip_network(trusted, strict=False)
+                if ipaddress.ip_network(address, strict=False).subnet_of(network):
+                    return True
+            except (ValueError, TypeError):
+                if trusted in ("*", address):
+                    return True
+        return False
+
+
+def _network(transport: asyncio.Transport) -> str:
+    peer = transport.get_extra_info("peername")
+    return Backoff.network(peer[0]) if peer else "unknown"
