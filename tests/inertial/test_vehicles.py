@@ -15,8 +15,8 @@ from inertial.navigation.smoother import smooth_drive
 from inertial.navigation.solution import WHEELS, Wheels
 from inertial.navigation.standstill import AlignmentSettings
 from inertial.simulation.drive import SimulatedDrive
+from inertial.simulation.ride_score import Errors, errors_of
 from inertial.simulation.vehicles import RIDES, travel
-from logs.ride_score import Errors, errors_of
 
 PLAIN = "kf"
 WORSE = 1.2  # of the default against the plain filter, at most
