@@ -199,7 +199,7 @@ class Gate:
             }
         except FileNotFoundError:
             return {}
-        except (OSError, ValueError, TypeError, AttributeError) as error:
+        except (OSError, ValueError, TypeError, AttributeError, RecursionError) as error:
             log.warning("%s: %s: everybody has to sign in again", self._file, error)
             return {}
 
