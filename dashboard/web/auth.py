@@ -213,7 +213,7 @@ class Gate:
             return {key: self._moved(one) for key, one in found.items()}
         except FileNotFoundError:
             return {}
-        except (OSError, ValueError, TypeError, AttributeError) as error:
+        except (OSError, ValueError, TypeError, AttributeError, RecursionError) as error:
             log.warning("%s: %s: everybody has to sign in again", self._file, error)
             return {}
 

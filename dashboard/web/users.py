@@ -95,7 +95,7 @@ def load_users(path: Path) -> dict[str, User]:
         raise UsersError(
             f"{path}: {error.strerror}; the dashboard's user must be able to read it"
         ) from None
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
         raise UsersError(
             f"{path}: no users file ({type(error).__name__}: {error}); restore a copy, or remove it"
             " and add users again"

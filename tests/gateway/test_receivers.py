@@ -89,6 +89,7 @@ def test_a_fix_in_two_dimensions_has_no_height():
     assert fix.latitude_deg is not None and fix.height_m is None and fix.height_msl_m is None
     flat = one(nav_pvt(T0, fix=2, height=0, msl=0, v_acc=0xFFFFFFFF))
     assert flat.latitude_deg is not None and flat.height_m is None and flat.height_msl_m is None
+    assert flat.v_n[:2] == (0.2, 6.3) and math.isnan(flat.v_n[2])
 
 
 def test_sigma_is_of_gst_else_of_the_dilution_of_precision():
