@@ -79,8 +79,11 @@ class Navigator:
         return self._live.head.x
 
     def covariance(self) -> Array:
-        """(n, n) at the newest sample."""
-        return self._live.head.covariance(self._live.model)
+        """(n, n) at the newest sample, with what wanders in the receiver's position (E-58)."""
+        head = self._live.head
+        P = head.covariance(self._live.model)
+        P[DP, DP] += np.diag(head.receiver.wander)
+        return P
 
     @property
     def navigating(self) -> bool:
