@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from inertial.constants import GRAVITY
 from inertial.timing import Timing
-from logs.quantities import UNITS, column_of, timing_of
+from logs.quantities import UNITS, column_of, in_range, timing_of
 from logs.sheet import LogError, Sheet, Table, open_sheet
 
 Array = NDArray[np.float64]
@@ -94,6 +94,9 @@ def read_log(path: Path, names: Sequence[str], lsb_mg: float | None = None) -> C
     table = sheet.read([t_name, *axes, *_optional(sheet)])
     table.columns["t"] = table[t_name] * t_unit
     timing = timing_of(sheet, table)
+    for name in (TACHO, *TRUE_RATE):
+        if name in table:
+            in_range(sheet, table, name, table[name], name)
     lsb = (LSB_MG if lsb_mg is None else lsb_mg) * 1e-3 * GRAVITY if unit == "counts" else 0.0
     if unit == "counts" and not lsb > 0.0:
         raise LogError(f"{path}: {lsb_mg} mg per count, want more than 0")
@@ -103,6 +106,7 @@ def read_log(path: Path, names: Sequence[str], lsb_mg: float | None = None) -> C
         if lsb:
             _whole(path, table, column, name)
         f_axis[:, k] = column * (lsb or UNITS[unit])
+        in_range(sheet, table, name, f_axis[:, k], "fx")
     return CubeLog(
         path=path,
         sha256=_digest(path),

@@ -24,7 +24,7 @@ from inertial.navigation.fix import (
 from inertial.plausible import doubt_of_gravity, doubt_of_rate
 from inertial.timing import Timing
 from inertial.toml_file import text_of
-from logs.quantities import read_si, refuse, timing_of
+from logs.quantities import read_si, refuse, rising, timing_of
 from logs.sheet import LogError, Table, open_sheet
 
 Array = NDArray[np.float64]
@@ -105,6 +105,7 @@ def read_fixes(path: Path) -> tuple[list[Fix], list[str]]:
     """
     sheet = open_sheet(path)
     c = read_si(sheet, ("t", *PLACE), EPOCH, (*PLACE, *EPOCH))
+    rising(sheet, c)
     quality = c["quality"] if "quality" in c else np.full(len(c), 5.0)
     kinds = [
         QUALITY.get(int(q), UNKNOWN_QUALITY) if math.isfinite(q) else UNKNOWN_QUALITY

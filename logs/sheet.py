@@ -86,6 +86,27 @@ class _Rows:
         return index + self.first + np.searchsorted(kept_before, index, side="right")
 
 
+class _Growing:
+    """A column that grows block by block in one array, as long as the file's size promises."""
+
+    def __init__(self, size: int) -> None:
+        self._blocks = 2 + size // LINE
+        self._values, self._n = np.zeros(0), 0
+
+    def add(self, part: Array) -> None:
+        """More of it."""
+        if self._n + len(part) > len(self._values):
+            larger = np.empty(max(len(part) * self._blocks, 2 * len(self._values)))
+            larger[: self._n] = self._values[: self._n]
+            self._values = larger  # pages that are never written take no memory
+        self._values[self._n : self._n + len(part)] = part
+        self._n += len(part)
+
+    def whole(self) -> Array:
+        """All of it."""
+        return self._values[: self._n]
+
+
 @dataclass(frozen=True)
 class Sheet:
     """How a file is written, found from its beginning."""
@@ -126,21 +147,21 @@ class Sheet:
         self.want(names)
         rows, done = _Rows(self.header_line + 1), 0
         blanks = Lines(self.path, self.size, self.encoding)
-        parts: dict[str, list[Array]] = {name: [] for name in names}
-        for batch in self._batches(list(parts), rows):
+        kept: dict[str, _Growing] = {name: _Growing(self.size) for name in names}
+        for batch in self._batches(list(kept), rows):
             table = {
                 name: column.to_numpy(zero_copy_only=False).astype(np.float64, copy=False)
-                for name, column in zip(parts, batch.columns, strict=True)
+                for name, column in zip(kept, batch.columns, strict=True)
             }
             empty = self._empty(table, rows, done, blanks)
             for name, column in table.items():
-                kept = column[~empty]
+                samples = column[~empty]
                 if name not in may_miss:
-                    self._finite(kept, name, rows, done)
-                parts[name].append(kept)
+                    self._finite(samples, name, rows, done)
+                kept[name].add(samples)
             done += int(np.count_nonzero(~empty))
         cut_off = self._check_rows(rows, done)
-        columns = {name: np.concatenate([*parts.pop(name), np.zeros(0)]) for name in list(parts)}
+        columns = {name: column.whole() for name, column in kept.items()}
         return Table(columns, rows.lines(np.arange(done)), cut_off)
 
     def _batches(self, names: list[str], rows: _Rows) -> Iterator[pa.RecordBatch]:

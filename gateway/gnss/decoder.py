@@ -23,6 +23,7 @@ UBX_MUTES_NMEA = 3  # NMEA epochs left out after each UBX one
 PLACES_UBX = {"NAV-PVT", "NAV-POSLLH", "NAV-HPPOSLLH", "NAV-SOL"}
 PLACES_NMEA = {"GGA", "GNS", "RMC", "GLL"}
 SELDOM = {"ZDA", "GSA"}  # not waited for: many receivers send them less often
+GSA_EPOCHS = 50  # for so many epochs the last GSA is true
 MOST_NAMES = 64  # of messages that are told apart
 
 
@@ -56,7 +57,8 @@ class GnssDecoder:
         self._nmea_leads = False
         self._date: date | None = None
         self._last_tod_ns = 0
-        self._dimensions: int | None = None
+        self._gsa: Sentence | None = None
+        self._gsa_age = 0  # epochs since it came
         self._pending_since: Stamp = None  # of the message that is half received
         self._now: Stamp = None  # of the message that is looked at
 
@@ -128,8 +130,8 @@ class GnssDecoder:
     # --- NMEA
 
     def _take_nmea(self, sentence: Sentence) -> list[Fix]:
-        if sentence.dimensions is not None:
-            self._dimensions = sentence.dimensions
+        if sentence.name == "GSA":
+            self._gsa, self._gsa_age = sentence, 0
         tod_ns = sentence.tod_ns
         if tod_ns is None:  # VTG and GSA have no time: they belong to what is open
             if sentence.name not in ("VTG", "GSA") or self._nmea is None:
@@ -168,6 +170,7 @@ class GnssDecoder:
         if self._muted and not self._nmea_leads:
             self._muted -= 1
             return []
-        fix = nmea_fix(epoch.parts, self._dimensions)
+        self._gsa_age += 1
+        fix = nmea_fix(epoch.parts, self._gsa if self._gsa_age <= GSA_EPOCHS else None)
         utc_ns = utc_ns_of(self._date, epoch.tod_ns)
         return [replace(fix, fix_utc_ns=utc_ns, began=epoch.began)]

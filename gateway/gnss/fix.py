@@ -6,11 +6,20 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from gateway.gnss.nmea import NONE, RTK_FIXED, Sentence
+from gateway.gnss.nmea import (
+    AUTONOMOUS,
+    DIFFERENTIAL,
+    NONE,
+    RTK_FIXED,
+    RTK_FLOAT,
+    Sentence,
+)
 from gateway.gnss.ubx_read import MOST_SPEED_ACCURACY_MPS, Nav, Three
 
 NMEA_SPEED_SIGMA = 0.5  # m/s; NMEA has no word for it: a cautious figure for a code receiver
 WALKING_MPS = 1.0  # faster than this without a course has no direction, and is no velocity
+# m north and east at a dilution of precision of 1, by quality; twice that up
+USUAL_SIGMA_M = {AUTONOMOUS: 1.6, DIFFERENTIAL: 0.8, RTK_FLOAT: 0.3, RTK_FIXED: 0.02}
 TRUSTED_ACCURACY_M = 100.0  # of a position for whose fix no message answers
 WEEK_ROLLOVER_NS = 1024 * 7 * 86400 * 10**9  # GPS week counter of 10 bits
 DAY_NS = 86400 * 10**9
@@ -49,10 +58,8 @@ class Fix:
 # --- NMEA
 
 
-def nmea_fix(parts: Mapping[str, Sentence], dimensions: int | None = None) -> Fix:
-    """The epoch's sentences, by name, as one fix without its time; dimensions: of the fix, by the
-    last GSA.
-    """
+def nmea_fix(parts: Mapping[str, Sentence], gsa: Sentence | None = None) -> Fix:
+    """The epoch's sentences, by name, as one fix without its time; gsa: the last one that came."""
     known = [parts[name] for name in ("GGA", "GNS", "RMC", "GLL") if name in parts]
     quality = next((s.quality for s in known if s.quality is not None), NONE)
     counts = next((s for s in known if s.satellites or s.hdop), known[0])
@@ -61,8 +68,9 @@ def nmea_fix(parts: Mapping[str, Sentence], dimensions: int | None = None) -> Fi
     if source is None or source.place is None or quality == NONE:
         return fix
     fix = replace(fix, latitude_deg=source.place[0], longitude_deg=source.place[1])
-    fix = _with_height(fix, known, dimensions)
-    return _with_course(_with_sigma(fix, parts.get("GST")), parts.get("RMC"), parts.get("VTG"))
+    fix = _with_height(fix, known, None if gsa is None else gsa.dimensions)
+    fix = _with_sigma(fix, parts.get("GST"), gsa)
+    return _with_course(fix, parts.get("RMC"), parts.get("VTG"))
 
 
 def _with_height(fix: Fix, known: list[Sentence], dimensions: int | None) -> Fix:
@@ -75,11 +83,24 @@ def _with_height(fix: Fix, known: list[Sentence], dimensions: int | None) -> Fix
     return replace(fix, height_msl_m=source.altitude_m, height_m=height)
 
 
-def _with_sigma(fix: Fix, gst: Sentence | None) -> Fix:
-    if gst is None or gst.sigma_m is None:
+def _with_sigma(fix: Fix, gst: Sentence | None, gsa: Sentence | None) -> Fix:
+    """By GST; else by the dilution of precision, where that is known; else none."""
+    if gst is not None and gst.sigma_m is not None:
+        north, east, up = gst.sigma_m
+        return replace(fix, sigma_ned_m=(north, east, NAN if up is None else up))
+    hdop = fix.hdop or (gsa.hdop if gsa is not None else 0.0)
+    vdop = gsa.vdop if gsa is not None else 0.0
+    if not hdop or fix.quality not in USUAL_SIGMA_M:
         return fix
-    north, east, up = gst.sigma_m
-    return replace(fix, sigma_ned_m=(north, east, NAN if up is None else up))
+    level, up = usual_sigma(fix.quality)
+    level, up = level * max(hdop, 1.0), up * max(vdop, hdop, 1.0)
+    return replace(fix, sigma_ned_m=(level, level, up))
+
+
+def usual_sigma(quality: int) -> tuple[float, float]:
+    """m, north or east, and up, of a fix in good geometry."""
+    level = USUAL_SIGMA_M.get(quality, USUAL_SIGMA_M[AUTONOMOUS])
+    return level, 2.0 * level
 
 
 def _with_course(fix: Fix, rmc: Sentence | None, vtg: Sentence | None) -> Fix:
@@ -145,7 +166,7 @@ def _ubx_quality(parts: Mapping[str, Nav]) -> int:
             return parts[name].quality or NONE
     base = _position_of(parts)
     trusted = base is not None and base.sigma_m is not None
-    return 1 if trusted and math.hypot(*base.sigma_m[:2]) < TRUSTED_ACCURACY_M else NONE
+    return AUTONOMOUS if trusted and math.hypot(*base.sigma_m[:2]) < TRUSTED_ACCURACY_M else NONE
 
 
 def _with_covariance(fix: Fix, cov: Nav | None) -> Fix:
@@ -163,7 +184,8 @@ def _with_velocity(fix: Fix, parts: Mapping[str, Nav]) -> Fix:
     cov, sigma = parts.get("NAV-COV"), source.v_sigma
     if cov is not None and cov.v_sigma is not None:
         sigma = cov.v_sigma
-    if sigma is not None and sigma[2] >= MOST_SPEED_ACCURACY_MPS:
+    flat = any(part.flat for part in parts.values())  # then no climb is measured either
+    if sigma is not None and (flat or sigma[2] >= MOST_SPEED_ACCURACY_MPS):
         down, sigma = NAN, (*sigma[:2], NAN)
     return replace(
         fix,

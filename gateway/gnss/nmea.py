@@ -51,6 +51,7 @@ class Sentence:
     course_deg: float | None = None
     sigma_m: tuple[float, float, float | None] | None = None  # north, east, up
     dimensions: int | None = None  # of the fix: 0, 2 or 3
+    vdop: float = 0.0
     satellites: int = 0
     hdop: float = 0.0
 
@@ -147,7 +148,11 @@ def _gst(f: Fields) -> dict[str, Any]:
 
 def _gsa(f: Fields) -> dict[str, Any]:
     mode = f.number(2, "mode", 1.0, 3.0)
-    return {"dimensions": None if mode is None else (0, 2, 3)[int(mode) - 1]}
+    return {
+        "dimensions": None if mode is None else (0, 2, 3)[int(mode) - 1],
+        "hdop": f.number(16, "HDOP", 0.0, 1e4) or 0.0,
+        "vdop": f.number(17, "VDOP", 0.0, 1e4) or 0.0,
+    }
 
 
 def _zda(f: Fields) -> dict[str, Any]:

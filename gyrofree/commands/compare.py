@@ -179,6 +179,9 @@ def _show_tracks(result: "Comparison") -> None:
     )
     for t in result.tracks:
         table.add_row(
-            t.session, t.track, *(f"{part:.4g}" for part in t.rms_ned_m), f"{t.seconds:.1f} s"
+            t.session,
+            t.track,
+            *("–" if part is None else f"{part:.4g}" for part in t.rms_ned_m),
+            f"{t.seconds:.1f} s",
         )
     show_table(table)

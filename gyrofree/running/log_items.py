@@ -16,6 +16,7 @@ from inertial.navigation.fix import AUTONOMOUS, DIFFERENTIAL, RTK_FIXED, RTK_FLO
 from logs.board_log import BoardLog
 
 LOG_EPOCH_S = 1704067200  # 2024-01-01T00:00:00Z, stands for the date that a log does not have
+LONGEST_S = 1.0  # without samples, over which the table is said to have turned on
 RTKLIB = {RTK_FIXED: 1, RTK_FLOAT: 2, DIFFERENTIAL: 4, AUTONOMOUS: 5}
 
 
@@ -36,7 +37,8 @@ def _cube(log: BoardLog, pitch: float) -> Iterator[Item]:
     rates = itertools.repeat(0.0) if log.tacho is None else log.tacho
     for row, rate in zip(zip(log.t_s, log.index, log.counts, strict=True), rates, strict=False):
         t_s, index, counts, rate = float(row[0]), int(row[1]), row[2].tolist(), float(rate)
-        yield from table_pulses(angle, rate, before_s, t_s, pitch)
+        if t_s - before_s < LONGEST_S:
+            yield from table_pulses(angle, rate, before_s, t_s, pitch)
         angle, before_s = angle + rate * (t_s - before_s), t_s
         yield BoardAccel(t_s, tuple(counts), index)
 

@@ -35,6 +35,7 @@ KINDS = (  # what a refusal can be counted as
     "length",
     "value",  # not one of those that there are
     "many",  # more devices or streams than there is room for
+    "time",  # far from that of all others
     "answer",  # of a publisher: not what was asked for
     "failure",  # we could not take it: a fault of ours
 )

@@ -89,6 +89,18 @@ def test_a_fix_in_two_dimensions_has_no_height():
     assert fix.latitude_deg is not None and fix.height_m is None and fix.height_msl_m is None
     flat = one(nav_pvt(T0, fix=2, height=0, msl=0, v_acc=0xFFFFFFFF))
     assert flat.latitude_deg is not None and flat.height_m is None and flat.height_msl_m is None
+    assert flat.v_n[:2] == (0.2, 6.3) and math.isnan(flat.v_n[2])
+
+
+def test_sigma_is_of_gst_else_of_the_dilution_of_precision():
+    gst = "GPGST,120001.00,,,,,1.5,2.5,4.5"
+    assert one(gga(at(1)), gst).sigma_ned_m == (1.5, 2.5, 4.5)
+    assert one(gga(at(1))).sigma_ned_m == (1.6, 1.6, 3.2)
+    poor = one("GPGSA,A,3,04,05,09,,,,,,,,,,9.0,4.0,8.0", gga(at(1)).replace(",0.9,", ",4.0,"))
+    assert poor.sigma_ned_m == pytest.approx((6.4, 6.4, 25.6))
+    alone = one("GPGSA,A,3,04,05,09,,,,,,,,,,9.0,4.0,8.0", rmc(at(1)))
+    assert alone.sigma_ned_m[0] == pytest.approx(6.4)
+    assert one(rmc(at(1))).sigma_ned_m is None
 
 
 def test_sea_level_without_a_geoid_is_no_height_above_the_ellipsoid():

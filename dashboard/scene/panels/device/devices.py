@@ -169,7 +169,8 @@ class Devices(Panel):
         if s.store.dropped:
             texts.append(f"the dashboard could not keep up: {s.store.dropped} messages not shown")
         if s.store.refused:
-            texts.append(f"{s.store.refused} messages of too many or nameless devices not shown")
+            kinds = ", ".join(f"{kind} {n}" for kind, n in sorted(s.store.door.counts().items()))
+            texts.append(f"{s.store.refused} messages refused and not shown ({kinds}): see the log")
         return joined(alert(text) for text in texts)
 
     @staticmethod
