@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.layouts.layout import Layout
+from inertial.layouts.layout import GeometryError, Layout
 from inertial.rate import bound, least_squares, products_ekf, tachometer
 from inertial.rate.batch import RateColumns, RateState, columns
 from inertial.rate.observed import sensor
@@ -279,6 +279,19 @@ class FreeBodyRate(ProductsRate):
     name = "products-free"
     with_bound = False
     default = products_ekf.Config(fixed_axis=False, gravity_aid=False)
+
+
+def leave_out(estimator: RateEstimator, mask: int) -> GeometryError | None:
+    """Go on without the axes of the mask's bits; where the rest cannot see omega' and p, samples
+    are taken for none until another mask comes, and the error says why.
+    """
+    try:
+        estimator.exclude(mask)
+    except GeometryError as error:
+        estimator.withhold(True)
+        return error
+    estimator.withhold(False)
+    return None
 
 
 ESTIMATORS: dict[str, Any] = {

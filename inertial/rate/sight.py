@@ -22,6 +22,7 @@ DOUBTS = (
     "turning about a vertical axis or standing with large biases: not told apart yet",
     "the innovations contradict the estimate",
     "no usable data: axes at the end of their range, frozen or stale",
+    "this estimator has no noise model: how far it may be off is not known while it turns",
 )
 """Why nothing of an estimate is valid, for people, by the number that the core says (Doubt)."""
 

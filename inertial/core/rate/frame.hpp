@@ -53,7 +53,7 @@ class KeptStates {
 };
 
 // Why nothing that is said is valid.
-enum class Doubt : std::uint8_t { NONE, STANDING, CONTRADICTED, NO_DATA };
+enum class Doubt : std::uint8_t { NONE, STANDING, CONTRADICTED, NO_DATA, NO_NOISE_MODEL };
 
 // What the frame works by; constant between two changes of the axes in use.
 struct Constants {

@@ -35,9 +35,12 @@ Phase phase_of(const Frame& frame) {
   return frame.still() ? STILL : TURNING;
 }
 
-void write_sight(const Frame& frame, const Sensor& s, Row& row) {
+void write_sight(const Frame& frame, const Constants& c, Row& row) {
+  const Sensor& s = frame.sensor(c);
   const Filter& f = frame.filter();
-  const Doubt doubt = frame.doubt();
+  Doubt doubt = frame.doubt();
+  const bool forgets = static_cast<Method>(c.tuning.method) == Method::FORGET;  // its P is no covariance
+  if (doubt == Doubt::NONE && forgets && frame.started() && !frame.still()) doubt = Doubt::NO_NOISE_MODEL;
   row.doubt = static_cast<std::uint8_t>(doubt);
   std::fill_n(row.sight, 3, frame.started() ? VALID : BLIND);
   if (doubt != Doubt::NONE) {
@@ -102,7 +105,7 @@ void write(const Frame& frame, const Constants& c, Row& row) {
   row.sign_variance = f.sign_variance;
   row.still = frame.still();
   row.phase = phase_of(frame);
-  write_sight(frame, s, row);
+  write_sight(frame, c, row);
 }
 
 }  // namespace gyrofree::rate
