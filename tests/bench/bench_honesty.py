@@ -3,7 +3,7 @@
 For every condition of inertial/simulation/disturbed.py, three profiles, ten seeds, an estimator as
 it comes (products-ekf unless others are named): of the samples whose components are called valid,
 the share that is off by more than 5 sigma (wanted: at most 0.001), and the mean NEES per component
-(wanted: between 0.5 and 2); what share of the time is called valid, and the rate RMS over it, deg/s.
+(wanted: between 0.5 and 2); what share of the time is called valid, the rate RMS over it, deg/s.
 Usage: python tests/bench/bench_honesty.py [seeds] [estimator ...] [part of a condition's name ...]
 """
 
