@@ -48,6 +48,12 @@ class Ready(NamedTuple):
     arrival: Arrival
 
 
+class Gone(NamedTuple):
+    """A device that has been silent for long and makes room for another."""
+
+    device: str
+
+
 class Worker:
     """Bus callbacks append, one thread steps the pipeline in order of publication and publishes.
 
@@ -90,6 +96,10 @@ class Worker:
                 self.inbox.dropped,
             )
 
+    def forget(self, device: str) -> None:
+        """Called on the bus's thread: the device is gone."""
+        self.inbox.put(device, Gone(device))
+
     def answered(self, question: Question, reply: pb.HistoryReply | None) -> None:
         """Called on the asker's thread: what a gateway kept."""
         self.inbox.put(question.stream[0], (question, reply))
@@ -116,6 +126,9 @@ class Worker:
                 device, item = turn
                 if isinstance(item, Order):
                     self._obey(item)
+                elif isinstance(item, Gone):
+                    self.pipeline.forget(item.device)
+                    self.mender.forget(item.device)
                 elif isinstance(item, Ready):
                     self._ready -= 1
                     self._handle(item.arrival)

@@ -5,6 +5,7 @@ sources.
 from google.protobuf.message import DecodeError
 
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.door import OTHERS
 from messages.contract.header import first_field
 from messages.contract.topics import ACCEL, ADC, IMU, Address
 from messages.history.mending_state import FARTHEST
@@ -109,3 +110,10 @@ class KeyState:
             head = len(front) + (2 if len(front) < 0x80 else 3)  # tag and length stand before it
             self.samples.take(payload, header, head)
         return header.utc_ns
+
+
+def largest(counts: dict[str, int], most: int = 200) -> dict[str, int]:
+    """The largest counts above 0, and what all others come to: a status has to stay short."""
+    found = sorted(((n, key) for key, n in counts.items() if n), reverse=True)
+    rest = sum(n for n, _ in found[most:])
+    return {key: n for n, key in found[:most]} | ({OTHERS: rest} if rest else {})
