@@ -17,6 +17,7 @@ from inertial.layouts.catalogue import find
 from inertial.layouts.layout import GeometryError, Layout
 from inertial.plausible import doubt_of_gravity
 from inertial.rate import resolved
+from inertial.rate.axis_verdicts import leave_out
 from inertial.rate.batch import RateColumns
 from inertial.rate.beliefs import make
 from inertial.rate.estimators import ESTIMATORS, ProductsRate
@@ -165,6 +166,7 @@ def run_log(
     watched = monitored(data, shape, f_axis)
     tracks: dict[str, EstimatorRun] = {}
     notes = [f"{text}: not used" for text in watched.named(data.names)]
+    notes += [watched.width] if watched.width else []
     for k, name in enumerate(chosen):
         try:
             with np.errstate(
@@ -184,6 +186,7 @@ def run_log(
                     resolve,
                 )
             tracks[track.name] = track
+            notes += [track.kept] if track.kept else []
         except GeometryError as error:
             notes.append(f"{name}: {error}")
         except np.linalg.LinAlgError:
@@ -214,21 +217,20 @@ def run_estimator(
     estimator, n = make(ESTIMATORS[name], shape, card), len(data.t_s)
     reports = _reports(data) if tacho_aid else {}
     said: list[RateColumns] = []
-    busy, mask = 0, 0
+    busy, mask, refused = 0, 0, ""
     for part in cut(parts, list(reports)):
         began = time.thread_time_ns()
         if part.missing:
             estimator.skip(part.missing)
         if part.mask != mask:
-            estimator.exclude(part.mask)
-            mask = part.mask
+            mask, refused = part.mask, leave_out(estimator, part.mask) or refused
         rows = slice(part.begin, part.end)
         said.append(estimator.feed(data.t_s[rows], f_axis[rows]))
         if (last := part.end - 1) in reports:
             estimator.tacho(float(data.t_s[last]), reports[last], TACHO_SIGMA)
         busy += time.thread_time_ns() - began
         progress(part.end / n)
-    run = _joined(name, said, busy / n / 1000.0)
+    run = replace(_joined(name, said, busy / n / 1000.0), kept=refused)
     if resolve and issubclass(ESTIMATORS[name], ProductsRate):
         return _resolved(run, make(ESTIMATORS[name], shape, card), data, f_axis)
     return run

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.layouts.layout import Layout
-from inertial.rate.axis_fault import AxisState
 from logs.cube_log import CubeLog
 from logs.cube_parts import Monitored
 
@@ -22,8 +21,8 @@ def axes_of(data: CubeLog, shape: Layout, watched: Monitored) -> dict[str, dict[
     """As `examine`, with the axis monitor's word where it says that an axis is not good."""
     found = examine(data, shape)
     for name, fault in zip(data.names, watched.faults, strict=True):
-        if fault.state not in (AxisState.GOOD, AxisState.SUSPECT):
-            found[name]["state"] = fault.state.name.lower()
+        if fault.word != "good":
+            found[name]["state"] = fault.word
             found[name]["text"] = fault.text
     return found
 

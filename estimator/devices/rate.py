@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.stream import Stream, every, worth_a_line
-from inertial.layouts.layout import GeometryError
 from inertial.rate.batch import RateColumns, RateState
 from inertial.rate.beliefs import Beliefs, make
 
@@ -174,15 +173,13 @@ class RateBoard:
         """
         if mask == self._mask:
             return
+        from inertial.rate.axis_verdicts import leave_out  # here: loads only where it is needed
+
         names = [name for k, name in enumerate(self.wiring.axis_names) if mask >> k & 1]
         log.warning(
             "%s: axes not used: %s", self.device, ", ".join(names) or "none, all are good again"
         )
         self._mask = mask
         for estimator in self._estimators.values():
-            try:
-                estimator.exclude(mask)
-            except GeometryError as error:
-                log.warning(
-                    "%s: %s goes on with the axes it had: %s", self.device, estimator.name, error
-                )
+            if refused := leave_out(estimator, mask):
+                log.warning("%s: %s", self.device, refused)

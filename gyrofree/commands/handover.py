@@ -5,6 +5,7 @@ again.
 import functools
 import json
 import sys
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -22,7 +23,8 @@ from gyrofree.commands.options import (
 )
 from gyrofree.commands.run import progress_bar
 from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
-from messages.contract.topics import TopicError, check_name
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import AXES, Topic, TopicError, check_name, parse
 from sessions.library.annotations import give_title
 from sessions.recording.manifest import SessionError, name_of, slug
 
@@ -139,7 +141,7 @@ def import_log(
         for note in source.notes:
             print(f"note: {note}", file=sys.stderr)
         rows = list(importer.rows_of(source, settings.bus.prefix, device))
-        folder = _estimated(
+        folder, axes = _estimated(
             settings,
             rows,
             f"20240101-000000-{slug(name) or 'import'}",
@@ -147,13 +149,15 @@ def import_log(
             settings.recorder.root,
         )
         give_title(folder, name)
+        for text in axes:
+            print(text, file=sys.stderr)
     except (LogError, TopicError, SessionError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
     print(json.dumps({"session": folder.name}) if as_json else folder.name)
 
 
-def _estimated(settings, rows, session: str, note: str, root: Path) -> Path:
-    """A session of the rows with the estimates on them."""
+def _estimated(settings, rows, session: str, note: str, root: Path) -> tuple[Path, list[str]]:
+    """A session of the rows with the estimates on them; what is said of the axes at its end."""
     import tempfile
 
     from estimator.pipeline import Pipeline
@@ -165,7 +169,31 @@ def _estimated(settings, rows, session: str, note: str, root: Path) -> Path:
         again = estimates_again(
             inputs / "recording.mcap", Pipeline(settings.estimator), "", progress
         )
-        return write_session(Path(root), session, again, note, configuration)
+        last: dict[str, bytes] = {}
+        folder = write_session(
+            Path(root), session, _keeping(AXES, again, last), note, configuration
+        )
+        return folder, [_axes_text(payload) for payload in last.values()]
+
+
+def _keeping(
+    topic: Topic, rows: Iterable[tuple[int, str, bytes]], last: dict[str, bytes]
+) -> Iterator[tuple[int, str, bytes]]:
+    """The rows; `last` keeps the topic's last payload, by bus key."""
+    for row in rows:
+        if parse(row[1]).topic is topic:
+            last[row[1]] = row[2]
+        yield row
+
+
+def _axes_text(payload: bytes) -> str:
+    """What the axis monitor says, as `run` does."""
+    from inertial.rate.axis_fault import axis_word
+    from inertial.rate.axis_verdicts import good_of
+
+    said = pb.AxisHealth.FromString(payload)
+    states = {axis.name: axis_word(axis.state, axis.excluded) for axis in said.axes}
+    return said.message or f"axes: {good_of(states)}"
 
 
 def rerun(
