@@ -135,7 +135,8 @@ def run(
                 settings.url,
             )
         with open_client(bus, stop) as session:
-            store, desk, watched = Store(), Desk(session, bus.prefix), threading.Event()
+            store = Store(settings.devices, settings.history_bytes)
+            desk, watched = Desk(session, bus.prefix), threading.Event()
             try:
                 handle = scene.start(settings, store, desk, watched)
             except scene.SceneError as error:

@@ -46,6 +46,11 @@ class DashboardSettings(BaseModel):
         default=300.0, gt=0, le=86400
     )  # s, of the doubling wait after them
 
+    devices: int = Field(default=64, ge=1, le=1000)  # shown; a silent one makes room for another
+    history_bytes: int = Field(
+        default=1 << 30, ge=1 << 24
+    )  # memory for what the charts show; when it is full they reach back less far
+
     connections: int = Field(default=800, ge=16, le=100_000)  # at a time; see web/connections.py
     connections_per_address: int = Field(default=100, ge=8, le=100_000)  # of them; not of proxies
     request_s: float = Field(default=10.0, gt=0, le=300)  # s, to ask for something, or it is ended

@@ -74,6 +74,11 @@ class Pipeline:
         """Counts of an analogue six-axis board."""
         return self._six_axis(batch.header.device).adc(batch)
 
+    def forget(self, device: str) -> None:
+        """Begin a device anew with its next message."""
+        self._cubes.pop(device, None)
+        self._six_axes.pop(device, None)
+
     def _six_axis(self, device: str) -> SixAxis:
         if device not in self._six_axes:
             self._six_axes[device] = SixAxis(device, self._common, self._axes)

@@ -17,7 +17,8 @@ from estimator.settings import EstimatorSettings
 from estimator.worker import Worker
 from messages.bus import orders
 from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client
-from messages.contract.topics import ESTIMATES, PIPELINE_INPUTS, REPLAY_SUFFIX, TopicError, parse
+from messages.contract.door import Door
+from messages.contract.topics import ESTIMATES, PIPELINE_INPUTS, REPLAY_SUFFIX
 from messages.history.answers import Asker, declare
 from messages.history.journal_folder import JournalBusy
 from messages.history.mending_state import Arrival
@@ -42,7 +43,7 @@ def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) ->
         publishers = Publishers(session, bus.prefix, spool)
         asker = Asker(session, bus.prefix, lambda question, reply: worker.answered(question, reply))
         saved = SavedState(settings.journal, settings, version()) if spool is not None else None
-        worker = _worker(pipeline, publishers, asker, saved)
+        worker = _worker(pipeline, publishers, asker, saved, settings)
         thread = threading.Thread(target=worker.work, args=(stop,), name="estimator", daemon=True)
         thread.start()
         answering = (
@@ -83,7 +84,11 @@ def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) ->
 
 
 def _worker(
-    pipeline: Pipeline, publishers: Publishers, asker: Asker, saved: SavedState | None
+    pipeline: Pipeline,
+    publishers: Publishers,
+    asker: Asker,
+    saved: SavedState | None,
+    settings: EstimatorSettings,
 ) -> Worker:
     """A worker that goes on from the saved state when there is one."""
     found = saved.load() if saved is not None else None
@@ -100,6 +105,7 @@ def _worker(
         put,
         lambda question: asker.ask(question, *question.stream, question.query),
         None if saved is None else lambda worker: saved.save(worker, publishers),
+        Door("estimator", most_devices=settings.max_devices),
     )
     if found is not None:
         for (device, name), (run_, last) in found[1].items():
@@ -120,12 +126,14 @@ def _open_spool(settings: EstimatorSettings) -> Spool | None:
 
 def _on(worker: Worker) -> Callable[[Any], None]:
     def on_sample(sample: Any) -> None:
-        try:
-            address = parse(str(sample.key_expr))
-        except TopicError:
-            return
+        key = str(sample.key_expr)
+        address = worker.door.address(key)
         # a replay makes its own estimates
-        if address.topic in PIPELINE_INPUTS and not address.device.endswith(REPLAY_SUFFIX):
+        if address is None or address.device.endswith(REPLAY_SUFFIX):
+            return
+        if address.topic in PIPELINE_INPUTS and worker.door.admit(
+            key, address, len(sample.payload)
+        ):
             payload = sample.payload.to_bytes()
             worker.offer(
                 Arrival(address.topic, address.device, address.estimator, payload, time.time_ns())

@@ -85,6 +85,9 @@ class EstimatorSettings(BaseModel):
     use_every_fix: int = Field(
         default=1, ge=1, le=1000
     )  # n: filters get one fix in n, the others only score them
+    max_devices: int = Field(
+        default=256, ge=1, le=4096
+    )  # those that come first; messages of more are counted as refused
     journal: Path | None = (
         None  # folder: what is published, and the state to go on with after a crash
     )

@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass
 
+FARTHEST = 10_000_000  # samples; a longer gap is a new beginning: a day at 100 Hz
+
 
 @dataclass(frozen=True)
 class Admission:
@@ -43,7 +45,10 @@ class Stream:
             return Admission(True, 0, f"board restarted (boot {self._epoch} -> {epoch})")
         if first_index < self._next:
             return Admission(True, 0, f"sample index went back from {self._next} to {first_index}")
-        return Admission(False, first_index - self._next)
+        missing = first_index - self._next
+        if missing > FARTHEST:
+            return Admission(True, 0, f"sample index went from {self._next} to {first_index}")
+        return Admission(False, missing)
 
 
 def every(period_s: float, limit_hz: float) -> int:

@@ -5,21 +5,22 @@ the pipeline sees what came after them. Orders of people are done between two sa
 """
 
 import logging
-import queue
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from estimator.convert.samples import BadMessage
+from estimator.inbox import Inbox
 from estimator.output import Output
 from estimator.pipeline import Pipeline
 from estimator.stream import worth_a_line
 from messages.bus import orders
-from messages.bus.session import decode
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import PIPELINE_INPUTS
+from messages.contract.checks import Refusal
+from messages.contract.door import Door
+from messages.contract.topics import ESTIMATOR, PIPELINE_INPUTS, Address
 from messages.history.mending import Mender
 from messages.history.mending_state import Arrival, Question
 
@@ -27,6 +28,8 @@ log = logging.getLogger(__name__)
 
 # messages; more than a minute of a full-rate board, then the newest are dropped and asked for again
 BACKLOG = 20_000
+BACKLOG_BYTES = 256 << 20
+FAILURES_SHOWN = 20  # faults of ours that stand in the log with all that is known of them
 SAVE_S = 2.0
 
 
@@ -38,8 +41,18 @@ class Order:
     answer: Callable[[pb.Reply], None]
 
 
+class Ready(NamedTuple):
+    """A message that its turn has come for: nothing before it is missing any more."""
+
+    arrival: Arrival
+
+
 class Worker:
-    """Bus callbacks append, one thread steps the pipeline in order of publication and publishes."""
+    """Bus callbacks append, one thread steps the pipeline in order of publication and publishes.
+
+    What comes in is looked at here (`door`): the contract, the number of devices. Messages of a
+    device are in order, devices take turns.
+    """
 
     def __init__(
         self,
@@ -47,34 +60,37 @@ class Worker:
         put: Callable[[Output], None],
         ask: Callable[[Question], None] | None = None,
         save: Callable[["Worker"], None] | None = None,
+        door: Door | None = None,
     ) -> None:
         """`ask` puts a question to a gateway, its answer comes through `answered`; `save` keeps the
         state.
         """
         self.pipeline = pipeline
+        self.door = door or Door("estimator")
         self.mender = Mender(
-            ask or (lambda question: self.answered(question, None)), topics=PIPELINE_INPUTS
+            ask or (lambda question: self.answered(question, None)),
+            topics=PIPELINE_INPUTS,
+            refuse=self.door.refuse,
         )
         self._put, self._save = put, save
-        self._queue: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._bad = self._dropped = 0
+        self.inbox = Inbox(BACKLOG, BACKLOG_BYTES)
+        self._ready = 0  # messages that the mender has given on and the pipeline has not taken
+        self._bad = 0
         self._save_at = time.monotonic() + SAVE_S
         self.failure: BaseException | None = None
 
     def offer(self, arrival: Arrival) -> None:
         """Called on the bus's thread: append and return."""
-        if self._queue.qsize() >= BACKLOG:
-            self._dropped += 1
-            if worth_a_line(self._dropped):
-                log.error(
-                    "%d messages waiting: too slow, %d dropped so far", BACKLOG, self._dropped
-                )
-            return
-        self._queue.put(arrival)
+        if not self.inbox.offer(arrival.device, arrival) and worth_a_line(self.inbox.dropped):
+            log.error(
+                "%d messages waiting: too slow, %d dropped so far",
+                len(self.inbox),
+                self.inbox.dropped,
+            )
 
-    def answered(self, question: object, reply: pb.HistoryReply | None) -> None:
+    def answered(self, question: Question, reply: pb.HistoryReply | None) -> None:
         """Called on the asker's thread: what a gateway kept."""
-        self._queue.put((question, reply))
+        self.inbox.put(question.stream[0], (question, reply))
 
     def take_order(self, order: orders.Order[pb.EstimatorCommand, pb.Reply]) -> None:
         """Called on the bus's thread: an order for the device whose key was asked."""
@@ -83,38 +99,52 @@ class Worker:
 
     def order(self, command: pb.EstimatorCommand, answer: Callable[[pb.Reply], None]) -> None:
         """Called on any thread: what a person asks for, done between two samples."""
-        self._queue.put(Order(command, answer))
+        self.inbox.put(command.device, Order(command, answer))
 
     def finish(self) -> None:
         """Ask the worker to end after what is queued now."""
-        self._queue.put(None)
+        self.inbox.end()
 
     def work(self, stop: threading.Event) -> None:
-        """The worker: until finish(). An unexpected error sets `stop`: run() raises it, the
-        supervisor starts anew.
+        """The worker: until finish(). An unexpected error outside of a device's estimators sets
+        `stop`: run() raises it, the supervisor starts anew.
         """
         try:
-            while (item := self._queue.get()) is not None:
+            while (turn := self.inbox.get()) is not None:
+                device, item = turn
                 if isinstance(item, Order):
-                    reply, outputs = self.pipeline.order(item.command)
-                    for output in outputs:
-                        self._put(output)
-                    self._keep(
-                        at_once=True
-                    )  # before the answer: what was answered survives a crash
-                    item.answer(reply)
-                    continue
-                ready = (
-                    self.mender.take(item)
-                    if isinstance(item, Arrival)
-                    else self.mender.answer(*item)
-                )
-                for arrival in ready:
-                    self._handle(arrival)
+                    self._obey(item)
+                elif isinstance(item, Ready):
+                    self._ready -= 1
+                    self._handle(item.arrival)
+                else:
+                    self._mend(device, item)
                 self._keep()
         except BaseException as error:
             self.failure = error
             stop.set()
+
+    def _mend(self, device: str, item: Any) -> None:
+        """A message, or the answer to a question: what is in order now is handled, one at a
+        turn.
+        """
+        ready = self.mender.take(item) if isinstance(item, Arrival) else self.mender.answer(*item)
+        if len(ready) == 1:
+            self._handle(ready[0])
+        elif ready:
+            self._ready += len(ready)
+            self.inbox.put_first(device, [Ready(arrival) for arrival in ready])
+
+    def _obey(self, order: Order) -> None:
+        try:
+            reply, outputs = self.pipeline.order(order.command)
+            for output in outputs:
+                self._tell(output)
+        except Exception as error:
+            self._fail(order.command.device, "order", error)
+            reply = pb.Reply(ok=False, message=f"not done: {type(error).__name__}: see the log")
+        self._keep(at_once=True)  # before the answer: what was answered survives a crash
+        order.answer(reply)
 
     def _keep(self, at_once: bool = False) -> None:
         """Save the state when it is time; while a gap is being filled that waits. An order stands
@@ -122,20 +152,38 @@ class Worker:
         """
         if at_once:
             self._save_at = 0.0
-        if self._save is not None and time.monotonic() >= self._save_at and not self.mender.asking:
+        if self._save is None or self._ready or self.mender.asking:
+            return
+        if time.monotonic() >= self._save_at:
             self._save_at = time.monotonic() + SAVE_S
             self._save(self)
 
     def _handle(self, arrival: Arrival) -> None:
-        message = decode(arrival.topic, arrival.payload)
+        """One message in its place: through the door, and into its device's estimators."""
+        address = Address("", arrival.device, arrival.topic, arrival.estimator)
+        message = self.door.message(address, arrival.payload)
         if message is None:
             return
+        message.header.device = arrival.device
         try:
-            outputs = self.pipeline.on(arrival.topic, message)
+            for output in self.pipeline.on(arrival.topic, message):
+                self._tell(output)
         except BadMessage as error:
             self._bad += 1
             if worth_a_line(self._bad):
                 log.warning("%s: ignored (%d so far)", error, self._bad)
-            return
-        for output in outputs:
-            self._put(output)
+        except Exception as error:
+            self._fail(arrival.device, arrival.topic.name, error)
+
+    def _tell(self, output: Output) -> None:
+        if output.topic is ESTIMATOR:
+            output.message.refused.update(self.door.of(output.device))
+        self._put(output)
+
+    def _fail(self, device: str, what: str, error: Exception) -> None:
+        """A fault of ours in the estimators of one device: they begin anew, the others go on."""
+        failure = Refusal("failure", what, type(error).__name__, "to be understood")
+        self.door.refuse(f"{device}/{what}", failure, device)
+        if self.door.refused["failure"] <= FAILURES_SHOWN:
+            log.error("%s: its estimators begin anew", device, exc_info=error)
+        self.pipeline.forget(device)

@@ -21,6 +21,10 @@ FLATTENING = 1.0 / 298.257223563
 ECCENTRICITY2 = 6.69437999014e-3
 """First eccentricity squared of the ellipsoid (WGS-84)."""
 
+GEOID_SIGMA = 110.0
+"""m, how far the sea is from the ellipsoid at most (EGM96: -107 to 86): what a height above sea
+level is worth as one above the ellipsoid where nobody gives the geoid's."""
+
 GRAVITY_EQUATOR = 9.7803253359
 """m/s^2, normal gravity at the equator (WGS-84)."""
 

@@ -3,6 +3,8 @@ wrong with it.
 """
 
 import codecs
+import errno
+import stat
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -11,6 +13,8 @@ from typing import Any, TypeVar
 import tomli_w
 
 T = TypeVar("T")
+
+LARGEST = 16 * 1024**2  # bytes of a file of settings
 
 MARKS = (
     (codecs.BOM_UTF8, "utf-8"),
@@ -21,9 +25,17 @@ MARKS = (
 
 def text_of(path: Path) -> str:
     """The text of a file that an editor of any country wrote: UTF-8 with or without a byte-order
-    mark, UTF-16, else Windows-1252. Raises OSError.
+    mark, UTF-16, else Windows-1252. Raises OSError, also for what is no file, or too large for one
+    that a person wrote.
     """
-    data = Path(path).read_bytes()
+    path = Path(path)
+    shape = stat.S_IFMT(path.stat().st_mode)
+    if shape not in (stat.S_IFREG, stat.S_IFDIR):
+        raise OSError(errno.EINVAL, "a pipe, a device or a socket; want a file", str(path))
+    with path.open("rb") as file:
+        data = file.read(LARGEST + 1)
+    if len(data) > LARGEST:
+        raise OSError(errno.EFBIG, f"more than {LARGEST >> 20} MB; want settings", str(path))
     for mark, encoding in MARKS:
         if data.startswith(mark):
             return data[len(mark) :].decode(encoding, errors="replace")

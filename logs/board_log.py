@@ -14,6 +14,7 @@ height above the ellipsoid; quality as RTKLIB counts: 1 fixed, 2 float, 3 SBAS, 
 single, 0 none. Other units in the columns' names are converted.
 """
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,6 +34,7 @@ Array = NDArray[np.float64]
 
 CUBE_AXES = tuple(f"a{sensor}{axis}" for sensor in range(1, 5) for axis in range(1, 4))
 COUNTS_16 = (-32768, 32767)  # what a frame of the wire carries
+NEAR_S = 60.0  # before and behind the samples, in which epochs are taken
 HALF_SIDE = 0.05  # m; gravity is read without it
 
 
@@ -46,7 +48,7 @@ class BoardLog:
     index: NDArray[np.int64]  # (n,) sample numbers; what is missing was lost
     f_b: Array | None  # (n, 3) m/s^2 of a six-axis unit
     omega_b: Array | None  # (n, 3) rad/s
-    counts: NDArray[np.int64] | None  # (n, 12) of a cube
+    counts: NDArray[np.int16] | None  # (n, 12) of a cube
     tacho: Array | None  # (n,) rad/s
     fixes: tuple[Fix, ...]
     timing: Timing
@@ -84,6 +86,13 @@ def _imu(path: Path, sheet: Sheet, gnss: Path | None, as_named: bool) -> BoardLo
     doubts = [doubt_of_gravity(f_b), doubt_of_rate(table["t"], f_b, omega_b)]
     notes = refuse(path, doubts, as_named) + said_of(path, timing, table.cut_off)
     fixes, left_out = read_fixes(gnss) if gnss else ([], [])
+    near = [fix for fix in fixes if _near(fix, table["t"])]
+    if len(near) < len(fixes):
+        left_out.append(
+            f"{gnss}: {len(fixes) - len(near)} of {len(fixes)} epochs are left out: they have no"
+            f" position, or are more than {NEAR_S:.0f} s away from the samples"
+            f" ({table['t'][0]:.3f} to {table['t'][-1]:.3f} s)"
+        )
     return BoardLog(
         path,
         "imu",
@@ -93,26 +102,33 @@ def _imu(path: Path, sheet: Sheet, gnss: Path | None, as_named: bool) -> BoardLo
         omega_b,
         None,
         None,
-        tuple(fixes),
+        tuple(near),
         timing,
         (*notes, *left_out),
     )
 
 
+def _near(fix: Fix, t: Array) -> bool:
+    """Can an epoch belong to samples at times t?"""
+    place = math.isfinite(fix.latitude) and math.isfinite(fix.longitude)
+    return place and t[0] - NEAR_S <= fix.t <= t[-1] + NEAR_S
+
+
 def _cube(path: Path, as_named: bool, lsb_mg: float) -> BoardLog:
     log = read_log(path, CUBE_AXES, lsb_mg)
-    if log.counts is None:
+    counts = log.counts
+    if counts is None:
         raise LogError(
             f"{path}: a board sends counts, and this log has m/s^2: want columns a11_counts ..."
             " (gyrofree run takes the log as it is)"
         )
     low, high = COUNTS_16
-    bad = np.argwhere((log.counts < low) | (log.counts > high))
+    bad = np.argwhere((counts < low) | (counts > high))
     if len(bad):
         row, column = bad[0]
         raise LogError(
             f"{path}: column '{CUBE_AXES[column]}_counts' at {log.t_s[row]:.3f} s:"
-            f" {log.counts[row, column]}; want a whole number of 16 bits"
+            f" {counts[row, column]}; want a whole number of 16 bits"
         )
     doubt = doubt_of_gravity(centre_force(log.f_axis), lsb_mg)
     notes = refuse(path, [doubt], as_named) + said_of(path, log.timing, log.cut_off)
@@ -123,7 +139,7 @@ def _cube(path: Path, as_named: bool, lsb_mg: float) -> BoardLog:
         log.index,
         None,
         None,
-        log.counts,
+        counts.astype(np.int16),
         log.tacho,
         (),
         log.timing,

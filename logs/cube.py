@@ -36,6 +36,8 @@ Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
 SHOW_GAPS = 20
+BLOCK = 8192  # samples that an estimator is given at once
+SAID = ("omega_b", "P", "q_nb", "angle_z", "alpha_b", "f_b", "still", "p_n")  # what is kept
 TACHO_SIGMA = (
     0.03  # rad/s; a log says neither how well its tachometer measured nor when its pulses came
 )
@@ -156,7 +158,8 @@ def run_log(
     """Tracks of the estimators that can use this layout, what the axis monitor says, and why others
     cannot. Raises LogError, CardError.
     """
-    f_axis = data.f_axis * np.array(shape.gain)
+    gain = np.array(shape.gain)
+    f_axis = data.f_axis if np.all(gain == 1.0) else data.f_axis * gain
     if card is not None:
         shape, f_axis = card.layout(shape), card.correct(f_axis)
     chosen = list(names) if names else list(ESTIMATORS)
@@ -216,7 +219,7 @@ def run_estimator(
     """
     estimator, n = make(ESTIMATORS[name], shape, card), len(data.t_s)
     reports = _reports(data) if tacho_aid else {}
-    said: list[RateColumns] = []
+    said = _Said(n)
     busy, mask, refused = 0, 0, ""
     for part in cut(parts, list(reports)):
         began = time.thread_time_ns()
@@ -224,38 +227,44 @@ def run_estimator(
             estimator.skip(part.missing)
         if part.mask != mask:
             mask, refused = part.mask, leave_out(estimator, part.mask) or refused
-        rows = slice(part.begin, part.end)
-        said.append(estimator.feed(data.t_s[rows], f_axis[rows]))
+        for begin in range(part.begin, part.end, BLOCK):
+            rows = slice(begin, min(begin + BLOCK, part.end))
+            said.take(rows, estimator.feed(data.t_s[rows], f_axis[rows]))
         if (last := part.end - 1) in reports:
             estimator.tacho(float(data.t_s[last]), reports[last], TACHO_SIGMA)
         busy += time.thread_time_ns() - began
         progress(part.end / n)
-    run = replace(_joined(name, said, busy / n / 1000.0), kept=refused)
+    run = replace(said.run(name, busy / n / 1000.0), kept=refused)
     if resolve and issubclass(ESTIMATORS[name], ProductsRate):
         return _resolved(run, make(ESTIMATORS[name], shape, card), data, f_axis)
     return run
 
 
-def _joined(name: str, said: Sequence[RateColumns], us_per_sample: float) -> EstimatorRun:
-    """The columns of all parts as one run."""
+class _Said:
+    """What an estimator says of a log of n samples, block by block."""
 
-    def column(field: str) -> Array:
-        return np.concatenate([getattr(columns, field) for columns in said])
+    def __init__(self, n: int) -> None:
+        self._n, self._aided, self._blind, self._why = n, False, 0, ""
+        self._columns: dict[str, NDArray[Any]] = {}
 
-    blind = (column("sight") == BLIND).all(axis=1)
-    why = ""
-    if 2 * np.count_nonzero(blind) > len(blind):
-        last = said[-1]
-        k = len(last) - 1 - int(np.argmax((last.sight == BLIND).all(axis=1)[::-1]))
-        why = last.sight_reason(k) or "not known"
-    return EstimatorRun(
-        name + SUFFIX if column("aided").any() else name,
-        *(column(field) for field in ("omega_b", "P", "q_nb", "angle_z", "alpha_b", "f_b")),
-        column("still"),
-        column("p_n"),
-        us_per_sample,
-        why,
-    )
+    def take(self, rows: slice, said: RateColumns) -> None:
+        """Its columns over some rows."""
+        for field in SAID:
+            column = getattr(said, field)
+            if field not in self._columns:
+                self._columns[field] = np.empty((self._n, *column.shape[1:]), column.dtype)
+            self._columns[field][rows] = column
+        self._aided |= bool(said.aided.any())
+        blind = np.nonzero((said.sight == BLIND).all(axis=1))[0]
+        self._blind += len(blind)
+        if len(blind):
+            self._why = said.sight_reason(int(blind[-1]))
+
+    def run(self, name: str, us_per_sample: float) -> EstimatorRun:
+        """All of it; a rate that is not known in more than half of the samples is named so."""
+        why = (self._why or "not known") if 2 * self._blind > self._n else ""
+        name = name + SUFFIX if self._aided else name
+        return EstimatorRun(name, **self._columns, us_per_sample=us_per_sample, blind=why)
 
 
 def _resolved(run: EstimatorRun, fresh: ProductsRate, data: CubeLog, f_axis: Array) -> EstimatorRun:

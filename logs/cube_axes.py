@@ -10,7 +10,10 @@ from logs.cube_log import CubeLog
 from logs.cube_parts import Monitored
 
 STUCK_S = 1.0  # s of exactly the same reading ; at rest, coarse counts may repeat for long
-SATURATED = (-4096, 4095)  # counts, ADXL345 in full resolution, +-16 g
+SATURATED = (
+    (-4096, 0.5),
+    (4095, -0.5),
+)  # and half a count within; counts, ADXL345 in full resolution, +-16 g
 NOISELESS = 1e-3  # m/s^2; no accelerometer is quieter
 MOVING = (
     0.5  # m/s^2, standard deviation of the other axes over a stretch that tells turning from rest
@@ -32,9 +35,7 @@ def examine(data: CubeLog, shape: Layout) -> dict[str, dict[str, Any]]:
     either.
     """
     moving = _moving(data)
-    steps = np.diff(data.f_axis, axis=0)
-    spread = np.median(np.abs(steps - np.median(steps, axis=0)), axis=0)
-    noises = 1.4826 * spread / np.sqrt(2.0)  # robust against motion
+    noises = np.array([_noise(column) for column in data.f_axis.T])
     usual = float(np.median(noises))
     if usual < NOISELESS:
         moving[:] = False  # a computed log: axes along the table's axis stand still in it
@@ -45,12 +46,9 @@ def examine(data: CubeLog, shape: Layout) -> dict[str, dict[str, Any]]:
         column, noise = data.f_axis[:, k], float(noises[k])
         stuck = _longest_run(column, moving) * data.period_s
         saturated = 0
-        if data.counts is not None:
-            saturated = int(
-                np.count_nonzero(
-                    (data.counts[:, k] <= SATURATED[0]) | (data.counts[:, k] >= SATURATED[1])
-                )
-            )
+        if data.lsb_mps2:
+            low, high = (data.lsb_mps2 * (limit + side) for limit, side in SATURATED)
+            saturated = int(np.count_nonzero((column < low) | (column > high)))
         state = "stuck" if stuck >= STUCK_S else "saturated" if saturated else "good"
         found[name] = {
             "state": state,
@@ -60,6 +58,12 @@ def examine(data: CubeLog, shape: Layout) -> dict[str, dict[str, Any]]:
             "saturated_samples": saturated,
         }
     return found
+
+
+def _noise(column: NDArray[np.float64]) -> float:
+    """Of one axis, from sample to sample; robust against motion."""
+    steps = np.diff(column)
+    return float(1.4826 * np.median(np.abs(steps - np.median(steps))) / np.sqrt(2.0))
 
 
 def _moving(data: CubeLog) -> NDArray[np.bool_]:

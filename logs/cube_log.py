@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from inertial.constants import GRAVITY
 from inertial.timing import Timing
-from logs.quantities import UNITS, column_of, timing_of
+from logs.quantities import UNITS, column_of, in_range, timing_of
 from logs.sheet import LogError, Sheet, Table, open_sheet
 
 Array = NDArray[np.float64]
@@ -54,7 +54,6 @@ class CubeLog:
     names: tuple[str, ...]  # of the axes, "a11" ...
     t_s: Array  # (n,)
     f_axis: Array  # (n, N) m/s^2, nominal scale
-    counts: NDArray[np.int64] | None  # (n, N), where the log has counts
     lsb_mps2: float  # m/s^2 per count; 0 for a log in m/s^2
     index: NDArray[np.int64]  # (n,), sample numbers with the gaps counted
     timing: Timing
@@ -63,6 +62,13 @@ class CubeLog:
     omega_b: Array | None  # (n, 3) rad/s, truth
     q_nb: Array | None  # (n, 4), truth
     cut_off: bool = False  # the last line was half written and is left out
+
+    @property
+    def counts(self) -> NDArray[np.int64] | None:
+        """(n, N) as read, where the log has counts; made when they are asked for."""
+        if not self.lsb_mps2:
+            return None
+        return np.rint(self.f_axis / self.lsb_mps2).astype(np.int64)
 
     @property
     def period_s(self) -> float:
@@ -88,17 +94,25 @@ def read_log(path: Path, names: Sequence[str], lsb_mg: float | None = None) -> C
     table = sheet.read([t_name, *axes, *_optional(sheet)])
     table.columns["t"] = table[t_name] * t_unit
     timing = timing_of(sheet, table)
-    values = np.column_stack([table[name] for name in axes])
+    for name in (TACHO, *TRUE_RATE):
+        if name in table:
+            in_range(sheet, table, name, table[name], name)
     lsb = (LSB_MG if lsb_mg is None else lsb_mg) * 1e-3 * GRAVITY if unit == "counts" else 0.0
     if unit == "counts" and not lsb > 0.0:
         raise LogError(f"{path}: {lsb_mg} mg per count, want more than 0")
+    f_axis = np.empty((len(table), len(axes)))
+    for k, name in enumerate(axes):
+        column = table.columns.pop(name)  # a log is long: no column is kept twice
+        if lsb:
+            _whole(path, table, column, name)
+        f_axis[:, k] = column * (lsb or UNITS[unit])
+        in_range(sheet, table, name, f_axis[:, k], "fx")
     return CubeLog(
         path=path,
         sha256=_digest(path),
         names=tuple(names),
         t_s=table["t"],
-        f_axis=np.ascontiguousarray(values * (lsb or UNITS[unit])),
-        counts=_whole(path, table, values, names) if lsb else None,
+        f_axis=f_axis,
         lsb_mps2=lsb,
         index=timing.index,
         timing=timing,
@@ -157,16 +171,14 @@ def _gaps(timing: Timing, table: Table) -> tuple[Gap, ...]:
     )
 
 
-def _whole(path: Path, table: Table, values: Array, names: Sequence[str]) -> NDArray[np.int64]:
-    bad = np.argwhere((values != np.rint(values)) | (np.abs(values) > 2**31))
+def _whole(path: Path, table: Table, column: Array, name: str) -> None:
+    bad = np.nonzero((column != np.rint(column)) | (np.abs(column) > 2**31))[0]
     if len(bad):
-        row, column = bad[0]
+        row, axis = bad[0], name.rpartition("_")[0]
         raise LogError(
-            f"{path}:{table.lines[row]}: column '{names[column]}_counts': {values[row, column]:g}"
-            " is no whole number; counts are as read, values in m/s^2 belong in"
-            f" '{names[column]}_mps2'"
+            f"{path}:{table.lines[row]}: column {name!r}: {column[row]:g} is no whole number;"
+            f" counts are as read, values in m/s^2 belong in '{axis}_mps2'"
         )
-    return values.astype(np.int64)
 
 
 def _columns(table: Table, group: tuple[str, ...]) -> Array | None:

@@ -24,7 +24,7 @@ from inertial.navigation.fix import (
 from inertial.plausible import doubt_of_gravity, doubt_of_rate
 from inertial.timing import Timing
 from inertial.toml_file import text_of
-from logs.quantities import read_si, refuse, timing_of
+from logs.quantities import read_si, refuse, rising, timing_of
 from logs.sheet import LogError, Table, open_sheet
 
 Array = NDArray[np.float64]
@@ -38,7 +38,8 @@ TRUE_VELOCITY = ("true_vn", "true_ve", "true_vd")
 TRUE_ATTITUDE = ("true_qw", "true_qx", "true_qy", "true_qz")
 SIGMA_P, SIGMA_V = ("sd_n", "sd_e", "sd_u"), ("sd_vn", "sd_ve", "sd_vd")
 VELOCITY = ("vn", "ve", "vd")
-EPOCH = ("arrival", "quality", *VELOCITY, *SIGMA_P, *SIGMA_V, "yaw", "sd_yaw")
+PLACE = ("lat", "lon")
+EPOCH = ("height", "arrival", "quality", *VELOCITY, *SIGMA_P, *SIGMA_V, "yaw", "sd_yaw")
 
 
 @dataclass(frozen=True)
@@ -98,18 +99,21 @@ def read_drive_log(
 
 
 def read_fixes(path: Path) -> tuple[list[Fix], list[str]]:
-    """GNSS epochs, and in words what is missing of them; sigmas and velocity where the file has
-    them, else what is typical of the quality. Raises LogError, OSError.
+    """GNSS epochs, and in words what is missing of them; sigmas where the file has them, else what
+    is typical of the quality. A height or velocity that the file does not have is unknown. Raises
+    LogError, OSError.
     """
     sheet = open_sheet(path)
-    c = read_si(sheet, ("t", "lat", "lon", "height"), EPOCH, EPOCH)
+    c = read_si(sheet, ("t", *PLACE), EPOCH, (*PLACE, *EPOCH))
+    rising(sheet, c)
     quality = c["quality"] if "quality" in c else np.full(len(c), 5.0)
     kinds = [
         QUALITY.get(int(q), UNKNOWN_QUALITY) if math.isfinite(q) else UNKNOWN_QUALITY
         for q in quality.tolist()
     ]
-    fixes = [_fix(c, k, kind) for k, kind in enumerate(kinds)]
-    notes = []
+    placed = np.isfinite(c["lat"]) & np.isfinite(c["lon"]) & ((c["lat"] != 0) | (c["lon"] != 0))
+    fixes = [_fix(c, k, kind if placed[k] else UNKNOWN_QUALITY) for k, kind in enumerate(kinds)]
+    notes = _missing(path, c, fixes, placed)
     if unused := [k for k, kind in enumerate(kinds) if kind == UNKNOWN_QUALITY]:
         first = quality[unused[0]]
         value = f"{first:g}" if math.isfinite(first) else "empty"
@@ -120,6 +124,24 @@ def read_fixes(path: Path) -> tuple[list[Fix], list[str]]:
     return fixes, notes
 
 
+def _missing(path: Path, c: Table, fixes: list[Fix], placed: Array) -> list[str]:
+    """In words, what epochs do not have."""
+    notes, n = [], len(fixes)
+    if not placed.all():
+        line = c.lines[int(np.flatnonzero(~placed)[0])]
+        empty = int((~placed).sum())
+        notes.append(f"{path}:{line}: {empty} of {n} epochs have no position and are not used")
+    flat = sum(not fix.has_height for fix in fixes)
+    if flat:
+        why = "their cells are empty" if "height" in c else "there is no column height_m"
+        notes.append(f"{path}: {flat} of {n} epochs have no height ({why}): it stays unknown")
+    slow = sum(fix.v_n is None for fix in fixes)
+    if slow:
+        why = "their cells are empty" if "vn" in c else "there are no columns vn_mps, ve_mps"
+        notes.append(f"{path}: {slow} of {n} epochs have no velocity ({why})")
+    return notes
+
+
 def _fix(c: Table, k: int, kind: int) -> Fix:
     position, velocity = typical_sigma(kind)
     return Fix(
@@ -127,12 +149,12 @@ def _fix(c: Table, k: int, kind: int) -> Fix:
         arrival=_known(c, "arrival", k, float(c["t"][k])),
         latitude=float(c["lat"][k]),
         longitude=float(c["lon"][k]),
-        height=float(c["height"][k]),
+        height=_known(c, "height", k, math.nan),
         quality=kind,
         key=k,
-        sigma_p=_three(c, SIGMA_P, k, position),
-        v_n=_three(c, VELOCITY, k, None),
-        sigma_v=_three(c, SIGMA_V, k, velocity),
+        sigma_p=_three(c, SIGMA_P, k, position, float(position[2])),
+        v_n=_three(c, VELOCITY, k, None, math.nan),
+        sigma_v=_three(c, SIGMA_V, k, velocity, float(velocity[2])),
         yaw=_known(c, "yaw", k, None),
         sigma_yaw=_known(c, "sd_yaw", k, 0.01),
     )
@@ -144,9 +166,16 @@ def _known(c: Table, name: str, k: int, otherwise):
     return value if math.isfinite(value) else otherwise
 
 
-def _three(c: Table, names: tuple[str, ...], k: int, otherwise: Array | None) -> Array | None:
-    values = np.array([c[name][k] for name in names]) if all(n in c for n in names) else None
-    return values if values is not None and np.isfinite(values).all() else otherwise
+def _three(
+    c: Table, names: tuple[str, ...], k: int, otherwise: Array | None, third: float
+) -> Array | None:
+    """Three numbers of row k; `otherwise` where one of the first two is missing, `third` for the
+    last alone.
+    """
+    north, east, last = (_known(c, name, k, math.nan) for name in names)
+    if not (math.isfinite(north) and math.isfinite(east)):
+        return otherwise
+    return np.array([north, east, last if math.isfinite(last) else third])
 
 
 def _truth(table: Table) -> DriveTruth | None:

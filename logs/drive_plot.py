@@ -54,9 +54,9 @@ def draw(
 
 
 def _way(ax: Any, log: DriveLog, lead: Result) -> None:
-    first = log.fixes[0]
-    origin = first.latitude, first.longitude, first.height
-    places = np.array([(f.latitude, f.longitude, f.height) for f in log.fixes])
+    # seen from above: heights do not count
+    places = np.array([(f.latitude, f.longitude, 0.0) for f in log.fixes if f.quality])
+    origin = tuple(places[0])
     fixes, way = ned_between(origin, places.T), ned_between(origin, place_of(lead.x))
     ax.plot(fixes[1], fixes[0], ".", ms=2, color="#E69F00", label="fixes")
     ax.plot(way[1], way[0], lw=1.2, color=COLOURS[0], label="solution")

@@ -35,6 +35,19 @@ UNITS = {
     "mps": 1.0,
     "kmph": 1.0 / 3.6,
 }
+LIMITS = {  # of quantities in SI, by the beginning of their names: what a log can mean
+    "fx fy fz": (-2e4, 2e4),
+    "wx wy wz": (-2e3, 2e3),
+    "lat true_lat": (-math.pi / 2.0, math.pi / 2.0),
+    "lon true_lon": (-2.0 * math.pi, 2.0 * math.pi),
+    "height true_height": (-1e6, 1e6),
+    "vn ve vd true_vn true_ve true_vd": (-1e5, 1e5),
+    "sd_n sd_e sd_u sd_vn sd_ve sd_vd": (0.0, 1e6),
+    "tacho_rad_s true_wx true_wy true_wz": (-1e4, 1e4),
+}
+RANGES = {name: limits for names, limits in LIMITS.items() for name in names.split()}
+LATEST_S = 4.1e9  # of a log's time: year 2099, if it is Unix time
+LONGEST_S = 1e8  # of a log, three years
 USUAL = {"t": "s", "f": "mps2", "w": "radps", "lat": "deg", "lon": "deg", "height": "m", "v": "mps"}
 
 
@@ -67,7 +80,23 @@ def read_si(
     free = [there[q][0] for q in may_miss if q in there]
     table = sheet.read(names, free)
     columns = {q: table[name] * unit for q, (name, unit) in there.items()}
+    for q, (name, _) in there.items():
+        in_range(sheet, table, name, columns[q], q)
     return Table(columns, table.lines, table.cut_off)
+
+
+def in_range(sheet: Sheet, table: Table, name: str, values: Array, quantity: str) -> None:
+    """Raises LogError for a value (SI) that no such quantity has; NaN is none."""
+    if quantity not in RANGES:
+        return
+    low, high = RANGES[quantity]
+    bad = np.nonzero((values < low) | (values > high))[0]
+    if len(bad):
+        row = int(bad[0])
+        raise LogError(
+            f"{sheet.path}:{table.lines[row]}: column {name!r}: {values[row]:.6g} in SI units; want"
+            f" {low:.6g} to {high:.6g}: check the column's unit"
+        )
 
 
 def timing_of(sheet: Sheet, table: Table) -> Timing:
@@ -84,7 +113,26 @@ def timing_of(sheet: Sheet, table: Table) -> Timing:
         raise LogError(f"{sheet.path}:{line}: column {name!r}: {error}") from None
     if doubt := doubt_of_time(timing.period_s, name):
         raise LogError(f"{sheet.path}: {doubt.text}")
+    rising(sheet, table)
     return timing
+
+
+def rising(sheet: Sheet, table: Table) -> None:
+    """Raises LogError where times of column "t" (s) fall, or are no times of a log; equal ones may
+    follow one another.
+    """
+    t = table["t"]
+    name = (column_of(sheet, "t") or ("t_s", 1.0))[0]
+    wrong = np.concatenate([[False], np.diff(t) < 0.0]) | (np.abs(t) > LATEST_S)
+    if len(t):
+        wrong |= t - t[0] > LONGEST_S
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise LogError(
+            f"{sheet.path}:{table.lines[row]}: column {name!r}: time {t[row]:.6f} s after"
+            f" {t[max(0, row - 1)]:.6f} s; want seconds that rise, from the log's start or of Unix"
+            " time"
+        )
 
 
 def refuse(path: Path, doubts: Sequence[Doubt | None], as_named: bool) -> list[str]:

@@ -10,6 +10,7 @@ The file is read in blocks, so memory grows with the numbers that are kept, not 
 """
 
 import csv
+from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,19 +23,25 @@ from numpy.typing import NDArray
 from logs.sheet_form import (
     COMMENTS,
     FIRST_LOOK,
+    LINE,
     MISSING,
     SEPARATORS,
+    Lines,
     LogError,
     count,
     decimal_of,
     decoded,
+    first_bytes,
     header_line,
     is_number,
+    long_line,
+    opened,
+    printable,
 )
 
 Array = NDArray[np.float64]
 
-BLOCK = 1 << 20  # bytes read at once; no line may be longer
+MOST_COLUMNS = 4096
 
 
 @dataclass(frozen=True)
@@ -59,17 +66,45 @@ class Table:
 class _Rows:
     """Rows that are no samples, as the parser meets them."""
 
-    skipped: list[int] = field(default_factory=list)  # row numbers of comments and empty lines
-    wrong: list[tuple[int, int, str]] = field(default_factory=list)  # row, cells, text
+    first: int  # number that the parser gives to the first row below the header
+    skipped: array = field(default_factory=lambda: array("q"))  # comments and empty lines
+    wrong: list[tuple[int, int, str]] = field(default_factory=list)  # row, cells, text: two at most
 
     def judge(self, row: pa.csv.InvalidRow) -> str:
         """What to do with a row of a wrong number of cells."""
         text = row.text.strip()
         if not text.strip(",;|\t ") or text.startswith(COMMENTS):
             self.skipped.append(row.number)
-        else:
-            self.wrong.append((row.number, row.actual_columns, text))
+        elif len(self.wrong) < 2:
+            self.wrong.append((row.number, row.actual_columns, printable(text)))
         return "skip"
+
+    def lines(self, index: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Lines of the file of rows that were kept, by their order."""
+        out = np.sort([*self.skipped, *(row[0] for row in self.wrong)]).astype(np.int64)
+        kept_before = out - self.first - np.arange(len(out))
+        return index + self.first + np.searchsorted(kept_before, index, side="right")
+
+
+class _Growing:
+    """A column that grows block by block in one array, as long as the file's size promises."""
+
+    def __init__(self, size: int) -> None:
+        self._blocks = 2 + size // LINE
+        self._values, self._n = np.zeros(0), 0
+
+    def add(self, part: Array) -> None:
+        """More of it."""
+        if self._n + len(part) > len(self._values):
+            larger = np.empty(max(len(part) * self._blocks, 2 * len(self._values)))
+            larger[: self._n] = self._values[: self._n]
+            self._values = larger  # pages that are never written take no memory
+        self._values[self._n : self._n + len(part)] = part
+        self._n += len(part)
+
+    def whole(self) -> Array:
+        """All of it."""
+        return self._values[: self._n]
 
 
 @dataclass(frozen=True)
@@ -77,6 +112,7 @@ class Sheet:
     """How a file is written, found from its beginning."""
 
     path: Path
+    size: int  # bytes when it was looked at; what comes later is not read
     encoding: str
     separator: str
     decimal: str
@@ -88,7 +124,9 @@ class Sheet:
         missing = [name for name in names if name not in self.header]
         if not missing:
             return
-        found = ", ".join(self.header[:20]) + (" ..." if len(self.header) > 20 else "")
+        found = ", ".join(map(printable, self.header[:20])) + (
+            " ..." if len(self.header) > 20 else ""
+        )
         separated = ""
         if len(self.header) == 1:
             separated = (
@@ -107,43 +145,55 @@ class Sheet:
         too few cells or a line that is too long; OSError for a file that cannot be read.
         """
         self.want(names)
-        rows, parts, done = _Rows(), [], 0
-        for batch in self._batches(list(names), rows):
-            part = [column.to_numpy(zero_copy_only=False) for column in batch.columns]
-            table = np.column_stack(part).astype(np.float64, copy=False)
-            empty = self._empty(table, rows, done)
-            table = table[~empty]
-            self._finite(table, names, may_miss, rows, done)
-            parts.append(table)
-            done += len(table)
-        table = np.concatenate(parts) if parts else np.zeros((0, len(names)))
+        rows, done = _Rows(self.header_line + 1), 0
+        blanks = Lines(self.path, self.size, self.encoding)
+        kept: dict[str, _Growing] = {name: _Growing(self.size) for name in names}
+        for batch in self._batches(list(kept), rows):
+            table = {
+                name: column.to_numpy(zero_copy_only=False).astype(np.float64, copy=False)
+                for name, column in zip(kept, batch.columns, strict=True)
+            }
+            empty = self._empty(table, rows, done, blanks)
+            for name, column in table.items():
+                samples = column[~empty]
+                if name not in may_miss:
+                    self._finite(samples, name, rows, done)
+                kept[name].add(samples)
+            done += int(np.count_nonzero(~empty))
         cut_off = self._check_rows(rows, done)
-        columns = {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(names)}
-        return Table(columns, self._lines(np.arange(done), rows), cut_off)
+        columns = {name: column.whole() for name, column in kept.items()}
+        return Table(columns, rows.lines(np.arange(done)), cut_off)
 
     def _batches(self, names: list[str], rows: _Rows) -> Iterator[pa.RecordBatch]:
         try:
-            with self._open(names, rows, pa.float64()) as reader:
+            with opened(self.path, self.size) as stream, self._open(stream, names, rows) as reader:
                 yield from reader
+        except UnicodeDecodeError as error:
+            raise LogError(f"{self.path}: no text in {self.encoding}: {error.reason}") from None
         except pa.ArrowInvalid as error:
             if "straddling" in str(error):
+                line = long_line(self.path, self.size)
                 raise LogError(
-                    f"{self.path}: a line of more than {BLOCK >> 20} MB; want one sample a line"
+                    f"{self.path}:{line}: a line of more than {LINE >> 20} MB; want one sample"
+                    " a line"
                 ) from None
-            raise LogError(self._no_number(names) or f"{self.path}: {error}") from None
+            raise LogError(
+                self._no_number(names) or f"{self.path}: {printable(str(error))}"
+            ) from None
 
-    def _open(self, names: list[str], rows: _Rows, kind: pa.DataType) -> pa.csv.CSVStreamingReader:
+    def _open(self, stream, names: list[str], rows: _Rows) -> pa.csv.CSVStreamingReader:
         # names are ours: a column that stands twice, or has none, must not stop the reader
         unique = [f"{k}:{name}" for k, name in enumerate(self.header)]
         chosen = [unique[self.header.index(name)] for name in names]
         return pa.csv.open_csv(
-            self.path,
+            stream,
             pa.csv.ReadOptions(
                 use_threads=False,
-                block_size=BLOCK,
+                block_size=LINE,
                 skip_rows=self.header_line,
                 column_names=unique,
-                encoding=self.encoding,
+                # numbers are ASCII; bytes that Windows-1252 does not know must not end the reading
+                encoding="latin-1" if self.encoding == "cp1252" else self.encoding,
             ),
             pa.csv.ParseOptions(
                 delimiter=self.separator,
@@ -151,40 +201,30 @@ class Sheet:
                 invalid_row_handler=rows.judge,
             ),
             pa.csv.ConvertOptions(
-                column_types=dict.fromkeys(chosen, kind),
+                column_types=dict.fromkeys(chosen, pa.float64()),
                 include_columns=chosen,
-                null_values=MISSING if kind == pa.float64() else [],
+                null_values=MISSING,
                 decimal_point=self.decimal,
             ),
         )
 
-    def _empty(self, table: Array, rows: _Rows, done: int) -> NDArray[np.bool_]:
+    def _empty(
+        self, table: dict[str, Array], rows: _Rows, done: int, text: Lines
+    ) -> NDArray[np.bool_]:
         """Which rows are empty lines; they are noted as skipped."""
-        empty = np.isnan(table).all(axis=1)
-        if not empty.any():
-            return empty
-        lines = self._lines(np.arange(done, done + len(table)), rows)
-        blank = self._blank_lines(set(lines[empty].tolist()))
-        empty &= np.isin(lines, sorted(blank))
-        rows.skipped += lines[empty].tolist()
+        empty = np.all([np.isnan(column) for column in table.values()], axis=0)
+        if empty.any():
+            lines = rows.lines(np.arange(done, done + len(empty)))
+            nothing = ' \t\r\n"' + self.separator
+            for k in np.nonzero(empty)[0].tolist():
+                empty[k] = not text.line(int(lines[k])).strip(nothing)
+            rows.skipped.extend(lines[empty].tolist())
         return empty
 
-    def _blank_lines(self, candidates: set[int]) -> set[int]:
-        nothing = ' \t\r\n"' + self.separator
-        with self.path.open(encoding=self.encoding, errors="replace") as file:
-            return {
-                k for k, line in enumerate(file, 1) if k in candidates and not line.strip(nothing)
-            }
-
-    def _finite(
-        self, table: Array, names: Sequence[str], may_miss: Sequence[str], rows: _Rows, done: int
-    ) -> None:
-        must = [k for k, name in enumerate(names) if name not in may_miss]
-        bad = np.argwhere(~np.isfinite(table[:, must]))
+    def _finite(self, column: Array, name: str, rows: _Rows, done: int) -> None:
+        bad = np.nonzero(~np.isfinite(column))[0]
         if len(bad):
-            row, column = bad[0]
-            line = int(self._lines(np.array([done + row]), rows)[0])
-            name = names[must[column]]
+            line = int(rows.lines(bad[:1] + done)[0])
             raise LogError(
                 f"{self.path}:{line}: column {name!r}: {self._cell(line, name)!r} is no finite"
                 " number; correct it, or leave the row out: it then counts as a missing sample"
@@ -194,56 +234,41 @@ class Sheet:
         """Raises LogError for a row of a wrong number of cells; True for a last line cut off."""
         last = done + len(rows.skipped) + len(rows.wrong)
         for number, cells, text in rows.wrong:
-            if cells < len(self.header) and number - self._first == last - 1:
+            if cells < len(self.header) and number - rows.first == last - 1:
                 if not self._ends_with_newline():
                     return True
             raise LogError(
                 f"{self.path}:{number}: {cells} cells, the header names {len(self.header)}:"
-                f" {text[:60]!r}; complete the row, or leave it out"
+                f" {text!r}; complete the row, or leave it out"
             )
         return False
 
-    @property
-    def _first(self) -> int:
-        """Number that the parser gives to the first row below the header."""
-        return self.header_line + 1
-
-    def _lines(self, index: NDArray[np.int64], rows: _Rows) -> NDArray[np.int64]:
-        """Lines of the file of rows that were kept, by their order."""
-        lines = index + self._first
-        for number in sorted([*rows.skipped, *(row[0] for row in rows.wrong)]):
-            lines = np.where(lines >= number, lines + 1, lines)
-        return lines
-
     def _ends_with_newline(self) -> bool:
         with self.path.open("rb") as file:
-            file.seek(-min(4, self.path.stat().st_size), 2)
-            return file.read().rstrip(b"\0").endswith((b"\n", b"\r"))
+            file.seek(max(0, self.size - 4))
+            return file.read(min(4, self.size)).rstrip(b"\0").endswith((b"\n", b"\r"))
 
-    def _text(self) -> Iterator[list[str]]:
-        with self.path.open(encoding=self.encoding, errors="replace", newline="") as file:
-            for line in file:
-                yield next(csv.reader([line], delimiter=self.separator), [])
+    def _cells(self, line: str) -> list[str]:
+        return next(csv.reader([line], delimiter=self.separator), [])
 
     def _cell(self, line: int, name: str) -> str:
         place = self.header.index(name)
-        for number, cells in enumerate(self._text(), 1):
-            if number == line:
-                return cells[place].strip() if place < len(cells) else ""
-        return ""
+        cells = self._cells(Lines(self.path, self.size, self.encoding).line(line))
+        return printable(cells[place].strip()) if place < len(cells) else ""
 
     def _no_number(self, names: list[str]) -> str:
         """The first cell that is no number, in words."""
         places = [(name, self.header.index(name)) for name in names]
-        for number, cells in enumerate(self._text(), 1):
+        for number, line in enumerate(Lines(self.path, self.size, self.encoding), 1):
+            cells = self._cells(line)
             if number <= self.header_line or not cells or cells[0].startswith(COMMENTS):
                 continue
             for name, place in places:
                 cell = cells[place].strip() if place < len(cells) else ""
                 if cell and cell not in MISSING and not is_number(cell, self.decimal):
                     return (
-                        f"{self.path}:{number}: column {name!r}: {cell!r} is no finite number"
-                        f"{self._comma_hint(cell)}; correct it, or leave the row out"
+                        f"{self.path}:{number}: column {name!r}: {printable(cell)!r} is no finite"
+                        f" number{self._comma_hint(cell)}; correct it, or leave the row out"
                     )
         return ""
 
@@ -255,29 +280,39 @@ class Sheet:
 
 def open_sheet(path: Path) -> Sheet:
     """Find encoding, separator, decimal sign and header. Raises LogError, OSError."""
-    with path.open("rb") as file:
-        data = file.read(FIRST_LOOK)
-    encoding, text = decoded(path, data, len(data) == FIRST_LOOK)
+    size, data = first_bytes(path, FIRST_LOOK)
+    more = len(data) < size
+    encoding, text = decoded(path, data, more)
     lines = text.splitlines()
     number = header_line(lines)
+    if more and number in (0, len(lines)):
+        raise LogError(
+            f"{path}:{len(lines)}: no header in the first {FIRST_LOOK >> 10} kB; want CSV with a"
+            " line of columns' names above the samples"
+        )
     if number == 0:
         raise LogError(f"{path}: empty; want a header line with the columns' names, and samples")
     line = lines[number - 1]
     separator = max(SEPARATORS, key=lambda s: count(line, s))
     names = next(csv.reader([line], delimiter=separator))
     header = tuple(name.strip().strip('"') for name in names)
+    if len(header) > MOST_COLUMNS:
+        raise LogError(
+            f"{path}:{number}: {len(header)} columns; this program reads up to {MOST_COLUMNS}"
+        )
     if all(is_number(name, ".") for name in header):
         raise LogError(
-            f"{path}:{number}: numbers where the columns' names were expected ({line[:40]!r}); want"
-            " a header line above the samples"
+            f"{path}:{number}: numbers where the columns' names were expected"
+            f" ({printable(line)!r}); want a header line above the samples"
         )
     twice = [name for name in header if name and header.count(name) > 1]
     if twice:
         raise LogError(
-            f"{path}:{number}: column {twice[0]!r} stands there twice; rename or remove one"
+            f"{path}:{number}: column {printable(twice[0])!r} stands there twice; rename or"
+            " remove one"
         )
     decimal = decimal_of(lines[number:], separator)
-    return Sheet(path, encoding, separator, decimal, header, number)
+    return Sheet(path, size, encoding, separator, decimal, header, number)
 
 
 def _or(names) -> str:

@@ -1,8 +1,12 @@
-"""How a CSV file is written, found from its beginning: encoding, header, separators."""
+"""How a CSV file is written, found from its beginning: encoding, header, separators. And its bytes:
+what is no file of text is named, one that grows is read as it was found.
+"""
 
 import codecs
 import csv
-from collections.abc import Sequence
+import io
+import stat
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from inertial.toml_file import MARKS
@@ -11,10 +15,35 @@ FIRST_LOOK = 1 << 16  # bytes in which the header must stand
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar"}
 COMMENTS = ("#", "%", "//")
 MISSING = ["", "NA", "N/A", "na", "nan", "NaN", "NAN", "null", "-"]
+LINE = 1 << 20  # bytes of the longest line, read at once
+SHAPES = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFSOCK: "a socket",
+}
+FORMS = (  # how other files begin, and what to do about them
+    (b"\x1f\x8b", "compressed by gzip: unpack it (gunzip)"),
+    (b"\x28\xb5\x2f\xfd", "compressed by zstd: unpack it (unzstd)"),
+    (b"\xfd7zXZ", "compressed by xz: unpack it (unxz)"),
+    (b"BZh", "compressed by bzip2: unpack it (bunzip2)"),
+    (b"PK\x03\x04", "a ZIP archive or a workbook: save its sheet as CSV"),
+    (b"\xd0\xcf\x11\xe0", "a workbook: save its sheet as CSV"),
+    (b"\x89MCAP", "a recording (MCAP): give its path to export, report or rerun"),
+    (b"%PDF", "a PDF"),
+    (b"MATLAB 5.0", "a MATLAB file: save its arrays as CSV"),
+)
 
 
 class LogError(ValueError):
     """A log that cannot be used; names file, line and column, and says what was wanted."""
+
+
+def printable(text: str, most: int = 60) -> str:
+    """Words of a file as a message may show them: no control characters, not too long."""
+    shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text[:most])
+    return shown + (" ..." if len(text) > most else "")
 
 
 def header_line(lines: Sequence[str]) -> int:
@@ -69,3 +98,82 @@ def is_number(cell: str, decimal: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def first_bytes(path: Path, most: int) -> tuple[int, bytes]:
+    """Size of a file and its beginning. Raises LogError for what is no file of text, OSError."""
+    shape = stat.S_IFMT(path.stat().st_mode)
+    if shape != stat.S_IFREG:
+        raise LogError(f"{path}: {SHAPES.get(shape, 'not a file')}; want a CSV file")
+    with path.open("rb") as file:
+        size = file.seek(0, io.SEEK_END)
+        file.seek(0)
+        data = file.read(min(most, size))
+    for mark, what in FORMS:
+        if data.startswith(mark):
+            raise LogError(f"{path}: this is {what}; want CSV")
+    return len(data) if len(data) < most else size, data
+
+
+class _Part(io.RawIOBase):
+    """The first bytes of a file, whatever is written behind them meanwhile."""
+
+    def __init__(self, path: Path, size: int) -> None:
+        self._file, self._left = path.open("rb", buffering=0), size
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer) -> int:
+        wanted = memoryview(buffer)[: self._left]
+        got = self._file.readinto(wanted) or 0
+        self._left -= got
+        return got
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()
+
+
+def opened(path: Path, size: int) -> io.BufferedReader:
+    """The first `size` bytes of a file as a stream."""
+    return io.BufferedReader(_Part(path, size), LINE)
+
+
+class Lines:
+    """Lines of a file, front to end, none of them longer than LINE."""
+
+    def __init__(self, path: Path, size: int, encoding: str) -> None:
+        self._text = io.TextIOWrapper(opened(path, size), encoding=encoding, errors="replace")
+        self._number, self._line = 0, ""
+
+    def __iter__(self) -> Iterator[str]:
+        while line := self._next():
+            yield line
+
+    def line(self, number: int) -> str:
+        """Line `number`, from 1, which must not fall from call to call; empty behind the end."""
+        while self._number < number and self._next():
+            pass
+        return self._line if self._number == number else ""
+
+    def _next(self) -> str:
+        self._line = line = self._text.readline(LINE)
+        while line and not line.endswith("\n") and len(line) == LINE:
+            line = self._text.readline(LINE)  # the rest of a line that is too long is passed over
+        self._number += bool(self._line)
+        return self._line
+
+
+def long_line(path: Path, size: int) -> int:
+    """Number of the first line that is longer than LINE."""
+    number, length = 1, 0
+    with opened(path, size) as stream:
+        while block := stream.read(LINE):
+            for k, part in enumerate(block.replace(b"\r\n", b"\n").split(b"\n")):
+                if k:
+                    number, length = number + 1, 0
+                length += len(part)
+                if length > LINE:
+                    return number
+    return number

@@ -80,7 +80,7 @@ def plain(text: object, longest: int = LONGEST) -> str:
 
 
 def printed(text: object) -> str:
-    """Several lines for a terminal: line breaks and tabs stay, all else as `plain`."""
+    """Several lines for a terminal, uncut: line breaks and tabs stay, all else as `plain`."""
     whole = str(text).split("\n")
     return "\n".join("\t".join(plain(part, 1 << 20) for part in line.split("\t")) for line in whole)
 

@@ -1,6 +1,7 @@
 """What is known of one device: the newest message of each topic, tables over time, tracks."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -57,6 +58,8 @@ class Device:
     marks: list[tuple[float, str]] = field(default_factory=list)  # notes: when, s, and their text
     origin: tuple[float, float, float] | None = None  # of n: latitude deg, longitude deg, height m
     run: int = 0
+    may_grow: Callable[[int], bool] = lambda _: True  # see Ring
+    doubted: dict[tuple[str, str], int] = field(default_factory=dict)  # times of messages, utc_ns
     generation: int = 0  # counts the times everything was forgotten because time jumped back
 
     @property
@@ -85,6 +88,16 @@ class Device:
         """Its gateway or an estimator has said how it is."""
         return any(topic in ("link", "board", "estimator") for topic, _ in self.latest)
 
+    @property
+    def heard(self) -> float:
+        """When the newest message came, time.monotonic(), s."""
+        return max((latest.arrived for latest in self.latest.values()), default=0.0)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the rings."""
+        return sum(ring.nbytes for ring in self.rings.values())
+
     def estimators(self, topic: str) -> list[str]:
         """Names of the estimators heard on a topic; the leading one first."""
         names = [estimator for name, estimator in self.latest if name == topic]
@@ -103,7 +116,9 @@ class Device:
         """The ring of a topic, made at first use; `widths` of columns that depend on the device."""
         key, table = (topic, estimator), TABLES[topic]
         if key not in self.rings:
-            self.rings[key] = Ring(table.dtype(**widths), int(HISTORY_S * table.rate))
+            self.rings[key] = Ring(
+                table.dtype(**widths), int(HISTORY_S * table.rate), self.may_grow
+            )
         return self.rings[key]
 
     def window(

@@ -10,26 +10,38 @@ import logging
 import threading
 import time
 from collections import deque
+from typing import NamedTuple
 
 import zenoh
+from google.protobuf.message import Message
 
 from dashboard.data.store import Store
-from messages.bus import session as busmod
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
+from messages.contract.checks import Refusal
 from messages.history.answers import Asker
 from messages.history.mending import Mender
-from messages.history.mending_state import Arrival, Question
+from messages.history.mending_state import Arrival, Question, wrong_item
+from messages.text import plain
 
 log = logging.getLogger(__name__)
 
 # POSE and LOCATION repeat what RATE, NAV and GNSS say, for other viewers.
 TOPICS = {topic.name: topic for topic in tp.TOPICS if topic not in (tp.POSE, tp.LOCATION)}
 QUEUE = 20000  # messages; about 20 s of a busy bench
+QUEUE_BYTES = 64 << 20
+MESSAGE_BYTES = 128 << 10  # of one message; what waits and what is newest has to stay in memory
 PAST_S = 600.0  # a device's history is asked for so far back ...
 PAST_EVERY_S = 1.0  # ... with one message of each topic in this time, s
 FULL_S = 60.0  # ... and in full for the last s of it
+FAILURES_SHOWN = 20  # faults of ours that stand in the log with all that is known of them
 BUSY_S, IDLE_S = 0.02, 0.1  # pause between rounds with and without a browser
+
+
+class Past(NamedTuple):
+    """A question about the time before we listened."""
+
+    question: Question
 
 
 class Feed:
@@ -42,11 +54,13 @@ class Feed:
     ) -> None:
         self._session, self._prefix = session, prefix
         self._store, self._watched = store, watched
-        self._queue: deque = deque(maxlen=QUEUE)
+        self._queue: deque = deque()
+        self._bytes_in = self._bytes_out = 0  # of the queue: counted each by one thread
+        self._door = store.door
         self._stop = threading.Event()
-        self._received = 0
+        self._received = self._refused = 0
         self.taken = 0  # messages that went into the store
-        self._mender = Mender(self._ask, hold=False)
+        self._mender = Mender(self._ask, hold=False, refuse=self._door.refuse)
         self._answers: deque = deque()
         self._known: set[str] = set()  # devices whose past was asked for
         self._asker = Asker(session, prefix, lambda *answer: self._answers.append(answer))
@@ -69,28 +83,51 @@ class Feed:
     def _on_sample(self, sample: zenoh.Sample) -> None:
         """Zenoh's thread."""
         self._received += 1
-        self._queue.append((str(sample.key_expr), sample.payload.to_bytes(), time.monotonic()))
+        size = len(sample.payload)
+        if size > MESSAGE_BYTES:
+            self._door.too_large(str(sample.key_expr), size, MESSAGE_BYTES)
+            self._refused += 1
+        elif len(self._queue) < QUEUE and self._bytes_in - self._bytes_out < QUEUE_BYTES:
+            self._bytes_in += size
+            self._queue.append((str(sample.key_expr), sample.payload.to_bytes(), time.monotonic()))
 
     def _drain(self) -> None:
         while self._answers:
-            self._take_answer(*self._answers.popleft())
+            token, reply = self._answers.popleft()
+            try:
+                self._take_answer(token, reply)
+            except Exception as error:
+                self._fail("an answer", tp.RECORDER, error)
         for _ in range(len(self._queue)):
             key, payload, arrived = self._queue.popleft()
+            self._bytes_out += len(payload)
             self.taken += 1
+            address = self._door.address(key)
+            if address is None or address.topic.name not in TOPICS:
+                continue
             try:
-                address = tp.parse(key)
-                if address.topic.name in TOPICS:
-                    self._take(
-                        Arrival(address.topic, address.device, address.estimator, payload, 0),
-                        arrived,
-                    )
+                self._take(address, payload, arrived)
             except Exception as error:  # a foreign message must not stop the picture
-                log.warning("%s: not shown (%s: %s)", key, type(error).__name__, error)
-        self._store.dropped = max(0, self._received - self.taken - len(self._queue))
+                self._fail(key, address.device, error)
+        left = self._received - self._refused - self.taken - len(self._queue)
+        self._store.dropped = max(0, left)
 
-    def _take(self, arrival: Arrival, arrived: float) -> None:
-        for ready in self._mender.take(arrival):
-            message = busmod.decode(ready.topic, ready.payload)
+    def _fail(self, key: str, device: str, error: Exception) -> None:
+        failure = Refusal("failure", "message", type(error).__name__, "to be shown")
+        self._door.refuse(key, failure, device)
+        if self._door.refused["failure"] <= FAILURES_SHOWN:
+            log.error("%s: not shown", plain(key), exc_info=error)
+
+    def _take(self, address: tp.Address, payload: bytes, arrived: float) -> None:
+        topic, device, estimator = address.topic, address.device, address.estimator
+        gone = self._store.admit(topic, device, estimator, arrived)
+        if gone is None or not self._door.header(address, payload, f"{device}/{topic.name}"):
+            return
+        if gone:
+            self._mender.forget(gone)
+            self._known.discard(gone)
+        for ready in self._mender.take(Arrival(topic, device, estimator, payload, 0)):
+            message = self._message(ready)
             if message is None:
                 continue
             self._store.put(ready.topic, ready.device, ready.estimator, message, arrived)
@@ -107,33 +144,45 @@ class Feed:
         )
         for query in (overview, full):
             for source in (tp.GATEWAY, tp.ESTIMATES):
-                self._asker.ask((device, source, query), device, source, query)
+                self._ask_on(Past(Question((device, source), query)))
 
-    def _take_answer(self, token: tuple, reply: pb.HistoryReply | None) -> None:
+    def _ask_on(self, past: "Past") -> None:
+        self._asker.ask(past, *past.question.stream, past.question.query)
+
+    def _message(self, arrival: Arrival) -> Message | None:
+        address = tp.Address("", arrival.device, arrival.topic, arrival.estimator)
+        return self._door.message(address, arrival.payload)
+
+    def _take_answer(self, token: "Question | Past", reply: pb.HistoryReply | None) -> None:
         if isinstance(token, Question):
             late = self._mender.answer(token, reply)
             device, repaired = token.stream[0], True
         else:
-            device, source, query = token
-            repaired, late = False, []
-            for item in reply.items if reply is not None else ():
-                name, _, estimator = item.topic.partition("/")
-                topic = TOPICS.get(name)
-                if topic is not None:
-                    late.append(
-                        Arrival(
-                            topic, device, estimator, item.payload, item.published_ns, late=True
-                        )
-                    )
-            if reply is not None and reply.next:
-                query.position = reply.next
-                self._asker.ask(token, device, source, query)
-        decoded = [
-            (a.topic, a.estimator, busmod.decode(a.topic, a.payload))
-            for a in late
-            if a.topic.name in TOPICS
-        ]
+            device, repaired = token.question.stream[0], False
+            late = self._past(token, reply or pb.HistoryReply())
+        decoded = [(a.topic, a.estimator, self._message(a)) for a in late if a.topic.name in TOPICS]
         self._store.put_late(device, [row for row in decoded if row[2] is not None], repaired)
+
+    def _past(self, past: "Past", reply: pb.HistoryReply) -> list[Arrival]:
+        """What an answer brings of the time before we listened."""
+        device, found = past.question.stream[0], []
+        for item in reply.items:
+            refusal = wrong_item(device, item)
+            if refusal is not None:
+                self._door.refuse(f"answer about {device}", refusal, device)
+                continue
+            name, _, estimator = item.topic.partition("/")
+            topic = tp.BY_NAME[name]
+            found.append(
+                Arrival(topic, device, estimator, item.payload, item.published_ns, late=True)
+            )
+        if reply.next:
+            refusal = past.question.goes_on(reply)
+            if refusal is None:
+                self._ask_on(Past(past.question.more(reply.next)))
+            else:
+                self._door.refuse(f"answer about {device}", refusal, device)
+        return found
 
     def _ask(self, question: Question) -> None:
         self._asker.ask(question, *question.stream, question.query)

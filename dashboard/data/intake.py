@@ -4,6 +4,7 @@ Every function takes one message and appends all the rows it carries at once. A 
 lengths do not fit is left out, a field whose length does not fit is NaN.
 """
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -121,7 +122,7 @@ def _attitude(device: Device, estimator: str, t: float, m: pb.AttitudeEstimate) 
 def _nav(device: Device, estimator: str, t: float, m: pb.NavSolution) -> None:
     if len(m.p_ned_m) != 3 or m.mode < pb.NavSolution.MODE_COURSE:
         return
-    device.origin = m.origin_latitude_deg, m.origin_longitude_deg, m.origin_height_m
+    device.origin = _origin(m.origin_latitude_deg, m.origin_longitude_deg, m.origin_height_m)
     h = m.horizon
     fuzzy = len(h.inputs) == 2 and len(h.membership) == 6
     device.ring("nav", estimator).append(
@@ -138,10 +139,17 @@ def _nav(device: Device, estimator: str, t: float, m: pb.NavSolution) -> None:
     device.tracks.setdefault(f"nav/{estimator}", Track(spacing=NAV_SPACING_M)).add(m.p_ned_m)
 
 
+def _origin(
+    latitude_deg: float, longitude_deg: float, height_m: float
+) -> tuple[float, float, float]:
+    """Where to count from, at height 0 as long as nobody knows one."""
+    return latitude_deg, longitude_deg, height_m if math.isfinite(height_m) else 0.0
+
+
 def _gnss(device: Device, estimator: str, t: float, m: pb.GnssFix) -> None:
     if m.quality == pb.GnssFix.QUALITY_NONE or (m.latitude_deg == 0.0 and m.longitude_deg == 0.0):
         return
-    origin = device.origin or (m.latitude_deg, m.longitude_deg, m.height_m)
+    origin = device.origin or _origin(m.latitude_deg, m.longitude_deg, m.height_m)
     p_n = ned_from_geodetic(m.latitude_deg, m.longitude_deg, m.height_m, origin)
     device.ring("gnss", estimator).append(t, p_n=p_n)
     if device.origin is None:

@@ -1,8 +1,11 @@
 """A table of the newest rows over time, which the charts read."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
+FIRST_ROWS = 256  # of a new ring; it grows as it fills
 SLACK = 4  # one part in so many is room to write on before the rows are moved to the front
 SAME_S = 1e-6  # rows nearer than this in time are one
 
@@ -14,11 +17,19 @@ class Ring:
     that, and a window is good until the next write.
     """
 
-    def __init__(self, dtype: np.dtype, capacity: int) -> None:
-        self._rows = np.empty(capacity + max(1, capacity // SLACK), dtype)
-        self._capacity = capacity
+    def __init__(
+        self, dtype: np.dtype, capacity: int, may_grow: Callable[[int], bool] = lambda _: True
+    ) -> None:
+        """may_grow(bytes): is there memory for so much more? Where not, fewer rows are kept."""
+        self._rows = np.empty(_with_slack(min(capacity, FIRST_ROWS)), dtype)
+        self._capacity, self._may_grow = capacity, may_grow
         self._end = 0
         self.count = 0
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the rows."""
+        return self._rows.nbytes
 
     @property
     def dtype(self) -> np.dtype:
@@ -41,7 +52,7 @@ class Ring:
 
     def like(self) -> "Ring":
         """An empty ring of the same rows."""
-        return Ring(self.dtype, self._capacity)
+        return Ring(self.dtype, self._capacity, self._may_grow)
 
     def merge(self, rows: np.ndarray) -> None:
         """Take in older rows of this type in any order; at an equal time what is there stays."""
@@ -66,12 +77,35 @@ class Ring:
     def _write(self, block: np.ndarray) -> None:
         block = block[-self._capacity :]
         if self._end + len(block) > len(self._rows):
+            self._grow(self.count + len(block))
+            block = block[-self._capacity :]
+        if self._end + len(block) > len(self._rows):
             kept = self.rows()[max(0, self.count + len(block) - self._capacity) :].copy()
             self._rows[: len(kept)] = kept
             self._end = self.count = len(kept)
         self._rows[self._end : self._end + len(block)] = block
         self._end += len(block)
         self.count = min(self.count + len(block), self._capacity)
+
+    def _grow(self, rows: int) -> None:
+        """Room for so many rows, and for as many again; where there is no memory for that, what is
+        there now is the capacity.
+        """
+        whole = _with_slack(self._capacity)
+        if len(self._rows) >= min(whole, _with_slack(rows)):
+            return
+        wanted = min(whole, 2 * _with_slack(rows))
+        if not self._may_grow((wanted - len(self._rows)) * self.dtype.itemsize):
+            self._capacity = max(1, len(self._rows) * SLACK // (SLACK + 1))
+            return
+        kept = self.rows()
+        larger = np.empty(wanted, self.dtype)
+        larger[: len(kept)] = kept
+        self._rows, self._end = larger, len(kept)
+
+
+def _with_slack(capacity: int) -> int:
+    return capacity + max(1, capacity // SLACK)
 
 
 def blank(dtype: np.dtype, count: int) -> np.ndarray:

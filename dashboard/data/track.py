@@ -1,5 +1,7 @@
 """The way of a body as a line of points that a browser gets in pieces."""
 
+import math
+
 import numpy as np
 
 
@@ -19,8 +21,9 @@ class Track:
         self.thinned = 0  # counts thinnings: pieces already sent are then no longer valid
 
     def add(self, p_n) -> None:
-        """Add a point (north, east, down), m."""
-        point = (float(p_n[0]), float(p_n[1]), float(p_n[2]))
+        """Add a point (north, east, down), m. One without a height is drawn at the origin's."""
+        down = float(p_n[2])
+        point = (float(p_n[0]), float(p_n[1]), down if math.isfinite(down) else 0.0)
         last = self.last()
         if last is not None and np.linalg.norm(np.subtract(point, last)) < self.spacing:
             return

@@ -26,6 +26,7 @@ An estimator is one of rate/, of nav/ for a vehicle, or of attitude/ for a board
 those all have the heading of the truth or of the first.
 """
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -243,9 +244,10 @@ class SceneView:
         for index, name in enumerate(estimators):
             message = device.get("nav", name).message
             q = geo.quaternion(message.q_nb)
-            p = tuple(message.p_ned_m) if len(message.p_ned_m) == 3 else None
+            p = geo.drawn_place(message.p_ned_m)
             self._set(f"/world/estimate/{name}/body", q=q, p=p)
-            surface = geo.ellipsoid(message.position_covariance)
+            flat = len(message.p_ned_m) == 3 and math.isnan(message.p_ned_m[2])
+            surface = geo.ellipsoid(geo.flattened(message.position_covariance, flat))
             path = f"/world/estimate/{name}/ellipsoid"
             if surface is not None and p is not None and path in self._nodes:
                 self._set(path, q=surface[1], p=p)

@@ -113,7 +113,9 @@ class View:
                 self._open(PAGES.index(first))
             if self._paused_at is None:
                 self._devices.update(snapshot)
-            self._pages[self._page].update(snapshot)
+            page = self._pages[self._page]
+            page.update(snapshot)
+            page.tidy()
 
     # --- building
 

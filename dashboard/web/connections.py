@@ -35,7 +35,7 @@ class Connection:
     transport: asyncio.Transport
     protocol: H11Protocol
     address: str
-    idle_since: float | None  # s, monotonic; None while a request is answered
+    idle_since: float | None  # s, monotonic; since its last answer, None while one is made
     stuck_since: float | None = None  # s, while its client does not take what is sent
 
     @property
@@ -72,6 +72,11 @@ class Connections:
             def connection_made(self, transport: Any) -> None:
                 super().connection_made(transport)
                 self._counted = connections.enter(transport, self)
+
+            def on_response_complete(self) -> None:
+                super().on_response_complete()
+                if self._counted is not None:
+                    self._counted.idle_since = time.monotonic()
 
             def connection_lost(self, exc: Exception | None) -> None:
                 connections.leave(self._counted)
@@ -117,7 +122,10 @@ class Connections:
 
     def _end(self, one: Connection, why: str) -> None:
         self._open.pop(one, None)
-        one.transport.abort()
+        if one.transport.get_write_buffer_size():
+            one.transport.abort()
+        else:
+            one.transport.close()
         self.ended[why] += 1
         n = self.ended[why]
         if n & (n - 1) == 0:  # a flood stays readable

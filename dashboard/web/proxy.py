@@ -27,6 +27,7 @@ from dashboard.web.scene_messages import (
     message_type,
 )
 from dashboard.web.scene_page import policy, scene_page, script_hashes
+from messages.text import plain
 
 log = logging.getLogger(__name__)
 
@@ -217,7 +218,7 @@ class Relay:
             except BadMessage as error:
                 log.warning("browser of %s: %s", self._who, error)
                 return 1007, "not a message of viser's"
-            if may_send(role, name, fields, self._widgets.open):
+            if may_send(role, name, fields, self._widgets):
                 await scene.send(data)
             else:
                 self._note(role, name)
@@ -226,7 +227,7 @@ class Relay:
         """Say each refused kind once per connection: a browser may repeat it at any rate."""
         if name not in self._refused and name not in DROPPED_QUIETLY and len(self._refused) < 20:
             self._refused.add(name)
-            log.warning("refused %r of %s (%s) to the scene", name[:64], self._who, role.name)
+            log.warning("refused %s of %s (%s) to the scene", plain(name, 64), self._who, role.name)
 
     async def _watch(self) -> tuple[int, str]:
         """Ends the connection of a browser that was signed out, also when it sends nothing."""

@@ -26,7 +26,9 @@ def pose_message(
     )
     message.timestamp.seconds, message.timestamp.nanos = divmod(header.utc_ns, 10**9)
     t, q = message.translation, message.rotation
-    t.x, t.y, t.z = map(float, p_n_m)
+    north, east, down = map(float, p_n_m)
+    # a viewer cannot draw a height that nobody knows: it gets the origin's
+    t.x, t.y, t.z = north, east, down if math.isfinite(down) else 0.0
     q.w, q.x, q.y, q.z = map(float, q_nb)
     return message
 
@@ -63,7 +65,14 @@ def nav_message(
         horizon=None if s.horizon is None else horizon_message(s.horizon),
         alignment=s.alignment,
         gnss_muted=muted,
+        height_reference=_reference(s),
     )
+
+
+def _reference(s: Solution) -> int:
+    if not math.isfinite(s.height):
+        return pb.HEIGHT_REFERENCE_UNKNOWN
+    return pb.HEIGHT_REFERENCE_SEA_LEVEL if s.datum else pb.HEIGHT_REFERENCE_ELLIPSOID
 
 
 def horizon_message(h: HorizonChoice) -> pb.Horizon:
@@ -86,7 +95,7 @@ def innovation_message(header: pb.Header, name: str, c: Correction) -> pb.Innova
         value=as_list(c.values),
         sigma=as_list(c.sigma),
         nis=c.nis,
-        dof=len(c.values),
+        dof=sum(map(math.isfinite, c.values)),
         accepted=c.accepted,
         error_to_reference=as_list(c.error_ned) if c.fix.withheld else [],
         reason=c.reason,

@@ -7,13 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.constants import GEOID_SIGMA
 from inertial.navigation.fix import Fix, typical_sigma
 from inertial.rate.samples import finite
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.fixes import complete
 
 Array = NDArray[np.float64]
 
 MICRO = 1e-6
+LEAST_PERIOD_S = 1e-5
 
 
 class BadMessage(ValueError):
@@ -37,8 +40,8 @@ def _rows(
         problem = f"{flat.size} values do not fill rows of {columns}"
     elif not finite(flat):
         problem = "not all values are finite"
-    elif not 0.0 < period_s < 10.0:
-        problem = f"period {period_s} s, want 0 to 10 s"
+    elif not LEAST_PERIOD_S <= period_s < 10.0:
+        problem = f"period {period_s} s, want {LEAST_PERIOD_S:g} to 10 s"
     if problem:
         raise BadMessage(f"{what} {header.sequence} of {header.device}: {problem}")
     n, start = flat.size // columns, header.device_us * MICRO
@@ -76,19 +79,15 @@ def fix_of(message: pb.GnssFix, every: int, clock_offset_s: float) -> Fix:
     its own has no device time at all: then UTC minus clock_offset_s (UTC - board's clock, s) stands
     for it.
     """
+    message = complete(message)
     header = message.header
     arrival = (
         header.device_us * MICRO if header.device_us else header.utc_ns * 1e-9 - clock_offset_s
     )
     position, velocity = typical_sigma(message.quality)
-    numbers = (
-        message.latitude_deg,
-        message.longitude_deg,
-        message.height_m,
-        arrival,
-        message.device_time_s,
-    )
-    if not all(map(math.isfinite, numbers)) or abs(message.latitude_deg) >= 90.0:
+    numbers = (message.latitude_deg, message.longitude_deg, arrival, message.device_time_s)
+    placed = all(map(math.isfinite, numbers)) and abs(message.latitude_deg) < 90.0
+    if message.quality != pb.GnssFix.QUALITY_NONE and not placed:
         raise BadMessage(f"gnss {header.sequence} of {header.device}: not a position: {numbers}")
     v_n = np.array(message.v_n_mps) if len(message.v_n_mps) == 3 else None
     sigma_v = None if v_n is None else _sigma(message.velocity_sigma_ned_mps, velocity)
@@ -99,7 +98,8 @@ def fix_of(message: pb.GnssFix, every: int, clock_offset_s: float) -> Fix:
         longitude=math.radians(message.longitude_deg),
         height=message.height_m,
         quality=message.quality,
-        sigma_p=_sigma(message.position_sigma_ned_m, position),
+        sigma_p=_sigma_p(message, position),
+        datum=GEOID_SIGMA if _from_sea(message) else 0.0,
         v_n=v_n,
         sigma_v=sigma_v,
         withheld=header.sequence % every != 0,
@@ -107,10 +107,25 @@ def fix_of(message: pb.GnssFix, every: int, clock_offset_s: float) -> Fix:
     )
 
 
+def _from_sea(message: pb.GnssFix) -> bool:
+    return bool(message.height_reference == pb.HEIGHT_REFERENCE_SEA_LEVEL)
+
+
+def _sigma_p(message: pb.GnssFix, typical: Array) -> Array:
+    """(3,) m; of a height above sea level without the geoid's part, which all fixes have alike."""
+    sigma = _sigma(message.position_sigma_ned_m, typical)
+    if _from_sea(message):
+        own = math.sqrt(max(sigma[2] ** 2 - GEOID_SIGMA**2, 0.0))
+        sigma = np.array([sigma[0], sigma[1], own or min(typical[2], sigma[2])])
+    return sigma
+
+
 def _sigma(said: Iterable[float], typical: Array) -> Array:
-    """The receiver's own sigma where it is one."""
+    """The receiver's own sigma where it is one; what is typical also for down alone."""
     values = np.array(said, dtype=np.float64)
-    return values if values.shape == (3,) and (values > 0.0).all() else typical
+    if values.shape != (3,) or not (values[:2] > 0.0).all():
+        return typical
+    return values if values[2] > 0.0 else np.array([values[0], values[1], typical[2]])
 
 
 def tacho_report(message: pb.TachoRate) -> tuple[float, float, float, bool]:

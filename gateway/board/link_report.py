@@ -105,6 +105,8 @@ class LinkReport:
             stopped_s=self._stopped_s,
             clock_offset_s=self._wall.offset_s,
         )
+        for name, count in self._gnss.refused.items():
+            status.refused[f"receiver: {name}"] = count
         self._at, self._samples_at = now, self._samples.count
         self._frames_at = ledger.good_frames
         return status
@@ -131,6 +133,8 @@ class LinkReport:
                 f"{device.port}: bytes come but no frame can be read; most likely the speed is"
                 f" wrong: set `baud` to the board's (now {device.baud})"
             )
+        if receiver := self._gnss.message(now):
+            found.append(receiver)
         refused = self._door.counts()
         total = sum(refused.values())
         if total > self._refused:

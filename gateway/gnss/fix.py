@@ -1,171 +1,195 @@
 """What one epoch of a receiver says, from its UBX messages or NMEA sentences: pure functions of
-parsed messages.
+records that have passed the door.
 """
 
-import calendar
 import math
-import struct
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
-NONE, AUTONOMOUS, DIFFERENTIAL, RTK_FLOAT, RTK_FIXED, DEAD_RECKONING = range(
-    6
-)  # as GnssFix.Quality
-GGA_QUALITY = {
-    1: AUTONOMOUS,
-    2: DIFFERENTIAL,
-    3: AUTONOMOUS,
-    4: RTK_FIXED,
-    5: RTK_FLOAT,
-    6: DEAD_RECKONING,
-}
-KNOT = 1852.0 / 3600.0  # m/s
+from gateway.gnss.nmea import (
+    AUTONOMOUS,
+    DIFFERENTIAL,
+    NONE,
+    RTK_FIXED,
+    RTK_FLOAT,
+    Sentence,
+)
+from gateway.gnss.ubx_read import MOST_SPEED_ACCURACY_MPS, Nav, Three
+
 NMEA_SPEED_SIGMA = 0.5  # m/s; NMEA has no word for it: a cautious figure for a code receiver
-NO_SIGMA = 100.0  # m or m/s; what NMEA does not say: vertical speed, sigma of the height
+WALKING_MPS = 1.0  # faster than this without a course has no direction, and is no velocity
+# m north and east at a dilution of precision of 1, by quality; twice that up
+USUAL_SIGMA_M = {AUTONOMOUS: 1.6, DIFFERENTIAL: 0.8, RTK_FLOAT: 0.3, RTK_FIXED: 0.02}
+TRUSTED_ACCURACY_M = 100.0  # of a position for whose fix no message answers
 WEEK_ROLLOVER_NS = 1024 * 7 * 86400 * 10**9  # GPS week counter of 10 bits
 DAY_NS = 86400 * 10**9
+YEAR_2000_NS = 946_684_800 * 10**9
+YEAR_2060_NS = 2_840_140_800 * 10**9
+NAN = math.nan
+Stamp = tuple[int, int | None] | None  # us of the board, monotonic ns; of a read
+
+__all__ = ["NONE", "RTK_FIXED", "Fix", "nmea_fix", "plausible_utc", "ubx_fix", "unroll_weeks"]
 
 
 @dataclass(frozen=True)
 class Fix:
-    """One epoch. None: the receiver does not say. Angles in degrees as the receivers give them."""
+    """One epoch. None, and NaN in a vector: the receiver does not say. Angles in degrees as the
+    receivers give them.
+    """
 
     talker: str
     fix_utc_ns: int = 0  # 0: date or time unknown
+    tow_ns: int | None = None  # of the GPS week, which knows no leap seconds; UBX alone gives it
     quality: int = NONE
     latitude_deg: float | None = None
     longitude_deg: float | None = None
     height_m: float | None = None  # above the ellipsoid
     height_msl_m: float | None = None
-    sigma_ned_m: tuple[float, float, float] | None = None
-    v_n: tuple[float, float, float] | None = (
-        None  # m/s; NMEA has no vertical speed: 0 with sigma NO_SIGMA
-    )
-    v_sigma_ned: tuple[float, float, float] | None = None
+    sigma_ned_m: Three | None = None
+    v_n: Three | None = None  # m/s; NMEA has no vertical speed: NaN
+    v_sigma_ned: Three | None = None
     speed_mps: float | None = None  # over ground
     track_deg: float | None = None  # course over ground; None when too slow to have one
     satellites: int = 0
     hdop: float = 0.0
+    began: Stamp = field(default=None, compare=False)  # of the epoch's first byte
 
 
-def tod_of(text: str) -> int:
-    """hhmmss.sss to ns since midnight; a leap second (60) counts on. Raises ValueError for anything
-    else.
-    """
-    whole, _, part = text.partition(".")
-    if len(whole) != 6:
-        raise ValueError(f"time of day {text!r}: want hhmmss.sss")
-    seconds = int(whole[:2]) * 3600 + int(whole[2:4]) * 60 + int(whole[4:])
-    return seconds * 10**9 + int((part + "000000000")[:9])
+# --- NMEA
 
 
-def nmea_fix(parts: dict) -> Fix:
-    """The epoch's sentences as one fix, without its time."""
-    gga, rmc, gst, vtg = (parts.get(name) for name in ("GGA", "RMC", "GST", "VTG"))
-    first = gga or rmc
-    quality = NONE
-    if gga is not None:
-        quality = GGA_QUALITY.get(int(gga.quality or 0), NONE)
-    elif rmc.status == "A":
-        quality = AUTONOMOUS
-    place = gga if gga is not None and isinstance(gga.lat, float) else rmc
-    has_place = place is not None and isinstance(place.lat, float) and quality != NONE
-    fix = Fix(first.talker, quality=quality)
-    if has_place:
-        fix = replace(fix, latitude_deg=place.lat, longitude_deg=place.lon)
-    if gga is not None and has_place and isinstance(gga.alt, float):
-        separation = gga.sep if isinstance(gga.sep, float) else None
-        height = gga.alt + separation if separation is not None else None
-        fix = replace(fix, height_msl_m=gga.alt, height_m=height)
-    if gga is not None:
-        fix = replace(fix, satellites=int(gga.numSV or 0), hdop=float(gga.HDOP or 0.0))
-    if gst is not None and isinstance(gst.stdLat, float) and isinstance(gst.stdLong, float):
-        fix = replace(fix, sigma_ned_m=(gst.stdLat, gst.stdLong, float(gst.stdAlt or NO_SIGMA)))
-    return _with_course(fix, rmc, vtg) if has_place else fix
-
-
-def _with_course(fix: Fix, rmc, vtg) -> Fix:
-    speed = track = None
-    if rmc is not None and rmc.status == "A" and isinstance(rmc.spd, float):
-        speed, track = rmc.spd * KNOT, rmc.cog if isinstance(rmc.cog, float) else None
-    elif vtg is not None and isinstance(vtg.sogn, float):
-        speed, track = vtg.sogn * KNOT, vtg.cogt if isinstance(vtg.cogt, float) else None
-    if speed is None:
+def nmea_fix(parts: Mapping[str, Sentence], gsa: Sentence | None = None) -> Fix:
+    """The epoch's sentences, by name, as one fix without its time; gsa: the last one that came."""
+    known = [parts[name] for name in ("GGA", "GNS", "RMC", "GLL") if name in parts]
+    quality = next((s.quality for s in known if s.quality is not None), NONE)
+    counts = next((s for s in known if s.satellites or s.hdop), known[0])
+    fix = Fix(known[0].talker, quality=quality, satellites=counts.satellites, hdop=counts.hdop)
+    source = next((s for s in known if s.place is not None), None)
+    if source is None or source.place is None or quality == NONE:
         return fix
+    fix = replace(fix, latitude_deg=source.place[0], longitude_deg=source.place[1])
+    fix = _with_height(fix, known, None if gsa is None else gsa.dimensions)
+    fix = _with_sigma(fix, parts.get("GST"), gsa)
+    return _with_course(fix, parts.get("RMC"), parts.get("VTG"))
+
+
+def _with_height(fix: Fix, known: list[Sentence], dimensions: int | None) -> Fix:
+    """A fix of two dimensions holds its height: it measures none."""
+    source = next((s for s in known if s.altitude_m is not None), None)
+    if source is None or source.altitude_m is None or dimensions == 2:
+        return fix
+    separation = source.separation_m
+    height = None if separation is None else source.altitude_m + separation
+    return replace(fix, height_msl_m=source.altitude_m, height_m=height)
+
+
+def _with_sigma(fix: Fix, gst: Sentence | None, gsa: Sentence | None) -> Fix:
+    """By GST; else by the dilution of precision, where that is known; else none."""
+    if gst is not None and gst.sigma_m is not None:
+        north, east, up = gst.sigma_m
+        return replace(fix, sigma_ned_m=(north, east, NAN if up is None else up))
+    hdop = fix.hdop or (gsa.hdop if gsa is not None else 0.0)
+    vdop = gsa.vdop if gsa is not None else 0.0
+    usual = USUAL_SIGMA_M.get(fix.quality)
+    if usual is None or not hdop:
+        return fix
+    level, up = usual * max(hdop, 1.0), 2.0 * usual * max(vdop, hdop, 1.0)
+    return replace(fix, sigma_ned_m=(level, level, up))
+
+
+def _with_course(fix: Fix, rmc: Sentence | None, vtg: Sentence | None) -> Fix:
+    source = next((s for s in (rmc, vtg) if s is not None and s.speed_mps is not None), None)
+    if source is None or source.speed_mps is None:
+        return fix
+    speed, track = source.speed_mps, source.course_deg
+    fix = replace(fix, speed_mps=speed, track_deg=track)
+    if track is None and speed > WALKING_MPS:
+        return fix
+    # Near standstill the speed has no direction: it is part of the uncertainty
     course = math.radians(track or 0.0)
-    # Without a course the speed has no direction: then it is part of the uncertainty
-    v_n = (
-        (speed * math.cos(course), speed * math.sin(course), 0.0)
-        if track is not None
-        else (0.0, 0.0, 0.0)
-    )
+    moving = 0.0 if track is None else speed
     sigma = NMEA_SPEED_SIGMA if track is not None else max(speed, NMEA_SPEED_SIGMA)
     return replace(
-        fix, speed_mps=speed, track_deg=track, v_n=v_n, v_sigma_ned=(sigma, sigma, NO_SIGMA)
+        fix,
+        v_n=(moving * math.cos(course), moving * math.sin(course), NAN),
+        v_sigma_ned=(sigma, sigma, NAN),
     )
 
 
-def ubx_fix(pvt, hppos=None, cov=None) -> Fix:
-    """NAV-PVT, refined by NAV-HPPOSLLH and NAV-COV of the same epoch (u-blox F9 interface
-    description).
-    """
-    fix = Fix("UBX", fix_utc_ns=_ubx_time(pvt), quality=_ubx_quality(pvt), satellites=pvt.numSV)
-    if fix.quality == NONE:
+# --- UBX
+
+
+def ubx_fix(parts: Mapping[str, Nav]) -> Fix:
+    """The epoch's messages, by name, as one fix."""
+    pvt = parts.get("NAV-PVT")
+    first = next(iter(parts.values()))
+    fix = Fix(
+        "UBX",
+        fix_utc_ns=next((p.utc_ns for p in parts.values() if p.utc_ns), 0),
+        tow_ns=first.tow_ms * 10**6,
+        quality=_ubx_quality(parts),
+        satellites=0 if pvt is None else pvt.satellites,
+    )
+    base = _position_of(parts)
+    if fix.quality == NONE or base is None or base.place is None:
+        return replace(fix, quality=NONE)
+    flat = any(part.flat for part in parts.values())
+    fix = replace(
+        fix,
+        latitude_deg=base.place[0],
+        longitude_deg=base.place[1],
+        height_m=None if flat else base.height_m,
+        height_msl_m=None if flat else base.altitude_m,
+        sigma_ned_m=base.sigma_m,
+    )
+    return _with_velocity(_with_covariance(fix, parts.get("NAV-COV")), parts)
+
+
+def _position_of(parts: Mapping[str, Nav]) -> Nav | None:
+    """The finest position that there is; NAV-PVT has the last word on whether there is one."""
+    pvt = parts.get("NAV-PVT")
+    if pvt is not None and pvt.place is None:
+        return None
+    names = ("NAV-HPPOSLLH", "NAV-PVT", "NAV-POSLLH", "NAV-SOL")
+    return next((parts[n] for n in names if n in parts and parts[n].place is not None), None)
+
+
+def _ubx_quality(parts: Mapping[str, Nav]) -> int:
+    for name in ("NAV-PVT", "NAV-SOL", "NAV-STATUS"):
+        if name in parts:
+            return parts[name].quality or NONE
+    base = _position_of(parts)
+    trusted = base is not None and base.sigma_m is not None
+    return AUTONOMOUS if trusted and math.hypot(*base.sigma_m[:2]) < TRUSTED_ACCURACY_M else NONE
+
+
+def _with_covariance(fix: Fix, cov: Nav | None) -> Fix:
+    return fix if cov is None or cov.sigma_m is None else replace(fix, sigma_ned_m=cov.sigma_m)
+
+
+def _with_velocity(fix: Fix, parts: Mapping[str, Nav]) -> Fix:
+    names = ("NAV-PVT", "NAV-VELNED", "NAV-SOL")
+    source = next((parts[n] for n in names if n in parts and parts[n].v_n is not None), None)
+    if source is None or source.v_n is None:
         return fix
-    lat, lon, height, msl = pvt.lat, pvt.lon, pvt.height / 1e3, pvt.hMSL / 1e3
-    horizontal, vertical = pvt.hAcc / 1e3, pvt.vAcc / 1e3
-    if hppos is not None and not getattr(hppos, "invalidLlh", 0):
-        _, lon7, lat7, height_mm, msl_mm, lon9, lat9, height4, msl4, acc_h, acc_v = (
-            struct.unpack_from("<Iiiiibbbbii", hppos.payload, 4)
-        )  # integers: the sum of two floats would not be the receiver's figure
-        lat, lon = (lat7 * 100 + lat9) / 1e9, (lon7 * 100 + lon9) / 1e9
-        height, msl = (height_mm * 10 + height4) / 1e4, (msl_mm * 10 + msl4) / 1e4
-        horizontal, vertical = acc_h / 1e4, acc_v / 1e4
-    one_axis = horizontal / math.sqrt(2.0)  # hAcc is the root of both variances' sum
-    sigma = (one_axis, one_axis, vertical)
-    v_sigma = (pvt.sAcc / 1e3 / math.sqrt(3.0),) * 3
-    if cov is not None and cov.posCovValid:
-        sigma = _roots(cov.posCovNN, cov.posCovEE, cov.posCovDD)
-    if cov is not None and cov.velCovValid:
-        v_sigma = _roots(cov.velCovNN, cov.velCovEE, cov.velCovDD)
+    north, east, down = source.v_n
+    own = math.hypot(north, east), math.degrees(math.atan2(east, north)) % 360.0
+    speed, track = source.ground or own
+    cov, sigma = parts.get("NAV-COV"), source.v_sigma
+    if cov is not None and cov.v_sigma is not None:
+        sigma = cov.v_sigma
+    if sigma is not None and sigma[2] >= MOST_SPEED_ACCURACY_MPS:
+        down, sigma = NAN, (*sigma[:2], NAN)
     return replace(
         fix,
-        latitude_deg=lat,
-        longitude_deg=lon,
-        height_m=height,
-        height_msl_m=msl,
-        sigma_ned_m=sigma,
-        v_n=(pvt.velN / 1e3, pvt.velE / 1e3, pvt.velD / 1e3),
-        v_sigma_ned=v_sigma,
-        speed_mps=pvt.gSpeed / 1e3,
-        track_deg=pvt.headMot,
+        v_n=(north, east, down),
+        v_sigma_ned=sigma,
+        speed_mps=speed,
+        track_deg=track,
     )
 
 
-def _roots(*variances: float) -> tuple[float, float, float]:
-    n, e, d = (math.sqrt(max(v, 0.0)) for v in variances)
-    return n, e, d
-
-
-def _ubx_quality(pvt) -> int:
-    if not pvt.gnssFixOk or pvt.fixType not in (1, 2, 3, 4):
-        return NONE
-    if pvt.fixType == 1:
-        return DEAD_RECKONING
-    if pvt.carrSoln:
-        return RTK_FIXED if pvt.carrSoln == 2 else RTK_FLOAT
-    return DIFFERENTIAL if pvt.diffSoln else AUTONOMOUS
-
-
-def _ubx_time(pvt) -> int:
-    """UTC of the fix in ns; nano may be negative, second may be 60. 0 when date or time are not
-    valid.
-    """
-    if not (pvt.validDate and pvt.validTime):
-        return 0
-    seconds = (
-        calendar.timegm((pvt.year, pvt.month, pvt.day, pvt.hour, pvt.min, 0, 0, 0, 0)) + pvt.second
-    )
-    return seconds * 10**9 + pvt.nano
+# --- time
 
 
 def unroll_weeks(fix_utc_ns: int, host_utc_ns: int) -> int:
@@ -176,3 +200,8 @@ def unroll_weeks(fix_utc_ns: int, host_utc_ns: int) -> int:
     if fix_utc_ns and weeks and abs(host_utc_ns - fix_utc_ns - weeks * WEEK_ROLLOVER_NS) < DAY_NS:
         return fix_utc_ns + weeks * WEEK_ROLLOVER_NS
     return fix_utc_ns
+
+
+def plausible_utc(fix_utc_ns: int) -> int:
+    """0 for the dates that receivers count from before they know better: 1980, 1999, 2079."""
+    return fix_utc_ns if YEAR_2000_NS <= fix_utc_ns < YEAR_2060_NS else 0

@@ -2,13 +2,22 @@
 
 Nothing is believed before its checksum: a damaged message is counted and the search goes on one
 byte behind its start, so a false start costs no true message. Any cutting of the stream into reads
-gives the same messages.
+gives the same messages. A sentence ends with its checksum, whatever ends its line: CR, LF, both,
+blanks before them, or nothing.
 """
 
+import re
 from collections import Counter
 from dataclasses import dataclass
 
+from pyubx2 import UBX_MSGIDS
+
+from gateway.gnss.foreign import Foreign
+
 MAX_NMEA = 1024  # bytes; the standard says 82, makers' own sentences are longer
+SENTENCE_ENDS = re.compile(rb"[*\x00-\x1f$]")  # checksum, or what cannot stand in a sentence
+UNCHECKED = re.compile(rb"[A-Z]{2}([A-Z]{3}),[ -~]*")
+MOST_UNCHECKED = 32  # names of sentences that are told apart
 MAX_UBX = 8192  # bytes of payload; longer ones are false starts
 
 _CRC24Q = []
@@ -25,6 +34,18 @@ class RawMessage:
 
     kind: str
     data: bytes
+
+    @property
+    def name(self) -> str:
+        """What people call it: GGA, NAV-PVT, RTCM 1005."""
+        if self.kind == "UBX":
+            known = UBX_MSGIDS.get(self.data[2:4], f"{self.data[2]:02X}-{self.data[3]:02X}")
+            return f"UBX {known}"
+        if self.kind == "RTCM":
+            return f"RTCM {self.data[3] << 4 | self.data[4] >> 4}" if len(self.data) > 7 else "RTCM"
+        head = self.data[1:].partition(b",")[0].partition(b"*")[0].decode("latin-1")
+        name = head[:5] if head.startswith("P") else head[-3:]
+        return name if name.isascii() and name.isalnum() else "nameless sentence"
 
 
 def ubx_checksum(data: bytes) -> bytes:
@@ -61,6 +82,8 @@ class GnssStream:
         self.bad = 0
         self.skipped_bytes = 0
         self.reasons: Counter[str] = Counter()
+        self.unchecked: Counter[str] = Counter()  # sentences without a checksum, by name
+        self.foreign = Foreign()
 
     @property
     def pending(self) -> int:
@@ -72,6 +95,7 @@ class GnssStream:
         buffer = self._buffer
         buffer += data
         found: list[RawMessage] = []
+        skipped = bytearray()
         at = 0
         while at < len(buffer):
             size, kind = self._measure(buffer, at)
@@ -82,8 +106,10 @@ class GnssStream:
                 self.good += 1
             else:
                 self.skipped_bytes += size
+                skipped += buffer[at : at + size]
             at += size
         del buffer[:at]
+        self.foreign.look(skipped)
         return found
 
     def _measure(self, buffer: bytearray, at: int) -> tuple[int, str]:
@@ -125,18 +151,33 @@ class GnssStream:
         have = len(buffer) - at
         if have > 1 and not 0x41 <= buffer[at + 1] <= 0x5A:
             return 1, ""  # a dollar sign within something else
-        end = buffer.find(b"\n", at, at + MAX_NMEA)
-        if end < 0:
+        end = SENTENCE_ENDS.search(buffer, at + 1, at + MAX_NMEA)
+        if end is None:
             return (0, "") if have < MAX_NMEA else (1, "")
-        line = bytes(buffer[at + 1 : end]).rstrip(b"\r")
-        body, star, check = line.rpartition(b"*")
+        stop = end.start()
+        if buffer[stop] != 0x2A:
+            return self._without_checksum(bytes(buffer[at + 1 : stop]), buffer[stop] in b"\r\n")
+        if len(buffer) < stop + 3:
+            return 0, ""
         try:
-            right = bool(star) and len(check) == 2 and int(check, 16) == nmea_checksum(body)
+            right = int(buffer[stop + 1 : stop + 3], 16) == nmea_checksum(buffer[at + 1 : stop])
         except ValueError:
             right = False
         if not right:
             return self._damaged("nmea checksum")
-        return end + 1 - at, "NMEA"
+        return stop + 3 - at, "NMEA"
+
+    def _without_checksum(self, body: bytes, whole: bool) -> tuple[int, str]:
+        """A line that looks like a sentence but has no checksum is told apart from a damaged one;
+        it is not believed either.
+        """
+        named = UNCHECKED.fullmatch(body.rstrip())
+        if not whole or named is None:
+            return self._damaged("nmea checksum")
+        name = named[1].decode()
+        few = name in self.unchecked or len(self.unchecked) < MOST_UNCHECKED
+        self.unchecked[name if few else "others"] += 1
+        return 1 + len(body), ""
 
     def _rtcm(self, buffer: bytearray, at: int) -> tuple[int, str]:
         have = len(buffer) - at

@@ -1,11 +1,13 @@
 """Raw to physical, and physical to the bus: small pure functions without state."""
 
+import math
+
 from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
 
 from firmware_protocol.codec import FLAG_SIMULATED
 from firmware_protocol.frames import Hello, Imu6, Status, field_names
 from gateway.gnss.fix import Fix
-from inertial.constants import GRAVITY
+from inertial.constants import GEOID_SIGMA, GRAVITY
 from messages.contract import gyrofree_pb2 as pb
 
 ADXL345_SCALE = (
@@ -13,9 +15,7 @@ ADXL345_SCALE = (
 )  # m/s^2 per count, full resolution, data sheet rev. G; before HELLO has come
 READS_IN_TURN = {0, 3}  # board ids of the LPC1768 cube, real and emulated
 READ_S = 17e-6  # one sensor: five SPI frames of 16 bits at 4.8 MHz, and the chip select
-NO_VERTICAL = (
-    100.0  # m, sigma of a height that is above sea level because the geoid's height is not known
-)
+NO_HEIGHT_SIGMA = 1e4  # m, of a height that is not known
 
 SOURCES = {
     0: pb.SOURCE_HARDWARE,
@@ -120,8 +120,8 @@ def board_info(hello: Hello | None, status: Status | None) -> pb.BoardInfo:
 
 
 def gnss_fix(fix: Fix) -> pb.GnssFix:
-    """A fix as a bus message, without header and device time. Without a position the quality is
-    NONE.
+    """A fix as a bus message, without header and device time. What the receiver does not say is NaN
+    or empty; without a position the quality is NONE.
     """
     message = pb.GnssFix(
         fix_utc_ns=fix.fix_utc_ns,
@@ -129,18 +129,28 @@ def gnss_fix(fix: Fix) -> pb.GnssFix:
         satellites=fix.satellites,
         hdop=fix.hdop,
         talker=fix.talker,
+        latitude_deg=math.nan,
+        longitude_deg=math.nan,
+        height_m=math.nan,
+        height_msl_m=math.nan,
+        height_reference=pb.HEIGHT_REFERENCE_UNKNOWN,
     )
     if fix.latitude_deg is None or fix.longitude_deg is None:
         message.quality = pb.GnssFix.QUALITY_NONE
         return message
     message.latitude_deg, message.longitude_deg = fix.latitude_deg, fix.longitude_deg
-    message.height_msl_m = fix.height_msl_m or 0.0
     sigma = fix.sigma_ned_m
+    if fix.height_msl_m is not None:
+        message.height_msl_m = fix.height_msl_m
     if fix.height_m is not None:
         message.height_m = fix.height_m
-    else:  # a geoid height of up to 100 m is missing: the sigma says so where there is one
-        message.height_m = message.height_msl_m
-        sigma = None if sigma is None else (sigma[0], sigma[1], max(sigma[2], NO_VERTICAL))
+        message.height_reference = pb.HEIGHT_REFERENCE_ELLIPSOID
+    elif fix.height_msl_m is not None:  # nobody says how far the sea is from the ellipsoid there
+        message.height_m = fix.height_msl_m
+        message.height_reference = pb.HEIGHT_REFERENCE_SEA_LEVEL
+        sigma = None if sigma is None else (*sigma[:2], math.hypot(sigma[2], GEOID_SIGMA))
+    elif sigma is not None:
+        sigma = (*sigma[:2], math.nan)
     message.position_sigma_ned_m.extend(sigma or ())
     message.v_n_mps.extend(fix.v_n or ())
     message.velocity_sigma_ned_mps.extend(fix.v_sigma_ned or ())
@@ -148,16 +158,21 @@ def gnss_fix(fix: Fix) -> pb.GnssFix:
 
 
 def location_fix(message: pb.GnssFix, device: str) -> LocationFix:
-    """The same position as Foxglove's LocationFix; covariance is east, north, up."""
+    """The same position as Foxglove's LocationFix; covariance is east, north, up. Its altitude is
+    above the ellipsoid, so it is NaN where that is not known.
+    """
+    ellipsoid = message.height_reference == pb.HEIGHT_REFERENCE_ELLIPSOID
     location = LocationFix(
         frame_id=f"{device}/antenna",
         latitude=message.latitude_deg,
         longitude=message.longitude_deg,
-        altitude=message.height_m,
+        altitude=message.height_m if ellipsoid else math.nan,
     )
     location.timestamp.FromNanoseconds(message.header.utc_ns)
     if message.position_sigma_ned_m:
         n, e, d = (s * s for s in message.position_sigma_ned_m)
+        if not (ellipsoid and math.isfinite(d)):
+            d = NO_HEIGHT_SIGMA**2
         location.position_covariance.extend([e, 0, 0, 0, n, 0, 0, 0, d])
         location.position_covariance_type = LocationFix.DIAGONAL_KNOWN
     return location

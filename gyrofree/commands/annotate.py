@@ -6,7 +6,14 @@ from typing import Annotated
 
 import typer
 
-from gyrofree.commands.options import AsJson, Config, SessionId, catalogue_of, settings_of
+from gyrofree.commands.options import (
+    AsJson,
+    Config,
+    SessionId,
+    catalogue_of,
+    say,
+    settings_of,
+)
 from gyrofree.running.process import EXIT_CONFIG, fail
 from sessions.library.annotations import SessionNote, add_note, change_annotations
 
@@ -30,9 +37,9 @@ def note(
     except (ValueError, OSError) as error:
         raise fail(str(error)) from None
     if as_json:
-        print(json.dumps([one.model_dump(mode="json") for one in notes], indent=2))
+        say(json.dumps([one.model_dump(mode="json") for one in notes], indent=2))
     else:
-        print(f"{session}: {len(notes)} note{'' if len(notes) == 1 else 's'}")
+        say(f"{session}: {len(notes)} note{'' if len(notes) == 1 else 's'}")
 
 
 def tag(
@@ -61,9 +68,9 @@ def tag(
     except (ValueError, OSError) as error:
         raise fail(str(error).splitlines()[0], EXIT_CONFIG) from None
     if as_json:
-        print(json.dumps(changed.model_dump(mode="json"), indent=2))
+        say(json.dumps(changed.model_dump(mode="json"), indent=2))
         return
-    print(
+    say(
         f"{session}: {changed.title or 'no title'}; tags {', '.join(changed.tags) or 'none'};"
         f" {changed.outcome}"
     )

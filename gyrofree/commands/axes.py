@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from gyrofree.commands.options import AsJson, show_table
+from gyrofree.commands.options import AsJson, say, show_table
 from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
 from inertial.constants import GRAVITY
 
@@ -65,7 +65,7 @@ def axes(
     except (LogError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
     if as_json:
-        print(json.dumps(_result(named, found, out), indent=2))
+        say(json.dumps(_result(named, found, out), indent=2))
         return
     _print(named, found, out)
 
@@ -105,11 +105,11 @@ def _print(m: Any, found: Any, out: Path | None) -> None:
     show_table(table, 100)
     for turn in found.turns:
         other = "" if turn.about == "z" else f", by accelerometer {turn.by_force * DEG:.1f}°"
-        print(f"turn about {turn.about}: by gyro {turn.by_rate * DEG:.1f}°{other}")
+        say(f"turn about {turn.about}: by gyro {turn.by_rate * DEG:.1f}°{other}")
     for t, text in found.said:
         if text != "found":
-            print(f"! {t:.1f} s: {text}")
+            say(f"! {t:.1f} s: {text}")
     if m.source == "adc":
-        print(f"\nas [gateway.devices.analogue]:\n{m.gateway_toml()}")
+        say(f"\nas [gateway.devices.analogue]:\n{m.gateway_toml()}")
     if out is not None:
-        print(f"written to {out}")
+        say(f"written to {out}")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gyrofree.commands.options import AsJson, Config, Verbose, settings_of
+from gyrofree.commands.options import AsJson, Config, Verbose, say, settings_of
 from gyrofree.running.process import EXIT_CONFIG, fail, run_service
 
 FAULT_HELP = (
@@ -134,7 +134,7 @@ def _say_load(image: Path, as_json: bool) -> None:
     except (EmulatorMissing, EmulationError) as error:
         raise fail(str(error)) from None
     if as_json:
-        print(json.dumps(found))
+        say(json.dumps(found))
         return
     for name, value in found.items():
-        print(f"{name:24} {value:.6g}")
+        say(f"{name:24} {value:.6g}")

@@ -13,7 +13,7 @@ import typer
 from rich.table import Table
 
 from gyrofree.commands.axes import axes
-from gyrofree.commands.options import AsJson, show_table
+from gyrofree.commands.options import AsJson, say, show_table
 from gyrofree.commands.run import progress_bar
 from gyrofree.running.process import EXIT_CONFIG, fail
 from inertial.constants import MILLI_G
@@ -67,13 +67,13 @@ def plan(
     }
     listed = [{"up_b": v.tolist(), "text": p.describe(v)} for v in up]
     if as_json:
-        print(json.dumps({"layout": shape.name, "poses": listed, "predicted": promised}, indent=2))
+        say(json.dumps({"layout": shape.name, "poses": listed, "predicted": promised}, indent=2))
         return
     table = Table("pose", "do this", "up in body axes")
     for number, one in enumerate(listed, 1):
         table.add_row(str(number), one["text"], " ".join(f"{v:+.2f}" for v in one["up_b"]))
     show_table(table)
-    print(
+    say(
         f"each {seconds:g} s still, worst axis then: bias"
         f" ±{promised['bias_sigma_mps2'] / MILLI_G:.2f} mg,"
         f" scale ±{promised['scale_sigma'] * 100:.3f} %, direction"
@@ -118,12 +118,12 @@ def fit(
         raise fail(str(error), EXIT_CONFIG) from None
     said = advice(made)
     if as_json:
-        print(json.dumps({**as_dict(made.card), "card": str(out), "advice": said}, indent=2))
+        say(json.dumps({**as_dict(made.card), "card": str(out), "advice": said}, indent=2))
         return
     _print(made.card)
     for line in said:
-        print(f"! {line}")
-    print(f"written to {out}")
+        say(f"! {line}")
+    say(f"written to {out}")
 
 
 @app.command()
@@ -138,7 +138,7 @@ def show(
     except (ValueError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
     if as_json:
-        print(json.dumps(as_dict(found), indent=2))
+        say(json.dumps(as_dict(found), indent=2))
     else:
         _print(found)
 
@@ -147,7 +147,7 @@ def _print(card: Any) -> None:
     from inertial.calibration.card import sigmas
 
     sigma = sigmas(card)
-    print(
+    say(
         f"card {card.id}: {card.device}{' ' + card.uid if card.uid else ''}, layout"
         f" {card.layout_name}, {card.date}\n{card.poses} poses, {card.steps} table runs; residual"
         f" {card.residual_rms / MILLI_G:.2f} mg, chi-square per degree {card.chi2:.2f}"
@@ -213,7 +213,7 @@ def apply_card(
         "samples": len(values),
         "layout": str(layout_out or ""),
     }
-    print(
+    say(
         json.dumps(result, indent=2)
         if as_json
         else f"{out}: {len(values)} samples corrected by card {found.id}"
@@ -263,4 +263,4 @@ def simulate(
     except (ValueError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
     for path in files:
-        print(path)
+        say(path)

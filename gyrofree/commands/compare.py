@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Column, Table
 
-from gyrofree.commands.options import AsJson, Config, file_of, settings_of, show_table
+from gyrofree.commands.options import (
+    AsJson,
+    Config,
+    file_of,
+    say,
+    settings_of,
+    show_table,
+)
 from gyrofree.commands.run import progress_bar
 from gyrofree.running.process import EXIT_CONFIG, fail
 
@@ -86,7 +93,7 @@ def compare(
     except (ValueError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
     if as_json:
-        print(json.dumps(as_dict(result), indent=2))
+        say(json.dumps(as_dict(result), indent=2))
     else:
         show(result)
 
@@ -113,7 +120,7 @@ def show(result: "Comparison") -> None:
         _show_tracks(result)
     for one in result.sessions:
         for text in one.curves.said:
-            print(f"note: {one.curves.session}: {text}")
+            say(f"note: {one.curves.session}: {text}")
 
 
 def _show_offsets(result: "Comparison") -> None:
@@ -172,6 +179,9 @@ def _show_tracks(result: "Comparison") -> None:
     )
     for t in result.tracks:
         table.add_row(
-            t.session, t.track, *(f"{part:.4g}" for part in t.rms_ned_m), f"{t.seconds:.1f} s"
+            t.session,
+            t.track,
+            *("–" if part is None else f"{part:.4g}" for part in t.rms_ned_m),
+            f"{t.seconds:.1f} s",
         )
     show_table(table)

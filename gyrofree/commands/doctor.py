@@ -5,13 +5,9 @@ from typing import Annotated
 
 import typer
 from rich.table import Table
+from rich.text import Text
 
-from gyrofree.commands.options import (
-    AsJson,
-    Config,
-    settings_of,
-    show_table,
-)
+from gyrofree.commands.options import AsJson, Config, say, settings_of, show_table
 from gyrofree.running.process import EXIT_CONFIG as CONFIG
 from gyrofree.running.process import EXIT_FAILED, fail
 
@@ -33,12 +29,12 @@ def doctor(
         raise fail(f"--health {health!r}: want one of {', '.join(services)}", CONFIG)
     findings = [examination.health(health, settings)] if health else examination.examine(settings)
     if as_json:
-        print(json.dumps(examination.as_json(findings), indent=2))
+        say(json.dumps(examination.as_json(findings), indent=2))
     else:
         table = Table("check", "state", "found", "what to do")
         colour = {"ok": "green", "warn": "yellow", "fail": "bold red"}
         for finding in findings:
-            state = f"[{colour[finding.state]}]{finding.state}[/]"
+            state = Text(finding.state, colour[finding.state])
             table.add_row(finding.check, state, finding.found, finding.remedy)
         show_table(table)
     if any(finding.state == "fail" for finding in findings):

@@ -5,7 +5,6 @@ again.
 import functools
 import json
 import sys
-from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -18,13 +17,13 @@ from gyrofree.commands.options import (
     UnitsAsNamed,
     catalogue_of,
     file_of,
+    say,
     session_name,
     settings_of,
 )
 from gyrofree.commands.run import progress_bar
 from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
-from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import AXES, Topic, TopicError, check_name, parse
+from messages.contract.topics import TopicError, check_name
 from sessions.library.annotations import give_title
 from sessions.recording.manifest import SessionError, name_of, slug
 
@@ -65,7 +64,7 @@ def export(
         raise fail(str(error), EXIT_CONFIG) from None
     except OSError as error:
         raise fail(str(error)) from None
-    print(
+    say(
         json.dumps([str(file) for file in files], indent=2)
         if as_json
         else "\n".join(map(str, files))
@@ -101,11 +100,11 @@ def report(
         with progress_bar() as progress:
             made = build(path, load_spec(spec), device, boot, progress)
         if as_json:
-            print(made.json, end="")
+            say(made.json, end="")
         else:
             for file in made.write(out or Path(f"report-{name_of(path)}")):
-                print(file)
-            print(f"verdict: {made.verdict}")
+                say(file)
+            say(f"verdict: {made.verdict}")
     except (ValueError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
     if made.verdict == "fail":
@@ -139,8 +138,8 @@ def import_log(
         check_name(device)
         source = read_board_log(log, gnss, units_as_named)
         for note in source.notes:
-            print(f"note: {note}", file=sys.stderr)
-        rows = list(importer.rows_of(source, settings.bus.prefix, device))
+            say(f"note: {note}", file=sys.stderr)
+        rows = importer.rows_of(source, settings.bus.prefix, device)
         folder, axes = _estimated(
             settings,
             rows,
@@ -150,10 +149,10 @@ def import_log(
         )
         give_title(folder, name)
         for text in axes:
-            print(text, file=sys.stderr)
+            say(text, file=sys.stderr)
     except (LogError, TopicError, SessionError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
-    print(json.dumps({"session": folder.name}) if as_json else folder.name)
+    say(json.dumps({"session": folder.name}) if as_json else folder.name)
 
 
 def _estimated(settings, rows, session: str, note: str, root: Path) -> tuple[Path, list[str]]:
@@ -161,6 +160,7 @@ def _estimated(settings, rows, session: str, note: str, root: Path) -> tuple[Pat
     import tempfile
 
     from estimator.pipeline import Pipeline
+    from gyrofree.running.axes_said import axes_said, keeping_axes
     from sessions.replay.rerun import estimates_again, write_session
 
     configuration = settings.model_dump(mode="json")
@@ -170,30 +170,8 @@ def _estimated(settings, rows, session: str, note: str, root: Path) -> tuple[Pat
             inputs / "recording.mcap", Pipeline(settings.estimator), "", progress
         )
         last: dict[str, bytes] = {}
-        folder = write_session(
-            Path(root), session, _keeping(AXES, again, last), note, configuration
-        )
-        return folder, [_axes_text(payload) for payload in last.values()]
-
-
-def _keeping(
-    topic: Topic, rows: Iterable[tuple[int, str, bytes]], last: dict[str, bytes]
-) -> Iterator[tuple[int, str, bytes]]:
-    """The rows; `last` keeps the topic's last payload, by bus key."""
-    for row in rows:
-        if parse(row[1]).topic is topic:
-            last[row[1]] = row[2]
-        yield row
-
-
-def _axes_text(payload: bytes) -> str:
-    """What the axis monitor says, as `run` does."""
-    from inertial.rate.axis_fault import axis_word
-    from inertial.rate.axis_verdicts import good_of
-
-    said = pb.AxisHealth.FromString(payload)
-    states = {axis.name: axis_word(axis.state, axis.excluded) for axis in said.axes}
-    return said.message or f"axes: {good_of(states)}"
+        folder = write_session(Path(root), session, keeping_axes(again, last), note, configuration)
+        return folder, [axes_said(payload) for payload in last.values()]
 
 
 def rerun(
@@ -262,7 +240,7 @@ def rerun(
         give_title(folder, name)
     except (UnknownEstimator, SessionError, ValueError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
-    print(json.dumps({"session": folder.name}) if as_json else folder.name)
+    say(json.dumps({"session": folder.name}) if as_json else folder.name)
 
 
 def reprocess(
@@ -315,9 +293,9 @@ def reprocess(
         raise fail(str(error), EXIT_CONFIG) from None
     bad = sum(bool(row.get("problem")) for row in rows)
     if as_json:
-        print(json.dumps(rows, indent=2))
+        say(json.dumps(rows, indent=2))
     else:
-        print(f"{out}: {len(rows)} rows of {len(paths)} sessions, {bad} with a problem")
+        say(f"{out}: {len(rows)} rows of {len(paths)} sessions, {bad} with a problem")
 
 
 def mount(app: typer.Typer) -> None:

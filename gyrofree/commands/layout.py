@@ -18,7 +18,7 @@ from gyrofree.commands.layout_tables import (
     price,
     unknowns_table,
 )
-from gyrofree.commands.options import AsJson, console_of, show_table
+from gyrofree.commands.options import AsJson, console_of, say, show_table
 from gyrofree.running.process import EXIT_CONFIG, fail
 
 WIDTH = 150  # characters of tables where nobody looks at a terminal
@@ -81,9 +81,9 @@ def show(
     if plot is not None:
         _draw([q], plot)
     if as_json:
-        return print(json.dumps(q.as_json(), indent=2))
+        return say(json.dumps(q.as_json(), indent=2))
     console = console_of(WIDTH)
-    console.print(f"[bold]{q.layout.name}[/]  {q.layout.text}", highlight=False)
+    console.print(f"{q.layout.name}  {q.layout.text}", highlight=False)
     console.print(axes_table(q.layout))
     console.print(figures_table([q]))
     console.print(unknowns_table(q))
@@ -121,7 +121,7 @@ def compare(
     if plot is not None:
         _draw(found, plot)
     if as_json:
-        return print(json.dumps([q.as_json() for q in found], indent=2))
+        return say(json.dumps([q.as_json() for q in found], indent=2))
     show_table(figures_table(found), WIDTH)
 
 
@@ -195,7 +195,7 @@ def optimise(
             "gdops": found.gdops,
             "lower_bound": found.bound,
         }
-        return print(
+        return say(
             json.dumps({"search": extra, "found": q.as_json(), "cube": cube.as_json()}, indent=2)
         )
     console = console_of(WIDTH)

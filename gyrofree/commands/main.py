@@ -10,6 +10,7 @@ from gyrofree.commands import run as logs
 from gyrofree.commands.board import board
 from gyrofree.commands.demo import demo, play
 from gyrofree.commands.doctor import doctor
+from gyrofree.commands.options import say
 from gyrofree.commands.replay import replay
 from gyrofree.commands.services import dashboard, estimator, gateway, record, router
 from gyrofree.commands.simulate import simulate
@@ -50,7 +51,7 @@ for command in (
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        print(f"gyrofree {importlib.metadata.version('gyrofree')}")
+        say(f"gyrofree {importlib.metadata.version('gyrofree')}")
         raise typer.Exit
 
 

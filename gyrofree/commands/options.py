@@ -2,14 +2,16 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from gyrofree.config import ConfigError, Settings, load_or_default
 from gyrofree.running.process import EXIT_CONFIG, fail
+from messages.text import printed
 
 if TYPE_CHECKING:
     from sessions.library.catalogue import Catalogue
@@ -71,11 +73,23 @@ def session_name(name: str) -> str:
     return name
 
 
+def say(*parts: object, sep: str = " ", end: str = "\n", file: TextIO | None = None) -> None:
+    """print(), for texts that may come from outside: see messages.text."""
+    print(*map(printed, parts), sep=sep, end=end, file=file)
+
+
+class Terminal(Console):
+    """Shows texts as they stand: what is in a cell neither moves the cursor nor is markup."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        return super().render_str(printed(text), **options | {"markup": False, "emoji": False})
+
+
 def console_of(width: int = 160) -> Console:
     """Standard output; `width` characters where that is a file or a pipe, which has no width of its
     own.
     """
-    return Console(file=sys.stdout, width=None if sys.stdout.isatty() else width)
+    return Terminal(file=sys.stdout, width=None if sys.stdout.isatty() else width)
 
 
 def show_table(table: Table, width: int = 160) -> None:

@@ -16,6 +16,7 @@ from gyrofree.commands.options import (
     Speed,
     Verbose,
     catalogue_of,
+    say,
     settings_of,
     show_table,
 )
@@ -80,7 +81,7 @@ def show_list(settings: Settings, as_json: bool) -> None:
     """The catalogue on standard output."""
     infos = catalogue_of(settings).list()
     if as_json:
-        print(json.dumps([asdict(info) for info in infos], indent=2, default=str))
+        say(json.dumps([asdict(info) for info in infos], indent=2, default=str))
         return
     table = Table("id", "devices", "start (UTC)", "length", "state", "messages", "lost", "size")
     for info in infos:
@@ -125,7 +126,7 @@ def compare_estimates(settings: Settings, path: Path, as_json: bool) -> int:
         result = reproduce(path, Pipeline(settings.estimator))
     other = other_core(path)
     if as_json:
-        print(json.dumps(result.as_dict(), indent=2))
+        say(json.dumps(result.as_dict(), indent=2))
     else:
         table = Table("key", "equal", "different", "missing", "first difference")
         for key, row in result.as_dict()["keys"].items():
@@ -134,8 +135,8 @@ def compare_estimates(settings: Settings, path: Path, as_json: bool) -> int:
                 *(str(row[name]) for name in ("equal", "different", "missing", "first_difference")),
             )
         show_table(table)
-        print(*filter(None, (f"recording: {result.damage}", result.others, other)), sep="\n")
+        say(*filter(None, (f"recording: {result.damage}", result.others, other)), sep="\n")
         if not result.identical:
             reason = "an estimator began before the recording, or an input is missing"
-            print(f"Estimates differ where {reason}: docs/recordings.md")
+            say(f"Estimates differ where {reason}: docs/recordings.md")
     return 0 if result.identical else 1

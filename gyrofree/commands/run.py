@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from gyrofree.commands.options import AsJson, UnitsAsNamed, show_table
+from gyrofree.commands.options import AsJson, UnitsAsNamed, say, show_table
 from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
 
 Report = Callable[[float, str], None]
@@ -174,7 +174,7 @@ def parse_outages(text: str) -> list[tuple[float, float]]:
 def show(result: dict[str, Any], as_json: bool) -> None:
     """One JSON object, or a table with a row per filter."""
     if as_json:
-        print(json.dumps(result, indent=2))
+        say(json.dumps(result, indent=2))
         return
     kind = kind_of(result)
     rows: dict[str, dict[str, Any]] = result[kind]
@@ -186,13 +186,13 @@ def show(result: dict[str, Any], as_json: bool) -> None:
     show_table(table, 200)
     for key, value in result.items():
         if key == "axes" and isinstance(value, dict):
-            print(f"axes: {axes(value)}")
+            say(f"axes: {axes(value)}")
         elif key == "notes":
-            print(*(f"note: {note}" for note in value), sep="\n")
+            say(*(f"note: {note}" for note in value), sep="\n")
         elif key == "gaps" and isinstance(value, dict):
-            print(f"gaps: {value['count']}, missing samples: {value['missing_samples']}")
+            say(f"gaps: {value['count']}, missing samples: {value['missing_samples']}")
         elif key not in (kind, "default") and value not in (None, [], {}, ""):
-            print(f"{key}: {json.dumps(value)}")
+            say(f"{key}: {json.dumps(value)}")
 
 
 def axes(found: dict[str, Any]) -> str:
@@ -262,6 +262,6 @@ def _reproduce(work: Callable[[Report], dict[str, Any]], out: Path, as_json: boo
     except (ValueError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
     if as_json:
-        print(json.dumps(result, indent=2))
+        say(json.dumps(result, indent=2))
     else:
-        print(f"written to {out}; open {out / 'index.html'}")
+        say(f"written to {out}; open {out / 'index.html'}")

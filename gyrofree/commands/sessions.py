@@ -18,6 +18,7 @@ from gyrofree.commands.options import (
     Config,
     SessionId,
     catalogue_of,
+    say,
     settings_of,
     show_table,
 )
@@ -51,7 +52,7 @@ def list_sessions(
     except SessionError as error:
         raise fail(str(error)) from None
     if as_json:
-        print(json.dumps(rows, indent=2))
+        say(json.dumps(rows, indent=2))
         return
     head = ("device", "start (UTC)", "length", "state", "complete", "size", "tags", "title")
     table = Table(Column("id", no_wrap=True), *head)
@@ -122,14 +123,14 @@ def show(session: SessionId, as_json: AsJson = False, config: Config = None) -> 
     except SessionError as error:
         raise fail(str(error)) from None
     if as_json:
-        print(
+        say(
             json.dumps(
                 manifest.model_dump(mode="json") | {"annotations": notes.model_dump(mode="json")},
                 indent=2,
             )
         )
         return
-    print(
+    say(
         f"{manifest.id}: {manifest.state}, {manifest.bytes / 1e6:.2f} MB, sha256"
         f" {manifest.sha256 or 'not yet'}"
     )
@@ -141,7 +142,7 @@ def show(session: SessionId, as_json: AsJson = False, config: Config = None) -> 
         ("recovery", manifest.recovery),
     ):
         if value:
-            print(f"{name}: {value}")
+            say(f"{name}: {value}")
     table = Table(
         Column("topic", no_wrap=True),
         "messages",
@@ -156,7 +157,7 @@ def show(session: SessionId, as_json: AsJson = False, config: Config = None) -> 
     show_table(table)
     for one in notes.notes:
         when = "all" if one.at_s is None else f"{one.at_s:.2f} s"
-        print(f"{when}  {one.author}: {one.text}")
+        say(f"{when}  {one.author}: {one.text}")
 
 
 @app.command()
@@ -174,22 +175,22 @@ def verify(session: SessionId, as_json: AsJson = False, config: Config = None) -
     except (SessionError, OSError) as error:
         raise fail(str(error)) from None
     if as_json:
-        print(json.dumps(asdict(found) | {"ok": found.ok}, indent=2))
+        say(json.dumps(asdict(found) | {"ok": found.ok}, indent=2))
     else:
         said = {
             True: "matches",
             False: "DOES NOT MATCH",
             None: "is not there yet: the session is open",
         }[found.hash_ok]
-        print(
+        say(
             f"{session}: {found.state}; its hash {said}; {found.messages:,} messages readable;"
             f" {found.damage}"
         )
         if found.others:
-            print(f"  {found.others}")
-        print(f"  curves for drawing: {found.curves}")
+            say(f"  {found.others}")
+        say(f"  curves for drawing: {found.curves}")
         for key, text in found.differing.items():
-            print(f"  {key}: {text}")
+            say(f"  {key}: {text}")
     if not found.ok:
         raise typer.Exit(EXIT_FAILED)
 
@@ -213,7 +214,7 @@ def delete(
     except (SessionError, OSError) as error:
         raise fail(str(error)) from None
     text = f"{session} deleted, {freed / 1e6:.2f} MB freed"
-    print(json.dumps({"deleted": session, "freed_bytes": freed}) if as_json else text)
+    say(json.dumps({"deleted": session, "freed_bytes": freed}) if as_json else text)
 
 
 @app.command()
@@ -254,15 +255,15 @@ def retain(
         going = too_many(catalogue, rule)
         if as_json:
             rows = [{"id": info.id, "bytes": info.bytes, "deleted": yes} for info in going]
-            print(json.dumps(rows, indent=2))
+            say(json.dumps(rows, indent=2))
         for info in going:
             if not as_json:
-                print(f"{info.id}  {info.bytes / 1e6:.2f} MB")
+                say(f"{info.id}  {info.bytes / 1e6:.2f} MB")
             if yes:
                 remove(catalogue, info.id)
     except (SessionError, OSError) as error:
         raise fail(str(error)) from None
-    print(
+    say(
         f"{len(going)} sessions {'deleted' if yes else 'would go; --yes deletes them'}",
         file=sys.stderr,
     )

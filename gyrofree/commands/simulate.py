@@ -11,6 +11,7 @@ from gyrofree.commands.options import (
     Fault,
     Verbose,
     faults_of,
+    say,
     settings_of,
 )
 from gyrofree.running.process import EXIT_CONFIG as CONFIG
@@ -78,7 +79,7 @@ def simulate(
         if csv is not None:
             from gyrofree.running import simulate_csv
 
-            print(f"{csv}: {simulate_csv.write(csv, profile, seed, layout, half_side)} samples")
+            say(f"{csv}: {simulate_csv.write(csv, profile, seed, layout, half_side)} samples")
             return
     except (ValueError, OSError) as error:
         raise fail(str(error), CONFIG) from None

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from dashboard.web.users import UsersError, add_user, load_users, remove_user
-from gyrofree.commands.options import AsJson, Config, settings_of
+from gyrofree.commands.options import AsJson, Config, say, settings_of
 from gyrofree.running.process import EXIT_CONFIG, fail
 
 app = typer.Typer(
@@ -38,7 +38,7 @@ def users_add(
         add_user(settings.dashboard.users, name, password, role)
     except UsersError as error:
         raise fail(str(error), EXIT_CONFIG) from None
-    print(f"{name} may sign in as {role}")
+    say(f"{name} may sign in as {role}")
 
 
 @app.command("list")
@@ -49,14 +49,14 @@ def users_list(as_json: AsJson = False, config: Config = None) -> None:
     except UsersError as error:
         raise fail(str(error)) from None
     if as_json:
-        print(
+        say(
             json.dumps(
                 [{"name": user.name, "role": user.role.name} for user in found.values()], indent=2
             )
         )
         return
     for user in found.values():
-        print(f"{user.name}\t{user.role.name}")
+        say(f"{user.name}\t{user.role.name}")
 
 
 @app.command("remove")

@@ -63,9 +63,8 @@ def origin_of(source: BoardLog) -> float:
 
 def _samples(source: BoardLog) -> Iterator[Item]:
     period_s = source.timing.period_s
-    for row, (t_s, index) in enumerate(
-        zip(source.t_s.tolist(), source.index.tolist(), strict=True)
-    ):
+    for row, (t_s, index) in enumerate(zip(source.t_s, source.index, strict=True)):
+        t_s, index = float(t_s), int(index)
         if source.kind == "imu":
             imu = pb.ImuBatch(first_index=index, period_s=period_s)
             imu.f_b_mps2.extend(source.f_b[row].tolist())
@@ -85,12 +84,14 @@ def _tacho(source: BoardLog) -> Iterator[Item]:
     """
     if source.tacho is None:
         return
-    for t_s, rate in zip(source.t_s.tolist(), source.tacho.tolist(), strict=True):
+    for t_s, rate in zip(source.t_s, source.tacho, strict=True):
         if rate != 0.0:
             yield (
-                t_s,
+                float(t_s),
                 TACHO_TOPIC,
-                pb.TachoRate(omega_radps=rate, sigma_radps=TACHO_SIGMA, direction_known=True),
+                pb.TachoRate(
+                    omega_radps=float(rate), sigma_radps=TACHO_SIGMA, direction_known=True
+                ),
             )
 
 
@@ -101,11 +102,16 @@ def _fixes(source: BoardLog) -> Iterator[Item]:
             latitude_deg=math.degrees(fix.latitude),
             longitude_deg=math.degrees(fix.longitude),
             height_m=fix.height,
+            height_msl_m=math.nan,  # a log does not say
+            height_reference=pb.HEIGHT_REFERENCE_ELLIPSOID
+            if fix.has_height
+            else pb.HEIGHT_REFERENCE_UNKNOWN,
             device_time_s=fix.t,
             quality=QUALITY.get(fix.quality, pb.GnssFix.QUALITY_NONE),
             fix_utc_ns=LOG_EPOCH_S * 1_000_000_000 + round((fix.t - zero_s) * 1e9),
         )
-        message.position_sigma_ned_m.extend(fix.sigma_p.tolist())
+        sigma_p = fix.sigma_p.tolist() if fix.has_height else [*fix.sigma_p[:2].tolist(), math.nan]
+        message.position_sigma_ned_m.extend(sigma_p)
         if fix.v_n is not None:
             message.v_n_mps.extend(fix.v_n.tolist())
         yield fix.t, GNSS, message

@@ -19,11 +19,13 @@ import zenoh
 
 from gyrofree.config import ConfigError
 from messages.bus.session import BusUnavailable
+from messages.text import plain, printed
 
 EXIT_FAILED = 1
 EXIT_CONFIG = 2
 EXIT_TAKEN = 3
 
+LINE = 4000  # characters of a message in the log
 SETTLED = 8.0  # s after the start: imports and compiled functions are loaded
 
 log = logging.getLogger(__name__)
@@ -38,6 +40,14 @@ def command(*arguments: str) -> list[str]:
     return [sys.executable, "-P", "-m", "gyrofree", *arguments]
 
 
+class OneLine(logging.Formatter):
+    """A message is one line: text from outside can neither begin another nor move the cursor."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:
+        record.message = plain(record.message, LINE)
+        return super().formatMessage(record)
+
+
 def start_logging(verbose: bool = False) -> None:
     """One line per event on stderr; below a supervisor without time, which the supervisor writes
     itself.
@@ -48,9 +58,10 @@ def start_logging(verbose: bool = False) -> None:
         if supervised
         else "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
     )
-    logging.basicConfig(
-        level=logging.DEBUG if verbose else logging.INFO, format=form, stream=sys.stderr, force=True
-    )
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(OneLine(form))
+    level = logging.DEBUG if verbose else logging.INFO
+    logging.basicConfig(level=level, handlers=[handler], force=True)
     for noisy in ("websockets", "uvicorn.access", "httpx", "asyncio", "httpcore"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
 
@@ -89,7 +100,7 @@ def _end_in_peace() -> None:
 
 def fail(text: str, code: int = EXIT_FAILED) -> typer.Exit:
     """Say why on stderr; raise what this returns."""
-    for line in text.splitlines():
+    for line in printed(text).splitlines():
         print(f"gyrofree: {line}", file=sys.stderr)
     return typer.Exit(code)
 

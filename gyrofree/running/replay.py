@@ -10,8 +10,11 @@ from sessions.library.catalogue import Catalogue
 
 def find(settings: Settings, session: str) -> Path:
     """MCAP file of an id or path; raises LookupError that says what there is."""
-    if Path(session).is_file():
-        return Path(session)
+    try:
+        if Path(session).is_file():
+            return Path(session)
+    except OSError as error:  # a name that no file can have
+        raise LookupError(f"{session[:60]}: {error.strerror}") from None
     catalogue = Catalogue(Path(settings.recorder.root))
     try:
         return catalogue.path(session)

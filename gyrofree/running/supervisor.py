@@ -18,6 +18,7 @@ from rich.console import Console
 from rich.text import Text
 
 from gyrofree.running.process import EXIT_CONFIG, EXIT_TAKEN, command
+from messages.text import printed
 
 PAUSE_FIRST = 0.05  # s; while a gateway is away its board's samples are lost
 PAUSE_LONGEST = 5.0  # s
@@ -185,5 +186,7 @@ class Supervisor:
 
     def _print(self, name: str, colour: str, text: str, style: str) -> None:
         clock = time.strftime("%H:%M:%S")
-        line = Text.assemble((clock, "dim"), " ", (f"{name:<10}", colour), " ", (text, style))
+        line = Text.assemble(
+            (clock, "dim"), " ", (f"{name:<10}", colour), " ", (printed(text), style)
+        )
         self.console.print(line, soft_wrap=True)

@@ -34,9 +34,9 @@ from inertial.navigation.solution import (
     Mode,
     Solution,
     Wheels,
+    as_known,
     correction_of,
     nothing_compared,
-    without_height,
 )
 from inertial.navigation.start import HEIGHT_UP, Startup, first_leg
 from inertial.rotation import from_matrix
@@ -71,7 +71,7 @@ class Navigator:
         self._last_fix: Fix | None = None
         self._last_used = -math.inf
         self._origin: tuple[float, float, float] | None = None  # its height may be NaN: unknown
-        self._datum = 0.0
+        self._datum, self._measured_height = 0.0, False
 
     @property
     def nominal(self) -> Any:
@@ -220,7 +220,7 @@ class Navigator:
         self._last_fix = fix
         self._last_used = fix.t
         if fix.has_height:
-            self._datum = fix.datum
+            self._datum, self._measured_height = fix.datum, True
         self.counts["used"] += 1
 
     def _refuse(self, said: Correction, count: str, reason: str) -> Correction:
@@ -272,7 +272,7 @@ class Navigator:
             self._datum,
             self.text,
         )
-        return without_height(solution)
+        return as_known(solution, self._measured_height)
 
     def _known_origin(self) -> tuple[float, float, float]:
         """The origin to count from; at height 0 as long as no fix had one."""
@@ -312,7 +312,7 @@ class Navigator:
             self._datum,
             align.text,
         )
-        return without_height(solution)
+        return as_known(solution, self._measured_height)
 
 
 def _maker(name: str) -> Callable[..., Navigator]:

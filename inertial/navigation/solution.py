@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.navigation import results
-from inertial.navigation.fix import Fix
+from inertial.navigation.fix import UNKNOWN_HEIGHT_SIGMA, Fix
 
 Array = NDArray[np.float64]
 
@@ -180,12 +180,17 @@ class Solution:
     alignment: str = ""  # for people: what the alignment does or waits for, how it was found
 
 
-def without_height(solution: Solution) -> Solution:
-    """Says what is not known: a height whose sigma is that of not knowing is none, and one that
-    counts from sea level is no better than the geoid.
+def as_known(solution: Solution, measured: bool) -> Solution:
+    """Says what is not known: a height that no fix has measured is none, whatever the model makes
+    of gravity and of wheels on the ground, nor is one whose sigma has grown to that of not knowing;
+    and one that counts from sea level is no better than the geoid.
     """
     s = solution
-    if s.datum:
+    if not measured:
+        sigma = s.sigma.copy()
+        sigma[HEIGHT_STATE] = max(sigma[HEIGHT_STATE], UNKNOWN_HEIGHT_SIGMA)
+        s = replace(s, sigma=sigma)
+    elif s.datum:
         sigma, covariance = s.sigma.copy(), s.position_covariance.copy()
         sigma[HEIGHT_STATE] = math.hypot(sigma[HEIGHT_STATE], s.datum)
         covariance[2, 2] += s.datum**2

@@ -16,7 +16,7 @@ from inertial.navigation.alignment import Alignment, AlignmentSettings, Start
 from inertial.navigation.alignment_positions import Positions
 from inertial.navigation.error_model import DP
 from inertial.navigation.filters import FilterConfig
-from inertial.navigation.fix import UNKNOWN_HEIGHT_SIGMA, Fix
+from inertial.navigation.fix import Fix
 from inertial.navigation.settings import NavigatorConfig
 
 Array = NDArray[np.float64]
@@ -114,8 +114,7 @@ def first_covariance(
     """(n, n) at the start: what is told, the fix, and what the alignment knows of itself."""
     c = config
     sigma_p = np.minimum(c.sigma_p, np.maximum(3.0 * fix.sigma_p, 0.1))
-    if fix.sigma_p[2] >= UNKNOWN_HEIGHT_SIGMA:
-        sigma_p[2] = fix.sigma_p[2]
+    sigma_p = np.maximum(sigma_p, fix.sigma_p)  # no start is better than its fix
     sigma_v = np.maximum(c.sigma_v, fix.sigma_v if start.sigma_v is None else start.sigma_v)
     sigma_yaw = c.sigma_yaw if start.sigma_yaw is None else max(c.sigma_yaw, start.sigma_yaw)
     attitude = [c.sigma_tilt, c.sigma_tilt, sigma_yaw]

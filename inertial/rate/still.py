@@ -61,6 +61,7 @@ class Config:
     drift: float = 0.02  # 1/s^2, sigma by which biases of the quiet quantities may have moved since
     drift_now: float = 0.004  # rad/s^2, the same within one standstill
     drift_tilt: float = 0.01  # m/s^2, of p within one standstill
+    scale: float = 0.007  # of 1, scale errors of the axes: they are told by another attitude
     guard: int = 64  # newest samples of a standstill that are not learnt: they may already move
     hold: int = 50  # samples after the end of a standstill before there can be another
 

@@ -69,7 +69,6 @@ def simulated(seed: int, progress: Progress = lambda done, what: None) -> Study:
         names=test.layout.axis_names,
         t_s=t,
         f_axis=counts * test.sensor.count,
-        counts=counts,
         lsb_mps2=test.sensor.count,
         index=np.arange(n),
         timing=sample_timing(t),

@@ -35,6 +35,7 @@ KINDS = (  # what a refusal can be counted as
     "length",
     "value",  # not one of those that there are
     "many",  # more devices or streams than there is room for
+    "time",  # far from that of all others
     "answer",  # of a publisher: not what was asked for
     "failure",  # we could not take it: a fault of ours
 )
@@ -75,6 +76,7 @@ class _Limits(NamedTuple):
     row: int
     columns: str
     name: bool
+    none: bool  # NaN is one of its values: not known
 
 
 @cache
@@ -99,6 +101,7 @@ def _limits(field: FieldDescriptor) -> _Limits:
         rule.row,
         rule.columns,
         rule.name,
+        rule.none,
     )
 
 
@@ -151,7 +154,8 @@ def _bounded(at: str, field: FieldDescriptor, limits: _Limits) -> str:
     natural = limits.low == 0.0 and field.cpp_type in NATURAL
     low = "" if limits.low is None or natural else f"{number(limits.low)!r} <= "
     high = "" if limits.high is None else f" <= {number(limits.high)!r}"
-    return f"{low}{at}{high}"
+    test = f"{low}{at}{high}"
+    return f"({test} or {at} != {at})" if limits.none else test
 
 
 def _list_test(field: FieldDescriptor, limits: _Limits, inner: str, given: dict[str, Any]) -> str:
@@ -251,6 +255,8 @@ def _explain_value(
     elif field.cpp_type == FieldDescriptor.CPPTYPE_ENUM:
         if value not in field.enum_type.values_by_number:
             yield Refusal("value", where, str(value), f"one of {field.enum_type.name}")
+    elif limits.none and math.isnan(value):
+        return
     elif field.cpp_type in FLOATS and not limits.open and not math.isfinite(value):
         yield Refusal("number", where, str(value), "a finite number")
     else:

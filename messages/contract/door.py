@@ -103,9 +103,9 @@ class Door:
         self.refuse(key, refusal, device)
         return False
 
-    def too_large(self, key: str, size: int) -> None:
+    def too_large(self, key: str, size: int, most: int = MESSAGE_BYTES) -> None:
         """A message whose bytes were not even fetched."""
-        self.refuse(key, _size(size), device_of(key))
+        self.refuse(key, _size(size, most), device_of(key))
 
     def forget(self, device: str) -> None:
         """A device is gone: there is room for another."""
@@ -139,8 +139,8 @@ def device_of(key: str) -> str:
         return OTHERS
 
 
-def _size(size: int) -> Refusal:
-    return Refusal("size", "message", f"{size} bytes long", f"at most {MESSAGE_BYTES}")
+def _size(size: int, most: int = MESSAGE_BYTES) -> Refusal:
+    return Refusal("size", "message", f"{size} bytes long", f"at most {most}")
 
 
 def wrong_header(topic: Topic, payload: bytes, device: str) -> Refusal | None:

@@ -15,31 +15,44 @@ class Source(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     SOURCE_SIMULATED: _ClassVar[Source]
     SOURCE_EMULATED: _ClassVar[Source]
     SOURCE_PLAYED: _ClassVar[Source]
+
+class HeightReference(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    HEIGHT_REFERENCE_UNSAID: _ClassVar[HeightReference]
+    HEIGHT_REFERENCE_ELLIPSOID: _ClassVar[HeightReference]
+    HEIGHT_REFERENCE_SEA_LEVEL: _ClassVar[HeightReference]
+    HEIGHT_REFERENCE_UNKNOWN: _ClassVar[HeightReference]
 SOURCE_UNKNOWN: Source
 SOURCE_HARDWARE: Source
 SOURCE_SIMULATED: Source
 SOURCE_EMULATED: Source
 SOURCE_PLAYED: Source
+HEIGHT_REFERENCE_UNSAID: HeightReference
+HEIGHT_REFERENCE_ELLIPSOID: HeightReference
+HEIGHT_REFERENCE_SEA_LEVEL: HeightReference
+HEIGHT_REFERENCE_UNKNOWN: HeightReference
 RULE_FIELD_NUMBER: _ClassVar[int]
 rule: _descriptor.FieldDescriptor
 OPEN_FIELD_NUMBER: _ClassVar[int]
 open: _descriptor.FieldDescriptor
 
 class Rule(_message.Message):
-    __slots__ = ("min", "max", "most", "row", "columns", "name")
+    __slots__ = ("min", "max", "most", "row", "columns", "name", "none")
     MIN_FIELD_NUMBER: _ClassVar[int]
     MAX_FIELD_NUMBER: _ClassVar[int]
     MOST_FIELD_NUMBER: _ClassVar[int]
     ROW_FIELD_NUMBER: _ClassVar[int]
     COLUMNS_FIELD_NUMBER: _ClassVar[int]
     NAME_FIELD_NUMBER: _ClassVar[int]
+    NONE_FIELD_NUMBER: _ClassVar[int]
     min: float
     max: float
     most: int
     row: int
     columns: str
     name: bool
-    def __init__(self, min: _Optional[float] = ..., max: _Optional[float] = ..., most: _Optional[int] = ..., row: _Optional[int] = ..., columns: _Optional[str] = ..., name: _Optional[bool] = ...) -> None: ...
+    none: bool
+    def __init__(self, min: _Optional[float] = ..., max: _Optional[float] = ..., most: _Optional[int] = ..., row: _Optional[int] = ..., columns: _Optional[str] = ..., name: _Optional[bool] = ..., none: _Optional[bool] = ...) -> None: ...
 
 class Header(_message.Message):
     __slots__ = ("device", "sequence", "epoch", "device_us", "utc_ns", "utc_sigma_s", "source", "run", "late")
@@ -124,7 +137,7 @@ class TachoRate(_message.Message):
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., omega_radps: _Optional[float] = ..., sigma_radps: _Optional[float] = ..., pulses: _Optional[int] = ..., direction_known: _Optional[bool] = ...) -> None: ...
 
 class GnssFix(_message.Message):
-    __slots__ = ("header", "fix_utc_ns", "latitude_deg", "longitude_deg", "height_m", "height_msl_m", "position_sigma_ned_m", "v_n_mps", "velocity_sigma_ned_mps", "quality", "satellites", "hdop", "talker", "device_time_s")
+    __slots__ = ("header", "fix_utc_ns", "latitude_deg", "longitude_deg", "height_m", "height_msl_m", "position_sigma_ned_m", "v_n_mps", "velocity_sigma_ned_mps", "quality", "satellites", "hdop", "talker", "device_time_s", "height_reference")
     class Quality(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         QUALITY_NONE: _ClassVar[GnssFix.Quality]
@@ -153,6 +166,7 @@ class GnssFix(_message.Message):
     HDOP_FIELD_NUMBER: _ClassVar[int]
     TALKER_FIELD_NUMBER: _ClassVar[int]
     DEVICE_TIME_S_FIELD_NUMBER: _ClassVar[int]
+    HEIGHT_REFERENCE_FIELD_NUMBER: _ClassVar[int]
     header: Header
     fix_utc_ns: int
     latitude_deg: float
@@ -167,7 +181,8 @@ class GnssFix(_message.Message):
     hdop: float
     talker: str
     device_time_s: float
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., fix_utc_ns: _Optional[int] = ..., latitude_deg: _Optional[float] = ..., longitude_deg: _Optional[float] = ..., height_m: _Optional[float] = ..., height_msl_m: _Optional[float] = ..., position_sigma_ned_m: _Optional[_Iterable[float]] = ..., v_n_mps: _Optional[_Iterable[float]] = ..., velocity_sigma_ned_mps: _Optional[_Iterable[float]] = ..., quality: _Optional[_Union[GnssFix.Quality, str]] = ..., satellites: _Optional[int] = ..., hdop: _Optional[float] = ..., talker: _Optional[str] = ..., device_time_s: _Optional[float] = ...) -> None: ...
+    height_reference: HeightReference
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., fix_utc_ns: _Optional[int] = ..., latitude_deg: _Optional[float] = ..., longitude_deg: _Optional[float] = ..., height_m: _Optional[float] = ..., height_msl_m: _Optional[float] = ..., position_sigma_ned_m: _Optional[_Iterable[float]] = ..., v_n_mps: _Optional[_Iterable[float]] = ..., velocity_sigma_ned_mps: _Optional[_Iterable[float]] = ..., quality: _Optional[_Union[GnssFix.Quality, str]] = ..., satellites: _Optional[int] = ..., hdop: _Optional[float] = ..., talker: _Optional[str] = ..., device_time_s: _Optional[float] = ..., height_reference: _Optional[_Union[HeightReference, str]] = ...) -> None: ...
 
 class LinkStatus(_message.Message):
     __slots__ = ("header", "connected", "port", "message", "bytes_in", "good_frames", "good_bytes", "bad_chunks", "bad_bytes", "pending_bytes", "lost_frames", "device_dropped", "lost_samples", "reboots", "unknown_frames", "reconnects", "sample_rate_hz", "frame_rate_hz", "latency_p50_s", "latency_p99_s", "clock_skew_ppm", "clock_residual_s", "clock_window_s", "journal_sequence", "durable_sequence", "gnss_good", "gnss_bad", "damage", "published_sequence", "published_durable", "refused", "stops", "stopped_s", "clock_offset_s")
@@ -447,7 +462,7 @@ class RateEstimate(_message.Message):
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., for_sequence: _Optional[int] = ..., for_index: _Optional[int] = ..., omega_ib_b_radps: _Optional[_Iterable[float]] = ..., omega_covariance: _Optional[_Iterable[float]] = ..., alpha_b_radps2: _Optional[_Iterable[float]] = ..., f_b_mps2: _Optional[_Iterable[float]] = ..., q_nb: _Optional[_Iterable[float]] = ..., angle_z_rad: _Optional[float] = ..., innovation: _Optional[_Iterable[float]] = ..., innovation_sigma: _Optional[_Iterable[float]] = ..., nis: _Optional[float] = ..., nis_dof: _Optional[int] = ..., still: _Optional[bool] = ..., p_n_m: _Optional[_Iterable[float]] = ..., v_n_mps: _Optional[_Iterable[float]] = ..., bias: _Optional[_Iterable[float]] = ..., innovation_unit: _Optional[str] = ..., sight: _Optional[_Iterable[_Union[RateEstimate.Sight, str]]] = ..., sight_reason: _Optional[str] = ..., bound_sigma_radps: _Optional[_Iterable[float]] = ..., calibration: _Optional[str] = ..., excluded_mask: _Optional[int] = ..., aid: _Optional[str] = ...) -> None: ...
 
 class NavSolution(_message.Message):
-    __slots__ = ("header", "estimator", "for_sequence", "for_index", "mode", "latitude_deg", "longitude_deg", "height_m", "p_ned_m", "v_n_mps", "q_nb", "bias_f_b_mps2", "bias_omega_b_radps", "sigma", "position_covariance", "origin_latitude_deg", "origin_longitude_deg", "origin_height_m", "fix_age_s", "horizon", "alignment", "gnss_muted", "calibration")
+    __slots__ = ("header", "estimator", "for_sequence", "for_index", "mode", "latitude_deg", "longitude_deg", "height_m", "p_ned_m", "v_n_mps", "q_nb", "bias_f_b_mps2", "bias_omega_b_radps", "sigma", "position_covariance", "origin_latitude_deg", "origin_longitude_deg", "origin_height_m", "fix_age_s", "horizon", "alignment", "gnss_muted", "calibration", "height_reference")
     class Mode(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         MODE_WAITING: _ClassVar[NavSolution.Mode]
@@ -481,6 +496,7 @@ class NavSolution(_message.Message):
     ALIGNMENT_FIELD_NUMBER: _ClassVar[int]
     GNSS_MUTED_FIELD_NUMBER: _ClassVar[int]
     CALIBRATION_FIELD_NUMBER: _ClassVar[int]
+    HEIGHT_REFERENCE_FIELD_NUMBER: _ClassVar[int]
     header: Header
     estimator: str
     for_sequence: int
@@ -504,7 +520,8 @@ class NavSolution(_message.Message):
     alignment: str
     gnss_muted: bool
     calibration: str
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., for_sequence: _Optional[int] = ..., for_index: _Optional[int] = ..., mode: _Optional[_Union[NavSolution.Mode, str]] = ..., latitude_deg: _Optional[float] = ..., longitude_deg: _Optional[float] = ..., height_m: _Optional[float] = ..., p_ned_m: _Optional[_Iterable[float]] = ..., v_n_mps: _Optional[_Iterable[float]] = ..., q_nb: _Optional[_Iterable[float]] = ..., bias_f_b_mps2: _Optional[_Iterable[float]] = ..., bias_omega_b_radps: _Optional[_Iterable[float]] = ..., sigma: _Optional[_Iterable[float]] = ..., position_covariance: _Optional[_Iterable[float]] = ..., origin_latitude_deg: _Optional[float] = ..., origin_longitude_deg: _Optional[float] = ..., origin_height_m: _Optional[float] = ..., fix_age_s: _Optional[float] = ..., horizon: _Optional[_Union[Horizon, _Mapping]] = ..., alignment: _Optional[str] = ..., gnss_muted: _Optional[bool] = ..., calibration: _Optional[str] = ...) -> None: ...
+    height_reference: HeightReference
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., for_sequence: _Optional[int] = ..., for_index: _Optional[int] = ..., mode: _Optional[_Union[NavSolution.Mode, str]] = ..., latitude_deg: _Optional[float] = ..., longitude_deg: _Optional[float] = ..., height_m: _Optional[float] = ..., p_ned_m: _Optional[_Iterable[float]] = ..., v_n_mps: _Optional[_Iterable[float]] = ..., q_nb: _Optional[_Iterable[float]] = ..., bias_f_b_mps2: _Optional[_Iterable[float]] = ..., bias_omega_b_radps: _Optional[_Iterable[float]] = ..., sigma: _Optional[_Iterable[float]] = ..., position_covariance: _Optional[_Iterable[float]] = ..., origin_latitude_deg: _Optional[float] = ..., origin_longitude_deg: _Optional[float] = ..., origin_height_m: _Optional[float] = ..., fix_age_s: _Optional[float] = ..., horizon: _Optional[_Union[Horizon, _Mapping]] = ..., alignment: _Optional[str] = ..., gnss_muted: _Optional[bool] = ..., calibration: _Optional[str] = ..., height_reference: _Optional[_Union[HeightReference, str]] = ...) -> None: ...
 
 class Innovation(_message.Message):
     __slots__ = ("header", "estimator", "for_sequence", "name", "value", "sigma", "nis", "dof", "accepted", "error_to_reference", "reason", "weight", "prediction_error", "residual")

@@ -27,6 +27,7 @@ from messages.history.mending_state import (
     Question,
     Stream,
     header_of,
+    say,
     take_out,
     wrong_item,
 )
@@ -58,7 +59,7 @@ class Mender:
         """`topics` limits what is asked for; none: everything. A run that began after `since_ns` is
         wanted whole. `refuse(key, why, device)` is told what of an answer is not taken.
         """
-        self._refuse = refuse or _say
+        self._refuse = refuse or say
         self._ask, self._hold, self._max_held = ask, hold, max_held
         self._topics, self._sources, self._since_ns = topics, sources, since_ns
         self._keys: dict[tuple[str, str], KeyState] = {}
@@ -86,6 +87,12 @@ class Mender:
     def seed(self, device: str, name: str, run: int, last: int) -> None:
         """The consumer has everything of this topic up to here, from an earlier life."""
         self._keys[device, name] = KeyState(run, last)
+
+    def forget(self, device: str) -> None:
+        """A device is gone; what waits for it is let go."""
+        for table in (self._keys, self._streams):
+            for name in [name for name in table if name[0] == device]:
+                del table[name]
 
     def taken(self) -> dict[tuple[str, str], tuple[int, int]]:
         """Run and sequence of the newest message given on, by device and topic: for `seed` in a
@@ -143,7 +150,7 @@ class Mender:
         return out
 
     def release(self) -> list[Arrival]:
-        """Everything that is held, without waiting any longer: the end."""
+        """All that is held, without waiting: the end."""
         return [arrival for stream in self._streams.values() for arrival in self._release(stream)]
 
     # --- one message
@@ -321,7 +328,3 @@ class Mender:
             return True
         self._seen.append(mark)
         return False
-
-
-def _say(key: str, refusal: Refusal, device: str) -> None:
-    log.warning("%s: refused: %s", key, refusal)

@@ -1,5 +1,6 @@
 """What is known of each stream while it is mended: what came, what is missing, what was asked."""
 
+import logging
 from collections import deque
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -11,6 +12,8 @@ from messages.contract.checks import Refusal, check
 from messages.contract.door import wrong_header
 from messages.contract.header import first_field
 from messages.contract.topics import BY_NAME, NAME, Topic
+
+log = logging.getLogger(__name__)
 
 MOST_REPLIES = 10_000  # of one answer; a reply has about a MB
 FARTHEST = 10_000_000  # messages; a sequence that jumps further has begun anew: a day at 100 Hz
@@ -148,3 +151,8 @@ def header_of(arrival: Arrival) -> pb.Header | None:
         return pb.Header.FromString(first_field(arrival.payload))
     except (DecodeError, ValueError):
         return None
+
+
+def say(key: str, refusal: Refusal, device: str) -> None:
+    """A refusal, where nobody counts them."""
+    log.warning("%s: refused: %s", key, refusal)

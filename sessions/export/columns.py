@@ -40,15 +40,18 @@ class Column:
 class Columns:
     """The columns of one key; `widen` must have seen every message before `table` is asked."""
 
-    def __init__(self, topic: Topic) -> None:
-        self.topic = topic
-        self._has_header = has_header(topic)
-        self._fields = fields_of(topic)
+    def __init__(self, topic: Topic, only: tuple[str, ...] | None = None) -> None:
+        """only: names of the wanted fields, the header's among them; None for all."""
+        self.topic, self.only = topic, only
+        self._header = [n for n in HEADER if has_header(topic) and (only is None or n in only)]
+        self._fields = [f for f in fields_of(topic) if only is None or f.name in only]
         self._widths: dict[str, int] = {}
 
     def widen(self, message: Message) -> None:
         """Learn how long the message's vectors are (per sample, in a batch)."""
         for name, width in widths(self.topic, message).items():
+            if self.only is not None and name not in self.only:
+                continue
             if width >= self._widths.get(name, 0):
                 self._widths[name] = width
 
@@ -56,8 +59,7 @@ class Columns:
     def names(self) -> list[Column]:
         """All columns, in the order of `table`."""
         columns = [Column(TIME)]
-        if self._has_header:
-            columns += [Column(name, whole=name != "utc_sigma_s") for name in HEADER]
+        columns += [Column(name, whole=name != "utc_sigma_s") for name in self._header]
         for field in self._fields:
             text, whole = not is_number(field), is_whole(field)
             if field.name in self._widths:
@@ -70,8 +72,7 @@ class Columns:
     def table(self, found: Samples) -> dict[str, NDArray[Any]]:
         """Column name -> (n,) numbers or str. What a sample does not say is NaN."""
         cells: list[NDArray[Any]] = [found.utc_ns / 1e9 + found.after_s]
-        if self._has_header:
-            cells += [found.header[name] for name in HEADER]
+        cells += [found.header[name] for name in self._header]
         for field in self._fields:
             column = found.fields[field.name]
             if field.name in self._widths:

@@ -34,6 +34,7 @@ from sessions.export.table import (
     Progress,
     Selection,
     Survey,
+    Table,
     blocks,
     silent,
     survey,
@@ -276,20 +277,52 @@ def _second_half(progress: Progress) -> Progress:
 
 
 def _tracks(path: Path, selection: Selection, progress: Progress) -> dict[str, np.ndarray]:
-    """Name -> (n, 4) utc s, latitude deg, longitude deg, height m."""
-    wanted = selection.topics or frozenset({GNSS.name, NAV.name})
+    """Name -> (n, 4) utc s, latitude deg, longitude deg, height above mean sea level m or NaN."""
+    wanted = (selection.topics or frozenset({GNSS.name, NAV.name})) - {LOG.name}
     found = tables(
-        path, Selection(wanted - {LOG.name}, selection.start_s, selection.end_s), progress
+        path, Selection(wanted | {GNSS.name}, selection.start_s, selection.end_s), progress
     )
-    result = {
-        file_stem(key): table.vector("utc_s", "latitude_deg", "longitude_deg", "height_m")
-        for key, table in found.items()
-        if "latitude_deg" in table.data
+    geoids = {
+        parse(key).device: _geoid(table) for key, table in found.items() if parse(key).topic is GNSS
     }
-    result = {name: track[np.any(track[:, 1:] != 0.0, axis=1)] for name, track in result.items()}
-    result = {name: track for name, track in result.items() if len(track)}
+    result = {}
+    for key, table in found.items():
+        where = parse(key)
+        if "latitude_deg" not in table.data or where.topic.name not in wanted:
+            continue
+        track = table.vector("utc_s", "latitude_deg", "longitude_deg")
+        placed = np.isfinite(track).all(axis=1) & np.any(track[:, 1:] != 0.0, axis=1)
+        if placed.any():
+            heights = _above_sea(table, geoids.get(where.device, np.zeros((0, 2))))
+            result[file_stem(key)] = np.column_stack([track, heights])[placed]
     if not result:
         raise ExportError(
             f"{path}: it has neither fixes nor a navigation solution, so there is no track to draw"
         )
     return result
+
+
+def _geoid(fixes: Table) -> np.ndarray:
+    """(n, 2) utc s, height of the geoid above the ellipsoid m, where a receiver gave both."""
+    undulation = fixes.data["height_m"] - fixes.data["height_msl_m"]
+    sea = fixes.data["height_reference"] == pb.HEIGHT_REFERENCE_SEA_LEVEL
+    known = np.isfinite(undulation) & ~sea
+    return np.column_stack([fixes.data["utc_s"], undulation])[known]
+
+
+def _above_sea(table: Table, geoid: np.ndarray) -> np.ndarray:
+    """(n,) heights above mean sea level, m: the receiver's own, or the ellipsoid's less the geoid
+    as the same device's fixes had it; NaN where neither is known.
+    """
+    data = table.data
+    if "height_msl_m" in data:
+        return data["height_msl_m"]
+    if "height_m" not in data or "height_reference" not in data:
+        return np.full(len(data["utc_s"]), np.nan)
+    own = data["height_reference"] == pb.HEIGHT_REFERENCE_SEA_LEVEL
+    undulation = (
+        np.interp(data["utc_s"], geoid[:, 0], geoid[:, 1])
+        if len(geoid)
+        else np.full(len(data["utc_s"]), np.nan)
+    )
+    return np.where(own, data["height_m"], data["height_m"] - undulation)

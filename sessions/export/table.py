@@ -2,7 +2,7 @@
 rows.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -32,6 +32,7 @@ class Selection:
     topics: frozenset[str] = frozenset()  # names; empty: all
     start_s: float = 0.0  # from the first message's receive time, s
     end_s: float = float("inf")
+    fields: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # by topic; absent: all
 
     def takes(self, topic: Topic) -> bool:
         """Is this topic wanted?"""
@@ -92,7 +93,7 @@ def survey(
         if message is None:
             continue
         if row.key not in found.columns:
-            found.columns[row.key] = Columns(topic)
+            found.columns[row.key] = Columns(topic, selection.fields.get(topic.name))
         found.columns[row.key].widen(message)
         found.counts[row.key] = found.counts.get(row.key, 0) + 1
     say(path, found.damage)
@@ -116,6 +117,7 @@ def blocks(
         key: Gathering(
             columns.topic,
             lambda taken, key=key, columns=columns: ready.append((key, columns.table(taken))),
+            columns.only,
         )
         for key, columns in found.columns.items()
     }
@@ -168,10 +170,8 @@ def tables(
 
 
 def _table(columns: list[Column], parts: list[Block]) -> Table:
-    data = {
-        column.name: np.concatenate([part[column.name] for part in parts]).astype(
-            str if column.text else np.float64
-        )
-        for column in columns
-    }
+    data = {}
+    for column in columns:  # a recording is long: no column is kept twice
+        whole = np.concatenate([part.pop(column.name) for part in parts])
+        data[column.name] = whole.astype(str if column.text else np.float64, copy=False)
     return Table(columns, data)

@@ -37,7 +37,7 @@ class TrackDifference:
     session: str
     track: str
     against: str
-    rms_ned_m: tuple[float, float, float]
+    rms_ned_m: tuple[float | None, ...]  # None: one of the two has no height
     seconds: float
 
 
@@ -151,9 +151,12 @@ def _track_differences(a: Overlaid, b: Overlaid) -> list[TrackDifference]:
         if not inside.any():
             continue
         delta = [mine[inside, k] - np.interp(t[inside], its[:, 0], its[:, k]) for k in (1, 2, 3)]
-        north, east, down = (float(np.sqrt(np.mean(part**2))) for part in delta)
+        rms = tuple(
+            float(np.sqrt(np.nanmean(part**2))) if np.isfinite(part).any() else None
+            for part in delta
+        )
         seconds = float(t[inside][-1] - t[inside][0])
-        result.append(TrackDifference(b.curves.session, key, key, (north, east, down), seconds))
+        result.append(TrackDifference(b.curves.session, key, key, rms, seconds))
     return result
 
 

@@ -175,7 +175,7 @@ class _Reading:
         latitude, longitude, height = (read.fields[f"origin_{name}"] for name in PLACE)
         known = (read.lengths["p_ned_m"] == 3) & ((latitude != 0) | (longitude != 0))
         for k in np.flatnonzero(known):
-            origin = (np.radians(latitude[k]), np.radians(longitude[k]), float(height[k]))
+            origin = _origin(np.radians(latitude[k]), np.radians(longitude[k]), float(height[k]))
             self._track(key, origin).add(float(t[k]), *read.fields["p_ned_m"][k].tolist())
 
     def _gnss(self, key: str, read: Samples, t: Array) -> None:
@@ -183,7 +183,7 @@ class _Reading:
         for k in np.flatnonzero(fields["quality"]):
             latitude, longitude, height = (float(fields[name][k]) for name in PLACE)
             place = (float(np.radians(latitude)), float(np.radians(longitude)), height)
-            self._track(key, place).add_place(float(t[k]), *place)
+            self._track(key, _origin(*place)).add_place(float(t[k]), *place)
 
     def _track(self, key: str, origin: tuple[float, float, float]) -> TrackLine:
         return self._tracks.setdefault(key, TrackLine(key, origin))
@@ -194,6 +194,11 @@ class _Reading:
             moment = (at_utc_ns - self._extent.first_ns) / 1e9 if at_utc_ns else float(t[k])
             text, author = fields["text"][k] or "mark", fields["author"][k]
             self._marks.append(Mark(moment, text, author, float(fields["seconds"][k])))
+
+
+def _origin(latitude: float, longitude: float, height: float) -> tuple[float, float, float]:
+    """Where a track counts from, at height 0 where its first point has none."""
+    return latitude, longitude, height if np.isfinite(height) else 0.0
 
 
 def _dark(key: str, lines: dict[str, Line]) -> NDArray[np.bool_] | None:

@@ -157,7 +157,7 @@ def _tracks(found: Comparison) -> list[dict[str, Any]]:
                 "t": np.round(points[:, 0] + one.offset_s, 2).tolist(),
                 "north": np.round(points[:, 1], 3).tolist(),
                 "east": np.round(points[:, 2], 3).tolist(),
-                "down": np.round(points[:, 3], 3).tolist(),
+                "down": _numbers(points[:, 3]),
             }
         )
     return result

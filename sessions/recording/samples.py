@@ -16,8 +16,8 @@ from google.protobuf.json_format import MessageToDict
 from google.protobuf.message import Message
 from numpy.typing import NDArray
 
-from messages.contract import rates
-from messages.contract.topics import ACCEL, ADC, IMU, RATE, Topic
+from messages.contract import fixes, rates
+from messages.contract.topics import ACCEL, ADC, GNSS, IMU, RATE, Topic
 
 Column = NDArray[Any]
 
@@ -61,6 +61,8 @@ class Samples:
 def decode(topic: Topic, payload: bytes) -> Message:
     """A recorded message of this topic in its present form. Raises DecodeError."""
     message = topic.type.FromString(payload)
+    if topic is GNSS:
+        return fixes.complete(message)
     return rates.complete(message) if topic is RATE else message
 
 

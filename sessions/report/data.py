@@ -100,6 +100,25 @@ class Run:
     whole: bool = True  # nothing of the recording is missing or unreadable
 
 
+FIELDS = {  # of long tables: what a report is made of
+    ACCEL.name: ("epoch", "period_s", "f_mps2"),
+    TACHO.name: ("epoch", "omega_radps", "sigma_radps"),
+    RATE.name: (
+        "epoch",
+        "omega_ib_b_radps",
+        "omega_covariance",
+        "alpha_b_radps2",
+        "f_b_mps2",
+        "angle_z_rad",
+        "p_n_m",
+        "nis",
+        "nis_dof",
+        "still",
+        "calibration",
+    ),
+    NAV.name: ("epoch", "p_ned_m", "v_n_mps", "sigma"),
+    INNOVATION.name: ("epoch", "nis", "dof", "accepted"),
+}
 WANTED = frozenset(topic.name for topic in (ACCEL, TACHO, RATE, NAV, INNOVATION, GNSS, LINK))
 
 
@@ -112,7 +131,7 @@ def load_run(
     Raises ReportError when there is no such device or boot, or no estimate at all; OSError.
     """
     damage = Damage()
-    found = tables(path, Selection(WANTED), progress, damage)
+    found = tables(path, Selection(WANTED, fields=FIELDS), progress, damage)
     devices: dict[str, int] = {}
     for key, table in found.items():
         address = parse(key)
@@ -152,7 +171,8 @@ def _run(mine: dict[str, Table], device: str, epoch: int, boots: tuple[int, ...]
     for key, table in sorted(mine.items()):
         address = parse(key)
         at = table.data.get("epoch", np.zeros(len(table))) == epoch
-        part = Table(table.columns, {name: column[at] for name, column in table.data.items()})
+        data = table.data if at.all() else {n: column[at] for n, column in table.data.items()}
+        part = Table(table.columns, data)
         if len(part):
             by_topic.setdefault(address.topic.name, []).append((address.estimator, part))
     starts = [

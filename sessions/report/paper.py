@@ -57,10 +57,11 @@ def cube_test(accel: Accel, side: float, segments: list[Segment], run: Run) -> C
 
 
 def local_gravity(run: Run) -> float:
-    """m/s^2, at the median fix, or the standard one."""
-    if not len(run.fixes):
+    """m/s^2, at the median fix, or the standard one where no fix has a height."""
+    high = run.fixes[np.isfinite(run.fixes).all(axis=1)]
+    if not len(high):
         return GRAVITY
-    return float(gravity(float(np.median(run.fixes[:, 1])), float(np.median(run.fixes[:, 3]))))
+    return float(gravity(float(np.median(high[:, 1])), float(np.median(high[:, 3]))))
 
 
 def equivalent_bias(

@@ -124,6 +124,21 @@ def test_what_asks_nothing_is_ended_and_what_works_is_not(tmp_path):
             assert scene.recv(timeout=20.0)
 
 
+def test_a_connection_that_goes_on_asking_is_not_idle(tmp_path):
+    """However short its requests are, between which everybody looks at it."""
+    ask = HEAD + b"\r\n"
+    with open_door(tmp_path, request_s=1.0) as door, sockets(door, 1, "127.0.0.2") as (link,):
+        link.settimeout(5.0)
+        for _ in range(40):
+            link.sendall(ask)
+            answer = b""
+            while b"</html>" not in answer:
+                part = link.recv(65536)
+                assert part, "it was ended"
+                answer += part
+            time.sleep(0.08)
+
+
 def test_a_head_without_an_end_is_refused(patient):
     with sockets(patient, 1, "127.0.0.3", HEAD) as (link,):
         with contextlib.suppress(OSError):

@@ -2,6 +2,7 @@
 meets.
 """
 
+import dataclasses
 import socket
 
 import msgspec
@@ -9,6 +10,8 @@ import numpy as np
 import pytest
 import viser._messages
 import zstandard
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from support.front_door import CAMERA, Door, message, open_door, wait_for
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
@@ -122,19 +125,13 @@ def test_viewer_uses_a_widget_of_his_own_view_by_its_label(door: Door, checkbox)
 
 
 def test_a_label_that_is_given_later_opens_nothing():
-    def frame(*messages) -> bytes:
-        text = msgspec.msgpack.encode({"messages": messages, "timestampSec": 0.0})
-        packed = zstandard.compress(text)
-        sizes = len(text).to_bytes(8, "little") + len(packed).to_bytes(8, "little")
-        return sizes + packed + b"more"
-
     made = {"type": "GuiButtonMessage", "uuid": "a", "props": {"label": "Record", "order": 1.0}}
     renamed = {"type": "GuiUpdateMessage", "uuid": "a", "updates": {"label": "Pause"}}
     own = {"type": "GuiButtonMessage", "uuid": "b", "props": {"label": "Pause"}}
     text = {"type": "GuiHtmlMessage", "uuid": "c", "props": {"content": "Pause", "label": "Pause"}}
     widgets = Widgets(["Pause"])
     widgets.learn(frame(made, renamed, text))
-    assert widgets.open == set()
+    assert widgets.open == set() and not widgets.takes("c", "x")
     widgets.learn(frame(own))
     for damaged in (b"", b"short", frame(own)[:-20], bytes(100), b"\xff" * 40):
         widgets.learn(damaged)
@@ -166,19 +163,137 @@ def test_nobody_opens_a_public_tunnel(door: Door, checkbox):
 
 
 def test_every_allowed_name_is_a_message_of_this_viser():
-    assert VIEWER_MAY < OPERATOR_MAY
-    for name in OPERATOR_MAY | MAKES_INPUT:
+    assert set(VIEWER_MAY) < set(OPERATOR_MAY)
+    for name in set(OPERATOR_MAY) | MAKES_INPUT:
         assert hasattr(viser._messages, name), name
+    for name, rules in OPERATOR_MAY.items():
+        fields = {field.name for field in dataclasses.fields(getattr(viser._messages, name))}
+        assert fields == set(rules), name
+
+
+def frame(*messages) -> bytes:
+    """A message of viser's to the browser."""
+    text = msgspec.msgpack.encode({"messages": messages, "timestampSec": 0.0})
+    packed = zstandard.compress(text)
+    sizes = len(text).to_bytes(8, "little") + len(packed).to_bytes(8, "little")
+    return sizes + packed + b"more"
+
+
+def made(kind: str, uuid: str, **props) -> dict:
+    return {"type": f"Gui{kind}Message", "uuid": uuid, "props": {"label": uuid} | props}
+
+
+def sent(role: Role, kind: str, widgets: Widgets | None = None, **fields) -> bool:
+    name, read = message_type(message(kind, **fields))
+    return may_send(role, name, read, widgets or Widgets([]))
 
 
 def test_viewer_may_use_widgets_that_concern_only_his_view():
+    widgets = Widgets(["pause"])
+    widgets.learn(frame(made("Checkbox", "pause"), made("Checkbox", "record")))
     update = {"uuid": "pause", "updates": {"value": True}}
-    assert may_send(Role.viewer, "GuiUpdateMessage", update, {"pause"})
-    assert not may_send(Role.viewer, "GuiUpdateMessage", update, {"other"})
-    assert not may_send(Role.viewer, "GuiUpdateMessage", update | {"uuid": ["pause"]}, {"pause"})
-    assert not may_send(
-        Role.viewer, "GuiUpdateMessage", {"uuid": "pause", "updates": {"label": "x"}}, {"pause"}
+    assert sent(Role.viewer, "GuiUpdateMessage", widgets, **update)
+    assert not sent(Role.viewer, "GuiUpdateMessage", widgets, **update | {"uuid": "record"})
+    assert not sent(Role.viewer, "GuiUpdateMessage", widgets, **update | {"uuid": ["pause"]})
+    named = update | {"updates": {"label": "x"}}
+    assert not sent(Role.viewer, "GuiUpdateMessage", widgets, **named)
+    assert sent(Role.operator, "GuiUpdateMessage", widgets, **update | {"uuid": "record"})
+
+
+ODD = [
+    None,
+    True,
+    False,
+    0,
+    -1,
+    2**63,
+    1.5,
+    -0.1,
+    float("nan"),
+    float("inf"),
+    "",
+    "a",
+    "10 s",
+    "1 h",
+]
+ODD += ["x" * 2001, "9" * 6000, b"bytes", [], [1.0], {}, {"a": 1}]
+TAKEN = {
+    "button": [True, False],
+    "box": [True, False],
+    "slider": [0, 1.5],
+    "text": ["", "a", "10 s", "1 h"],
+    "choice": ["10 s"],
+    "buttons": ["10 s"],
+}
+
+
+def test_a_widget_takes_the_values_that_a_person_can_give_it():
+    widgets = Widgets([])
+    widgets.learn(
+        frame(
+            made("Button", "button"),
+            made("Checkbox", "box"),
+            made("Slider", "slider", min=0.0, max=2.0),
+            made("Text", "text"),
+            made("Dropdown", "choice", options=["10 s", "30 s"]),
+            made("ButtonGroup", "buttons", options=["10 s"]),
+        )
     )
+    for uuid, taken in TAKEN.items():
+        for value in ODD:
+            update = {"uuid": uuid, "updates": {"value": value}}
+            good = any(value is one or (value == one and type(value) is type(one)) for one in taken)
+            assert sent(Role.operator, "GuiUpdateMessage", widgets, **update) == good, update
+    changes = {"type": "GuiUpdateMessage", "uuid": "choice", "updates": {"options": ["1 h"]}}
+    longer = {"type": "GuiUpdateMessage", "uuid": "slider", "updates": {"max": 9.0, "value": 3.0}}
+    widgets.learn(frame(changes, longer, {"type": "GuiRemoveMessage", "uuid": "box"}))
+    for uuid, value, good in (
+        ("choice", "1 h", True),
+        ("choice", "10 s", False),
+        ("slider", 5, True),
+        ("box", True, False),
+        ("nobody", True, False),
+    ):
+        update = {"uuid": uuid, "updates": {"value": value}}
+        assert sent(Role.operator, "GuiUpdateMessage", widgets, **update) == good, update
+
+
+def test_numbers_of_a_browser_are_finite_and_its_texts_short():
+    gizmo = {"name": "/bench/gizmo", "wxyz": [1, 0, 0, 0], "position": [0.0, 1.0, 2.0], "owner": ""}
+    good = {
+        "ViewerCameraMessage": CAMERA,
+        "TransformControlsUpdateMessage": gizmo,
+        "CommandTriggerMessage": {"uuid": "a"},
+        "FileTransferPartAck": {
+            "source_component_uuid": None,
+            "transfer_uuid": "a",
+            "transferred_bytes": 1,
+            "total_bytes": 2,
+        },
+    }
+    bad = [
+        None,
+        float("nan"),
+        float("inf"),
+        1e300,
+        -(2**63),
+        "x" * 1000,
+        [float("nan")] * 3,
+        {},
+        [[]],
+    ]
+    for kind, fields in good.items():
+        assert sent(Role.operator, kind, **fields)
+        assert not sent(Role.operator, kind, **fields, more=1)
+        for key in fields:
+            assert not sent(Role.operator, kind, **{k: v for k, v in fields.items() if k != key})
+            for value in bad:
+                if not (key == "source_component_uuid" and value is None):
+                    assert not sent(Role.operator, kind, **fields | {key: value}), (
+                        kind,
+                        key,
+                        value,
+                    )
 
 
 @pytest.mark.parametrize(
@@ -240,3 +355,43 @@ def test_scene_that_is_gone_is_said_and_does_not_hang(tmp_path):
         with pytest.raises(InvalidStatus):
             door.scene(client)
         assert client.get("/api/me").status_code == 200
+
+
+JUNK = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.floats()
+    | st.integers(-(2**63), 2**64 - 1)
+    | st.text(max_size=9),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner),
+    max_leaves=6,
+)
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+@given(
+    st.sampled_from(sorted(OPERATOR_MAY)), st.dictionaries(st.text(max_size=6), JUNK), JUNK, JUNK
+)
+def test_no_message_ends_the_scene(door: Door, kind, more, value, other):
+    uuids = list(door.viser.gui._gui_input_handle_from_uuid)
+    box = door.viser.gui.add_checkbox("Sw", False)
+    try:
+        with door.client("anna") as client, door.scene(client) as scene:
+            scene.recv(timeout=20.0)
+            for fields in (
+                more,
+                CAMERA | {"position": value},
+                dict.fromkeys(OPERATOR_MAY[kind], value) | {"name": other},
+                {"uuid": box._impl.uuid, "updates": {"value": value}},
+                {"uuid": (uuids or [""])[0], "updates": {"value": other, "label": value}},
+            ):
+                scene.send(message(kind, **{k: v for k, v in fields.items() if k != "type"}))
+            update = {"uuid": box._impl.uuid, "updates": {"value": not box.value}}
+            was = box.value
+            wait_for(
+                lambda: scene.send(message("GuiUpdateMessage", **update)) or box.value != was,
+                "the good message arrived",
+            )
+            assert box.label == "Sw"
+    finally:
+        box.remove()

@@ -109,7 +109,7 @@ def work_with_answers(worker: Worker, some: list[Arrival]) -> None:
         worker.offer(arrival)
     thread = threading.Thread(target=worker.work, args=(threading.Event(),))
     thread.start()
-    while worker._queue.qsize() or worker.mender.asking:
+    while len(worker.inbox) or worker.mender.asking:
         thread.join(0.05)
     worker.finish()
     thread.join(60.0)

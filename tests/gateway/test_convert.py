@@ -1,15 +1,20 @@
 """Raw to physical: sign, range, both ends; and what the settings refuse."""
 
+import math
+
 import pytest
 from pydantic import ValidationError
 
+from estimator.convert.samples import fix_of
 from firmware_protocol.codec import FLAG_SIMULATED
 from firmware_protocol.frames import Hello, Imu6, SensorInfo, Status
-from gateway.gnss.fix import AUTONOMOUS, Fix
+from gateway.gnss.fix import Fix
+from gateway.gnss.nmea import AUTONOMOUS
 from gateway.samples import convert
 from gateway.samples.batch import Batch, Index, Joiner
 from gateway.settings import DeviceSettings, GatewaySettings
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.checks import check
 
 SENSORS = tuple(SensorInfo(model=1, scale_ng=ng) for ng in (3_900_000, 4_000_000, 0, 1_000_000))
 
@@ -87,8 +92,35 @@ def test_fix_without_geoid_says_how_little_it_knows_of_its_height():
         height_msl_m=50.0,
         sigma_ned_m=(1, 1, 2),
     )
-    assert list(convert.gnss_fix(fix).position_sigma_ned_m) == [1, 1, convert.NO_VERTICAL]
-    assert convert.gnss_fix(Fix("GP", quality=AUTONOMOUS)).quality == pb.GnssFix.QUALITY_NONE
+    message = convert.gnss_fix(fix)
+    assert message.position_sigma_ned_m[:2] == [1, 1] and message.position_sigma_ned_m[2] > 110.0
+    assert message.height_reference == pb.HEIGHT_REFERENCE_SEA_LEVEL and message.height_m == 50.0
+    assert math.isnan(convert.location_fix(message, "car").altitude)
+    taken = fix_of(message, 1, 0.0)
+    assert taken.datum == 110.0 and taken.sigma_p[2] == pytest.approx(2.0)
+
+
+def test_what_a_receiver_does_not_say_is_no_zero():
+    nothing = convert.gnss_fix(Fix("GP", quality=AUTONOMOUS))
+    assert nothing.quality == pb.GnssFix.QUALITY_NONE and math.isnan(nothing.latitude_deg)
+    flat = Fix("GP", quality=AUTONOMOUS, latitude_deg=1.0, longitude_deg=2.0, sigma_ned_m=(1, 1, 2))
+    message = convert.gnss_fix(flat)
+    assert math.isnan(message.height_m) and math.isnan(message.height_msl_m)
+    assert message.height_reference == pb.HEIGHT_REFERENCE_UNKNOWN
+    assert not message.v_n_mps and math.isnan(message.position_sigma_ned_m[2])
+    location = convert.location_fix(message, "car")
+    assert math.isnan(location.altitude) and location.position_covariance[8] >= 1e8
+    taken = fix_of(message, 1, 0.0)
+    assert not taken.has_height and taken.v_n is None and taken.sigma_p[0] == 1.0
+    assert check(message) == [] == check(nothing)
+
+
+def test_a_fix_of_an_older_version_had_zeros_for_what_it_did_not_know():
+    old = {"latitude_deg": 49.0, "longitude_deg": 11.0, "quality": AUTONOMOUS}
+    assert math.isnan(fix_of(pb.GnssFix(talker="GP", **old), 1, 0.0).height)
+    assert fix_of(pb.GnssFix(talker="UBX", **old), 1, 0.0).height == 0.0
+    measured = fix_of(pb.GnssFix(talker="GP", height_m=357.6, height_msl_m=310.5, **old), 1, 0.0)
+    assert measured.height == 357.6 and measured.datum == 0.0
 
 
 def batch(index: int, period_ns: int, n: int = 1, lost: int = 0) -> Batch:

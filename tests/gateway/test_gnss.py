@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from gateway.gnss.decoder import GnssDecoder
-from gateway.gnss.fix import DAY_NS, RTK_FIXED, WEEK_ROLLOVER_NS, tod_of, unroll_weeks
+from gateway.gnss.fields import tod_of
+from gateway.gnss.fix import DAY_NS, RTK_FIXED, WEEK_ROLLOVER_NS, unroll_weeks
 from gateway.gnss.link import GnssLink
 from gateway.gnss.stream import GnssStream, nmea_checksum
 from gateway.gnss.ubx import Epoch, ubx_bytes
@@ -194,7 +195,7 @@ def test_midnight_with_and_without_a_date_in_the_epoch():
 def test_leap_second_and_nonsense_times():
     assert tod_of("235960.00") == DAY_NS
     for text in ("", "12", "ab0000", "1200001"):
-        with pytest.raises(ValueError, match="hhmmss|invalid literal"):
+        with pytest.raises(ValueError, match="hhmmss"):
             tod_of(text)
 
 

@@ -18,7 +18,7 @@ from inertial.navigation.navigation import NAVIGATORS, NavigatorConfig
 from inertial.navigation.smoother import smooth_drive
 from inertial.simulation.drive import simulate
 from logs.drive import run_drive
-from logs.drive_log import read_drive_log
+from logs.drive_log import read_drive_log, read_fixes
 from logs.sheet import LogError
 
 Array = NDArray[np.float64]
@@ -127,6 +127,29 @@ def test_the_real_drive(data_dir: Path, tmp_path: Path) -> None:
 
 
 HEADER = "t_s,fx_mps2,fy_mps2,fz_mps2,wx_radps,wy_radps,wz_radps\n"
+MISSING = """t_s,lat_deg,lon_deg,height_m,quality,vn_mps,ve_mps,vd_mps
+0,40,-105,1600,1,1,2,3
+1,40,-105,,1,1,2,
+2,40,-105,1600,1,,,
+3,,,,1,,,
+4,0,0,0,1,0,0,0
+"""
+
+
+def test_what_an_epoch_does_not_have_is_no_zero(tmp_path):
+    path = tmp_path / "gnss.csv"
+    path.write_text(MISSING)
+    fixes, notes = read_fixes(path)
+    assert [fix.has_height for fix in fixes[:3]] == [True, False, True]
+    assert fixes[1].v_n[:2].tolist() == [1.0, 2.0] and np.isnan(fixes[1].v_n[2])
+    assert fixes[2].v_n is None and [fix.quality for fix in fixes[3:]] == [0, 0]
+    text = " ".join(notes)
+    assert "have no position" in text and "have no height" in text and "no velocity" in text
+    path.write_text("t_s,lat_deg,lon_deg\n0,40,-105\n")
+    fixes, notes = read_fixes(path)
+    assert not fixes[0].has_height and "height_m" in " ".join(notes)
+
+
 GNSS = "t_s,lat_deg,lon_deg,height_m\n0,40,-105,1600\n"
 
 

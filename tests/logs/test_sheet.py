@@ -1,5 +1,9 @@
 """One reader of CSV: the same numbers however they are written, and errors that name the place."""
 
+import gzip
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -95,3 +99,79 @@ def test_cells_that_may_miss_become_nan(tmp_path):
     path = tmp_path / "log.csv"
     path.write_bytes(b"t_s,a\n0,\n1,2\n2,NA\n")
     assert np.isnan(read(path, may_miss=("a",))["a"]).tolist() == [True, False, True]
+
+
+def test_what_is_no_file_of_text_is_named(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "zip").write_bytes(b"PK\x03\x04" + bytes(30))
+    (tmp_path / "gz").write_bytes(gzip.compress(b"t_s,a\n0,1\n"))
+    (tmp_path / "mcap").write_bytes(b"\x89MCAP0\r\n" + bytes(30))
+    for name, words in (
+        ("pipe", "a pipe"),
+        ("", "a folder"),
+        ("zip", "save its sheet as CSV"),
+        ("gz", "gunzip"),
+        ("mcap", "export, report or rerun"),
+    ):
+        with pytest.raises(LogError, match=words):
+            open_sheet(tmp_path / name)
+    with pytest.raises(LogError, match="a device"):
+        open_sheet(Path("/dev/zero"))
+
+
+def test_a_line_that_is_too_long_is_named_by_its_number(tmp_path):
+    path = tmp_path / "log.csv"
+    with path.open("wb") as file:
+        file.write(b"t_s,a\n" + b"0,1\n" * 70_000)
+        file.truncate(file.tell() + 20 * 1024**2)  # a hole of zeros: one line
+    with pytest.raises(LogError, match="log.csv:70002: a line of more than 1 MB"):
+        read(path)
+
+
+def test_a_file_that_grows_is_read_as_it_was_found(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_bytes(b"t_s,a\n0,1\n1,2\n")
+    sheet = open_sheet(path)
+    with path.open("ab") as file:
+        file.write(b"2,3\n3,")
+    table = sheet.read(["t_s", "a"])
+    assert table["t_s"].tolist() == [0.0, 1.0] and not table.cut_off
+
+
+def test_comments_and_empty_lines_by_the_thousand_cost_little_and_lines_stay_right(tmp_path):
+    path, n = tmp_path / "log.csv", 60_000
+    body = "".join(f"# {k}\n{k},{k}\n,\n\n" for k in range(n))
+    path.write_text("t_s,a\n" + body + "x,1\n")
+    with pytest.raises(LogError, match=f":{4 * n + 2}: column 't_s': 'x'"):
+        read(path)
+    path.write_text("t_s,a\n" + body)
+    got = read(path)
+    np.testing.assert_array_equal(got.lines, 3 + 4 * np.arange(n))
+
+
+def test_words_of_a_file_reach_no_terminal_as_orders(tmp_path):
+    path = tmp_path / "log.csv"
+    for data in (
+        b"\x1b[31mt_s,b\x07\n0,1\n",
+        b"t_s,a\n0,\x1b]0;x\x07\n",
+        b"t_s,a,b\n0,\x1b[1m\n1,2,3\n",
+    ):
+        path.write_bytes(data)
+        with pytest.raises(LogError) as caught:
+            read(path)
+        assert str(caught.value).removeprefix(str(path)).isprintable()
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["Prüfstand.csv", "Pru\u0308fstand.csv", "a (1) [2].csv", "#50%.csv", "-x.csv", "a\nb.csv"],
+)
+def test_a_file_may_have_any_name(tmp_path, name):
+    (tmp_path / name).write_bytes(b"t_s,a\n0,1\n1,2\n")
+    assert read(tmp_path / name)["a"].tolist() == [1.0, 2.0]
+
+
+def test_bytes_that_windows_1252_does_not_know_end_nothing(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_bytes(b"t_s,a\n# \x81\x8d\xff\n" + b"0,1\n" * 40_000 + b"1,2\n")
+    assert len(read(path)) == 40_001

@@ -109,7 +109,10 @@ def test_what_is_wrong_is_named(fields, kind, field):
 def test_estimates_may_say_that_nothing_is_known():
     assert checks.check(pb.RateBatch(omega_ib_b_radps=[math.nan] * 3, nis=[math.inf])) == []
     assert checks.check(pb.NavSolution(sigma=[math.inf] * 15)) == []
-    (wrong,) = checks.check(pb.NavSolution(p_ned_m=[math.nan] * 3))
+    assert checks.check(pb.NavSolution(p_ned_m=[1.0, 2.0, math.nan], height_m=math.nan)) == []
+    assert checks.check(pb.GnssFix(height_m=math.nan, v_n_mps=[1.0, 2.0, math.nan])) == []
+    assert checks.check(pb.GnssFix(v_n_mps=[1.0, 2e5, math.nan])) != []
+    (wrong,) = checks.check(pb.NavSolution(p_ned_m=[math.inf] * 3))
     assert wrong.field == "p_ned_m[0]"
 
 

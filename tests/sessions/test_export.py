@@ -1,6 +1,7 @@
 """Recordings in other programs' formats, read back by those formats' own libraries."""
 
 import csv
+import math
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -20,7 +21,7 @@ from estimator.settings import EstimatorSettings
 from inertial.simulation.table import TableTest
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
-from messages.contract.topics import ACCEL, GNSS, RATE
+from messages.contract.topics import ACCEL, GNSS, NAV, RATE
 from sessions.export.export import ExportError, export
 from sessions.export.table import Selection, tables
 from sessions.recording.mcap_append import McapLog
@@ -153,7 +154,13 @@ def test_a_drive_becomes_a_track(tmp_path):
     with path.open("wb") as stream:
         log = McapLog(stream.fileno(), 65536)
         for k in range(20):
-            fix = pb.GnssFix(latitude_deg=40.0 + k * 1e-5, longitude_deg=-105.0, height_m=1600.5)
+            fix = pb.GnssFix(
+                latitude_deg=40.0 + k * 1e-5,
+                longitude_deg=-105.0,
+                height_m=1600.5,
+                height_msl_m=1617.25,
+                height_reference=pb.HEIGHT_REFERENCE_ELLIPSOID,
+            )
             fix.header.utc_ns = 1_700_000_000_000_000_000 + k * 10**9
             log.add(
                 log.open_channel("gyrofree/car/gnss", GNSS),
@@ -166,12 +173,65 @@ def test_a_drive_becomes_a_track(tmp_path):
     (kml,) = export(path, "kml", tmp_path)
     (gpx,) = export(path, "gpx", tmp_path)
     line = ET.parse(kml).find(".//{*}coordinates").text.split()
-    assert len(line) == 20 and line[3] == "-105.000000000,40.000030000,1600.5000"
+    assert len(line) == 20 and line[3] == "-105.000000000,40.000030000,1617.2500"
     points = ET.parse(gpx).findall(".//{*}trkpt")
     assert (
         points[0].find("{*}time").text == "2023-11-14T22:13:20.000Z"
         and points[0].get("lat") == "40.000000000"
     )
+
+
+def drive_of(path, **fix):
+    """A recording of four fixes with a solution at 1601 m above the ellipsoid between them."""
+    with path.open("wb") as stream:
+        log = McapLog(stream.fileno(), 65536)
+        for k in range(8):
+            place = {"latitude_deg": 40.0 + k * 1e-5, "longitude_deg": -105.0}
+            nav = pb.NavSolution(height_m=1601.0, height_reference=1, **place)
+            message, topic, key = nav, NAV, "gyrofree/car/nav/kf"
+            if k % 2 == 0:
+                message, topic, key = (
+                    pb.GnssFix(quality=1, **place, **fix),
+                    GNSS,
+                    "gyrofree/car/gnss",
+                )
+            message.header.utc_ns = 1_700_000_000_000_000_000 + k * 10**9
+            channel = log.open_channel(key, topic)
+            log.add(channel, message.header.utc_ns, 0, message.SerializeToString())
+        log.finish()
+        log.push()
+    return path
+
+
+def test_heights_of_tracks_are_above_the_sea(tmp_path):
+    """Also those of a filter, by the geoid that the receiver gave."""
+    fix = {"height_m": 1600.5, "height_msl_m": 1617.25, "height_reference": 1}
+    path = drive_of(tmp_path / "a.mcap", **fix)
+    (gpx,) = export(path, "gpx", tmp_path)
+    heights = [float(ele.text) for ele in ET.parse(gpx).findall(".//{*}ele")]
+    assert heights == [1617.25] * 4 + [1617.75] * 4
+    (gpx,) = export(path, "gpx", tmp_path, Selection(frozenset({NAV.name})))
+    assert [float(ele.text) for ele in ET.parse(gpx).findall(".//{*}ele")] == [1617.75] * 4
+
+
+@pytest.mark.parametrize(
+    "fix",
+    [
+        {"height_m": 1600.5, "height_msl_m": math.nan, "height_reference": 1},
+        {"height_m": math.nan, "height_msl_m": math.nan, "height_reference": 3},
+        {"height_m": 1600.5},  # of an older version, which left out what it did not know
+    ],
+)
+def test_a_height_above_the_sea_that_is_not_known_is_left_out_and_said(tmp_path, fix):
+    path = drive_of(tmp_path / "a.mcap", **fix)
+    (gpx,) = export(path, "gpx", tmp_path)
+    assert len(ET.parse(gpx).findall(".//{*}trkpt")) == 8
+    assert not ET.parse(gpx).findall(".//{*}ele")
+    assert all("not known" in d.text for d in ET.parse(gpx).findall(".//{*}desc"))
+    (kml,) = export(path, "kml", tmp_path)
+    modes = {mode.text for mode in ET.parse(kml).findall(".//{*}altitudeMode")}
+    assert modes == {"clampToGround"}
+    assert ET.parse(kml).find(".//{*}coordinates").text.split()[0] == "-105.000000000,40.000000000"
 
 
 def test_nothing_selected_is_said(recording, tmp_path):

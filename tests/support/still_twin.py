@@ -18,6 +18,7 @@ class StillTwin:
         self.y = np.zeros((0, 12))
         self.still_for = self.quiet_for = self.slow_for = self.hold = 0
         self.reference, self.learnt, self.learning = np.zeros(12), 0, 0
+        self.rows, self.settled, self.walk, self.known, self.dt = [], 0, 0.0, 0.0, 0.01
 
     def step(self, a, omega, P, dt):
         """One sample (n,), the caller's rate and its covariance: still, depth."""
@@ -65,7 +66,11 @@ class StillTwin:
         """Chi-square of the mean [omega', c] against the reference (E-21)."""
         d = (self.y[-window:].mean(axis=0) - self.reference)[:9]
         d[3 + self.s.m :] = 0.0
-        variance = self.s.spread * (1.0 / window + 1.0 / self.learnt) + self.c.drift**2
+        seconds = (len(self.y) - self.settled) * self.dt
+        leant = self._leant(self.y[-window:].mean(axis=0) - self.reference)
+        walked = (leant + self.walk * seconds**2) / self._axis_noise()
+        share = 1.0 / window + 1.0 / self.learnt + walked
+        variance = self.s.spread * share + self.c.drift**2
         return np.sum((self.s.basis @ d) ** 2 / variance)
 
     def _settled(self, omega, P, told):
@@ -91,7 +96,9 @@ class StillTwin:
                 break
             d = self.y[-length:, :3].sum(axis=0) - length * self.reference[:3]
             noise = np.diag(self.s.R_alpha) * length * (1.0 + length / self.learnt)
-            ratio = np.sum(d**2 / (noise + (length * c.drift_now) ** 2)) / c.turn_limit
+            late = (0.5 * self.learnt + length) * self.dt
+            lag = c.drift_now**2 + late**2 * self.walk * np.diag(self.s.drift)[:3]
+            ratio = np.sum(d**2 / (noise + length**2 * lag)) / c.turn_limit
             if ratio > worst:
                 worst, depth = ratio, length + length // 2
         d = self.y[-c.window :, 9:].mean(axis=0) - self.reference[9:]
@@ -102,9 +109,48 @@ class StillTwin:
 
     def _learn(self):
         """All of this standstill but the newest `guard` samples becomes the reference."""
+        now, c = len(self.y), self.c
         self.still_for += 1
-        self.learning = max(0, self.still_for - self.c.guard)
-        if self.learning >= self.c.window:
-            self.learnt = self.learning
-            end = len(self.y) - self.c.guard
-            self.reference = self.y[end - self.learning : end].mean(axis=0)
+        if self.still_for == 1:
+            before = c.window if self.learnt else c.steady_span
+            self.rows = list(range(now - 1 - before, now - 1))
+        self.learning = max(0, self.still_for - c.guard)
+        if not self.learning:
+            return
+        self.rows.append(now - 1 - c.guard)
+        if len(self.rows) >= 100 and len(self.rows) % 8 == 0:
+            self._slope()
+        if self.learning < c.window:
+            return
+        end = now - c.guard
+        mean = self.y[end - self.learning : end].mean(axis=0)
+        if self.learning == c.window and self.learnt:
+            self._stepped(mean - self.reference, (now - self.settled) * self.dt)
+        self.learnt, self.settled, self.reference = self.learning, now, mean
+
+    def _axis_noise(self):
+        return self.s.R_alpha[0, 0] / self.s.drift[0, 0]
+
+    def _leant(self, d):
+        """Variance of an axis by scale errors, of a body that stands another way up (E-21)."""
+        return self.c.scale**2 * np.sum(d[9:] ** 2)
+
+    def _of_one_axis(self, d):
+        seen = 3 + self.s.m
+        return np.mean(d[:seen] ** 2 / np.diag(self.s.drift)[:seen])
+
+    def _slope(self):
+        """Drift by the slope of this standstill (E-54)."""
+        t = np.array(self.rows) * self.dt
+        t -= t.mean()
+        slope, noise = t @ self.y[self.rows] / (t @ t), self._axis_noise() / (t @ t)
+        if not self.known or noise < self.known:
+            self.walk, self.known = max(0.0, self._of_one_axis(slope) - 1.5 * noise), noise
+
+    def _stepped(self, d, seconds):
+        """Drift by what two standstills differ (E-54)."""
+        noise = self._axis_noise() * (1.0 / self.learning + 1.0 / self.learnt) + self._leant(d)
+        told = noise / seconds**2
+        if not self.known or told <= self.known:
+            self.walk = max(0.0, self._of_one_axis(d) / seconds**2 - 1.5 * told)
+            self.known = told

@@ -71,6 +71,17 @@ class Chart:
         with folder:
             self._heading = client.gui.add_html("", order=order)
 
+    def name(self, title: str, unit: str, digits: int) -> None:
+        """What it shows; for another device that may be something else."""
+        self._title, self._unit, self._digits = title, unit, digits
+
+    def clear(self) -> None:
+        """Nothing is shown."""
+        if self._heading.content:
+            self._heading.content = ""
+        if self._plot is not None and self._plot.visible:
+            self._plot.visible = False
+
     def show(
         self,
         curves: Sequence[Curve],

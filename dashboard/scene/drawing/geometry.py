@@ -5,6 +5,7 @@ frame (east, north, up), so every node below it carries its quaternion and posit
 the messages.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -48,6 +49,21 @@ def ellipsoid(
         vectors[:, 0] = -vectors[:, 0]
     axes = tuple(float(v) for v in sigmas * np.sqrt(np.maximum(values, 1e-8)))
     return axes, tuple(from_matrix(vectors).tolist())
+
+
+def drawn_place(p_ned: Sequence[float]) -> tuple[float, float, float] | None:
+    """Where a body is drawn, m; without a height at the origin's. None without a place."""
+    if len(p_ned) != 3:
+        return None
+    north, east, down = p_ned
+    return north, east, down if math.isfinite(down) else 0.0
+
+
+def flattened(covariance: Sequence[float], flat: bool) -> Sequence[float]:
+    """(9,) NED m^2; where the height is unknown, without its part: only the plane can be drawn."""
+    if not flat or len(covariance) != 9:
+        return covariance
+    return [v if k in (0, 1, 3, 4) else 0.0 for k, v in enumerate(covariance)]
 
 
 def box_edges(half: tuple[float, float, float], centre=(0.0, 0.0, 0.0)) -> np.ndarray:

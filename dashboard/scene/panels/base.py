@@ -20,6 +20,8 @@ from messages.text import plain
 log = logging.getLogger(__name__)
 
 DEG = 180.0 / np.pi
+CHARTS = 36  # of one page
+CURVES = 16  # of one chart
 
 Input = viser.GuiInputHandle | viser.GuiButtonHandle | viser.GuiButtonGroupHandle
 
@@ -59,6 +61,7 @@ class Panel:
     def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
         self.client, self.folder = client, folder
         self._charts: dict[str, Chart] = {}
+        self._shown: set[str] = set()  # of them, since the last tidy
         self._place = 0.0
 
     def order_estimator(self, title: str, command: pb.EstimatorCommand) -> None:
@@ -75,13 +78,20 @@ class Panel:
         )
 
     def chart(self, key: str, title: str, unit: str, height: int = 170, digits: int = 1) -> Chart:
-        """The chart of this key, made at first use below the ones before it."""
-        if key not in self._charts:
+        """The chart of this key, made at first use below the ones before it; where there are
+        CHARTS of them, one that nobody shows any more.
+        """
+        found = self._charts.get(key)
+        if found is None and len(self._charts) >= CHARTS:
+            old = next((one for one in self._charts if one not in self._shown), None)
+            if old is not None:
+                found = self._charts[key] = self._charts.pop(old)
+        if found is None:
             self._place += 2.0
-            self._charts[key] = Chart(
-                self.client, self.folder, self._place, title, unit, height, digits
-            )
-        return self._charts[key]
+            found = Chart(self.client, self.folder, self._place, title, unit, height, digits)
+            self._charts[key] = found
+        found.name(title, unit, digits)
+        return found
 
     def show(
         self,
@@ -93,7 +103,11 @@ class Panel:
         shades: Sequence[Shade] = (),
         **options,
     ) -> None:
-        """Draw a chart for the window of the snapshot."""
+        """Draw a chart for the window of the snapshot; one too many is left out, as are curves."""
+        if key not in self._shown and len(self._shown) >= CHARTS:
+            return
+        self._shown.add(key)
+        curves = curves[:CURVES]
         self.chart(key, title, unit, **options).show(
             curves,
             s.t0,
@@ -124,6 +138,15 @@ class Panel:
     def update(self, s: Snapshot) -> None:
         """Bring the page to the state of the snapshot."""
         raise NotImplementedError
+
+    def tidy(self) -> None:
+        """Empty the charts that the last update did not show: of another device, of a filter that
+        is gone.
+        """
+        for key, chart in self._charts.items():
+            if key not in self._shown:
+                chart.clear()
+        self._shown.clear()
 
     def hide(self) -> None:
         """Another page was opened."""

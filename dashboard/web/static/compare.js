@@ -44,7 +44,7 @@ function showTables(answer) {
     deg(d.rms_radps.x), deg(d.rms_radps.y), deg(d.rms_radps.z), `${d.seconds.toFixed(1)} s`,
   ])), ...answer.track_differences.map((d) => line([
     `${d.session}: ${d.track.split("/").slice(1).join(" ")}`, "track: north / east / down, m",
-    ...d.rms_ned_m.map((v) => v.toPrecision(3)), `${d.seconds.toFixed(1)} s`,
+    ...d.rms_ned_m.map((v) => v === null ? "–" : v.toPrecision(3)), `${d.seconds.toFixed(1)} s`,
   ])));
   document.body.dataset.plotted = answer.state;
 }

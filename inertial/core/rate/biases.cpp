@@ -26,6 +26,36 @@ Vector<MOST_AXES> away_from_rest(Filter& f, const Sensor& s, const Tuning& t, bo
   return away;
 }
 
+constexpr double FOLLOWED = 3.0;  // rad/s; what swings faster is averaged out by the filter
+
+// Gravity that turns in the body swings the readings, and with them what scale errors do: within a
+// radian a bias may be anything of that size again. Grows the biases to it where they are known better.
+void swing_biases(Filter& f, const Sensor& s, const Tuning& t, double seconds) {
+  const Vector3 omega = f.omega(), lift = f.x.segment<3>(LIFT);
+  const double rate = norm_of(omega);
+  if (rate == 0.0) return;
+  const Vector3 axis = omega / rate;
+  // of gravity, what turns, less what the axis' own uncertainty makes of it
+  const double lost = 4.0 * square_of(lift) * largest_variance(f.omega_covariance()) / (rate * rate);
+  const double turns = square_of(lift) - square(dot(lift, axis)) - lost;
+  if (!(turns > 0.0)) return;
+  const double across = turns / (1.0 + square(rate / FOLLOWED));
+  Vector<MOST_AXES> size = Vector<MOST_AXES>::Zero();
+  for (int i = 0; i < s.n; ++i) {
+    const double along = dot(Vector3(s.theta_b.row(i).transpose()), axis);
+    size(i) = 0.15 * t.scale * across * (1.0 - along * along);
+  }
+  Matrix<MEASURED, MOST_AXES> W = s.W;
+  for (int i = 0; i < s.n; ++i) W.col(i) *= std::sqrt(size(i));
+  for (int k = 0; k < MEASURED; ++k) {
+    double most = 0.0;
+    for (int i = 0; i < s.n; ++i) most += W(k, i) * W(k, i);
+    const double known = std::max(f.P(bias_state(k), bias_state(k)), f.rest_variance(k));
+    W.row(k) *= known < most ? std::sqrt(1.0 - known / most) : 0.0;
+  }
+  add_to_biases(f.P, product_transposed(W, W), std::min(1.0, 2.0 * rate * seconds));
+}
+
 }  // namespace
 
 Measurement biases_of(const StateVector& x) {
@@ -50,7 +80,9 @@ void add_to_biases(Covariance& P, const Matrix<MEASURED>& D, double factor) {
 // A scale error e of an axis is a bias e (f - f at the last standstill): it comes and goes with the
 // readings. So what is known of a bias beyond that at rest, and its deviation, follow the readings up
 // and down again. Beside it every bias walks.
-void grow_biases(Filter& f, const Sensor& s, const Tuning& t, double seconds, bool turning) {
+void grow_biases(Filter& f, const Sensor& s, const Tuning& t, const Moment& moment) {
+  const double seconds = moment.grow;
+  const bool turning = moment.turning;
   const Vector<MOST_AXES> away = away_from_rest(f, s, t, turning);
   if (!turning) {
     for (int k = 0; k < MEASURED; ++k) {
@@ -70,7 +102,8 @@ void grow_biases(Filter& f, const Sensor& s, const Tuning& t, double seconds, bo
     f.x(b) = f.rest_bias(k) + follow(b) * (f.x(b) - f.rest_bias(k));
   }
   for (int j = 0; j < STATES; ++j) f.P.col(j) = f.P.col(j).cwiseProduct(follow * follow(j));
-  add_to_biases(f.P, s.drift, t.drift * seconds);
+  add_to_biases(f.P, s.drift, (t.drift + moment.wander) * seconds);
+  if (turning) swing_biases(f, s, t, seconds);
 }
 
 }  // namespace gyrofree::rate

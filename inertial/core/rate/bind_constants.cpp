@@ -85,6 +85,7 @@ void bind_limits(nb::module_& m) {
   c.def_rw("likely_rate", &StillLimits::likely_rate).def_rw("begin_limit", &StillLimits::begin_limit);
   c.def_rw("patience_s", &StillLimits::patience_s).def_rw("drift", &StillLimits::drift);
   c.def_rw("drift_now", &StillLimits::drift_now).def_rw("drift_tilt", &StillLimits::drift_tilt);
+  c.def_rw("scale", &StillLimits::scale);
   c.def_rw("window", &StillLimits::window).def_rw("short_window", &StillLimits::short_window);
   c.def_rw("steady_span", &StillLimits::steady_span).def_rw("brief_span", &StillLimits::brief_span);
   c.def_rw("guard", &StillLimits::guard).def_rw("hold", &StillLimits::hold);

@@ -174,7 +174,7 @@ struct Transition {
 Transition move(StateVector& x, const Drive& drive, const Sensor& s);
 void predict(StateVector& x, Covariance& P, const Drive& drive, const Sensor& s);
 void add_noise(Covariance& P, const Drive& drive, const Sensor& s, const Tuning& t);
-void forget(Covariance& P, const Sensor& s, const Tuning& t, double dt);
+void forget(Covariance& P, const Sensor& s, const Tuning& t, double amount);
 // omega' less what the products add to it (E-30).
 Vector3 free_alpha(const Vector3& alpha_m, const StateVector& x, const Sensor& s);
 
@@ -211,6 +211,8 @@ struct Moment {
   bool fixed;          // about an axis that keeps its direction
   double grow;         // s of bias growth that are due now; 0 for most samples
   const Vector3* at;   // omega that the products are linear about; null: that of the state
+  double forget = 0.0;  // 1/s, by what innovations say (E-59)
+  double wander = 0.0;  // (m/s^2)^2 per s, of biases beyond what is configured (E-54)
 };
 
 // step.cpp: one sample y = [alpha_m, c_m, p_m].
@@ -225,6 +227,6 @@ Measurement biases_of(const StateVector& x);
 Measurement bias_variances(const Covariance& P);
 constexpr int bias_state(int k) { return k < BIASES ? BIAS_ALPHA + k : BIAS_FORCE + k - BIASES; }
 void add_to_biases(Covariance& P, const Matrix<MEASURED>& D, double factor);
-void grow_biases(Filter& f, const Sensor& s, const Tuning& t, double seconds, bool turning);
+void grow_biases(Filter& f, const Sensor& s, const Tuning& t, const Moment& moment);
 
 }  // namespace gyrofree::rate

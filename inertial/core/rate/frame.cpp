@@ -30,6 +30,7 @@ void Frame::gap() {
 void Frame::restart() {
   gap();
   started_ = still_ = moved_ = false;
+  agreement_.forget();
   branches_ = 0;
   first_.filter = Filter();
 }
@@ -179,7 +180,8 @@ void Frame::run(const Constants& c, long first, long now, bool fixed, const Stat
     if (eighth && keeps) arrivals_.keep(sample, first_.filter);
     Vector3 at;
     if (end != nullptr) at = back(*end, watch_.total(now), watch_.total(sample), now - sample, dt_);
-    const Moment moment{watch_.dt(sample), !still_, fixed, eighth ? EVERY * dt_ : 0.0, end == nullptr ? nullptr : &at};
+    const Moment moment{watch_.dt(sample), !still_, fixed, eighth ? EVERY * dt_ : 0.0, end == nullptr ? nullptr : &at,
+                        agreement_.forgetting(), watch_.wander()};
     step(first_.filter, c.sensor, c.tuning, watch_.y(sample), moment, said_);
     if (branches_ == 2) step(second_.filter, c.sensor, c.tuning, watch_.y(sample), moment, other_said_);
   }
@@ -235,6 +237,7 @@ void Frame::stay() {
 }
 
 void Frame::count(const Constants& c) {
+  agreement_.observe(said_, c.sensor.m, dt_);
   if (!said_.used) ++refused_;
   if (said_.force_used) {
     unlike_ = 0;

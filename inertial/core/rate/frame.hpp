@@ -8,6 +8,7 @@
 // gravity's turn tells the signs apart (E-46).
 #pragma once
 
+#include "rate/agreement.hpp"
 #include "rate/start.hpp"
 
 namespace gyrofree::rate {
@@ -89,6 +90,7 @@ class Frame {
   bool started() const { return started_; }
   bool still() const { return still_; }
   bool two_signs() const { return branches_ == 2; }
+  const Agreement& agreement() const { return agreement_; }
   double balance() const { return balance_; }  // log of the likelihood ratio of the two signs
   double last_s() const { return last_s_; }
   double dt() const { return dt_; }
@@ -124,6 +126,7 @@ class Frame {
   Start second_;  // of the other sign, while there are two
   KeptStates<DEPTH / EVERY + 1> kept_;
   KeptStates<4> arrivals_;  // of the moving horizon: states before samples of this turn
+  Agreement agreement_;
   Said said_;
   Said other_said_;
   double last_s_ = std::numeric_limits<double>::quiet_NaN();

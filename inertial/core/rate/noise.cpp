@@ -3,14 +3,14 @@
 namespace gyrofree::rate {
 namespace {
 
-constexpr double THIRD = 20.0;  // variance of a third difference of white noise over the noise's own
-constexpr double CLIP = 6.0;    // of one ratio over the mean so far: a jolt is no noise
+constexpr double THIRD_DIFFERENCE = 20.0;  // variance of a third difference of white noise over the noise's own
+constexpr double NOISE_CLIP = 6.0;    // of one ratio over the mean so far: a jolt is no noise
 
 }  // namespace
 
 void Noise::Mean::add(double ratio) {
   count = std::min<long>(count + 1, MEMORY);
-  const double most = CLIP * std::max(value, 1.0);
+  const double most = NOISE_CLIP * std::max(value, 1.0);
   value += (std::min(ratio, most) - value) / count;
 }
 
@@ -27,8 +27,8 @@ void Noise::observe(const Sensor& s, const Measurement& third_difference) {
     force += square(third_difference(FORCE_M + k)) / s.R_p(k, k);
   }
   for (int k = 0; k < s.m; ++k) quiet += square(third_difference(PRODUCTS_M + k)) / s.R_c(k, k);
-  quiet_.add(quiet / (THIRD * (3 + s.m)));
-  force_.add(force / (THIRD * 3));
+  quiet_.add(quiet / (THIRD_DIFFERENCE * (3 + s.m)));
+  force_.add(force / (THIRD_DIFFERENCE * 3));
 }
 
 void apply(const Noise& noise, const Sensor& configured, Sensor& out) {

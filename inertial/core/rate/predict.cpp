@@ -114,9 +114,9 @@ void add_noise(Covariance& P, const Drive& drive, const Sensor& s, const Tuning&
 }
 
 // Exponential forgetting (E-47): P grows by its own size, up to what is known before any sample.
-void forget(Covariance& P, const Sensor& s, const Tuning& t, double dt) {
+void forget(Covariance& P, const Sensor& s, const Tuning& t, double amount) {
   constexpr double KNOWN_RATE = 4.0;  // (rad/s)^2
-  const double root = elementary::exp(0.5 * t.forget * dt);
+  const double root = elementary::exp(0.5 * amount);
   for (int i = OMEGA; i < LIFT; ++i) {
     const int bias = i - BIAS_ALPHA;
     const double known = bias < 0 ? KNOWN_RATE : t.bias * s.drift(bias, bias);

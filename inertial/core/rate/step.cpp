@@ -23,7 +23,7 @@ void predict_by_method(Filter& f, const Sensor& s, const Tuning& t, const Drive&
     predict(f.x, f.P, drive, s);
   }
   if (method == Method::FORGET && turning) {
-    forget(f.P, s, t, drive.dt);
+    forget(f.P, s, t, t.forget * drive.dt);
   } else {
     add_noise(f.P, drive, s, t);
   }
@@ -88,7 +88,8 @@ void navigate(Filter& f, const Vector3& mean_rate, const Vector3& f_b, const Dri
 }  // namespace
 
 void step(Filter& f, const Sensor& s, const Tuning& t, const Measurement& y, const Moment& moment, Said& said) {
-  if (moment.grow > 0.0) grow_biases(f, s, t, moment.grow, moment.turning);
+  if (moment.grow > 0.0) grow_biases(f, s, t, moment);
+  if (moment.forget > 0.0) forget(f.P, s, t, moment.forget * moment.dt);
   const StateVector x_before = f.x;
   const Covariance P_before = f.P;
   const Vector3 omega_before = f.omega();

@@ -20,6 +20,7 @@ void Watch::forget() {
 
 void Watch::unlearn() {
   forget();
+  walk = Drift();
   ring_y.setZero();
   learnt = 0;
 }
@@ -28,6 +29,7 @@ void Watch::take(const Sensor& s, const double* a, double dt) {
   const Eigen::Index k = count % DEPTH, now = count % TOTALS;
   const Eigen::Index before = (count + TOTALS - 1) % TOTALS;
   ring_dt(k) = dt;
+  seconds += dt;
   ring_y.col(k) = s.measure(a);
   if (filled == 0) ring_total.col(before).setZero();
   ring_total.col(now) = ring_y.col(k) + ring_total.col(before);
@@ -76,15 +78,23 @@ Measurement Watch::mean(int window, int ago) const {
   return (total(last) - total(last - window)) / window;
 }
 
+// Variance of one axis by scale errors, of a body that stands another way up by d.
+double Watch::leant(const Sensor&, const StillLimits& c, const Measurement& d) const {
+  return square(c.scale) * square_of(Vector3(d.segment<3>(FORCE_M)));
+}
+
 // Chi-square of the mean [omega', c] of the window against the reference (E-21).
-double Watch::moved(const Sensor& s, int window, double drift) const {
+double Watch::moved(const Sensor& s, const StillLimits& c, int window) const {
   const double share = 1.0 / window + 1.0 / learnt;
   const Measurement all = mean(window) - reference;
+  // over the variance of one sample of an axis
+  const double since = seconds - settled_s;
+  const double walked = (leant(s, c, all) + walk.variance() * since * since) / axis_noise(s);
   double chi2 = 0.0;
   for (int k = 0; k < s.spread.size(); ++k) {
     double along = 0.0;
     for (int r = 0; r < PRODUCTS_M + s.m; ++r) along += s.basis(k, r) * all(r);
-    chi2 += along * along / (s.spread(k) * share + drift * drift);
+    chi2 += along * along / (s.spread(k) * (share + walked) + c.drift * c.drift);
   }
   return chi2;
 }
@@ -93,8 +103,9 @@ double Watch::moved(const Sensor& s, int window, double drift) const {
 double Watch::turned(const Sensor& s, int length, double drift) const {
   const double share = length * (1.0 + static_cast<double>(length) / learnt);
   const Measurement d = total(newest()) - total(newest() - length) - length * reference;
+  const double late = (0.5 * learnt + length) * dt(newest());  // s, by which the reference lags behind
   double chi2 = 0.0;
-  for (int r = 0; r < 3; ++r) chi2 += square(d(ALPHA_M + r)) / (s.R_alpha(r, r) * share + square(length * drift));
+  for (int r = 0; r < 3; ++r) chi2 += square(d(ALPHA_M + r)) / (s.R_alpha(r, r) * share + square(length) * (drift * drift + late * late * walk.variance() * s.drift(r, r)));
   return chi2;
 }
 
@@ -151,12 +162,25 @@ int Watch::began(const Sensor& s, const StillLimits& c) const {
 }
 
 // One more sample of standstill; the one `guard` samples ago becomes part of the reference.
-void Watch::learn(const StillLimits& c) {
+void Watch::learn(const Sensor& s, const StillLimits& c) {
   ++still_for;
+  if (still_for == 1) {  // what was asked before it was believed stood as well
+    walk.begin();
+    const int before = learnt > 0 ? c.window : c.steady_span;
+    double ago = before * dt(newest());
+    for (int k = before; k > 0; --k, ago -= dt(newest())) walk.learn(s, y(newest() - k), seconds - ago);
+  }
   if (still_for <= c.guard) return;
   ++learning;
-  gathered += y(newest() - c.guard);
+  const Measurement late = y(newest() - c.guard);
+  gathered += late;
+  walk.learn(s, late, seconds - c.guard * dt(newest()));
   if (learning < c.window) return;
+  if (learning == c.window && learnt > 0) {
+    const Measurement d = gathered / learning - reference;
+    walk.moved(s, d, axis_noise(s) * (1.0 / learning + 1.0 / learnt) + leant(s, c, d), seconds - settled_s);
+  }
+  settled_s = seconds;
   learnt = learning;
   reference = gathered / learning;
 }
@@ -173,8 +197,8 @@ bool Watch::stands(const Sensor& s, const StillLimits& c, const Vector3& omega, 
   const double told = rate_excludes_zero(omega, P, c.rate_slack);
   const bool slow = told < c.rate_limit;
   if (!settled(s, c, omega, P, told)) return restless();
-  if (learnt == 0 || (moved(s, c.window, c.drift) <= c.quiet_limit &&
-                      moved(s, c.short_window, c.drift) <= c.quiet_limit)) {
+  if (learnt == 0 || (moved(s, c, c.window) <= c.quiet_limit &&
+                      moved(s, c, c.short_window) <= c.quiet_limit)) {
     ++quiet_for;
     slow_for = 0;
     return slow || quiet_for * dt >= c.patience_s;
@@ -189,7 +213,7 @@ Verdict Watch::detect(const Sensor& s, const StillLimits& c, const Vector3& omeg
   const bool still = stands(s, c, omega, P, dt);
   int depth = standing ? began(s, c) : 0;
   if (still && depth == 0) {
-    learn(c);
+    learn(s, c);
     return {true, 0};
   }
   if (standing && depth == 0) depth = std::min({std::max(depth, 2 * c.window), still_for, DEPTH - 8});

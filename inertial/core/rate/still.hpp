@@ -3,6 +3,7 @@
 // tests/support/still_twin.py.
 #pragma once
 
+#include "rate/drift.hpp"
 #include "rate/noise.hpp"
 
 namespace gyrofree::rate {
@@ -10,7 +11,7 @@ namespace gyrofree::rate {
 struct StillLimits {
   double spread_limit, quiet_limit, turn_limit, tilt_limit, steady_limit, drift_steady;
   double rate_limit, rate_slack, sure_rate, likely_rate, begin_limit, patience_s;
-  double drift, drift_now, drift_tilt;
+  double drift, drift_now, drift_tilt, scale;
   int window, short_window, steady_span, brief_span, guard, hold;
 };
 
@@ -43,13 +44,15 @@ class Watch {
   // Sum of all y up to a sample of the last 256, but for a constant.
   Measurement total(long sample) const { return ring_total.col((sample + TOTALS) % TOTALS); }
   Measurement mean_of(int window) const;
+  // (m/s^2)^2 per s, by which biases of one axis wander more than is configured.
+  double wander() const { return 2.0 * walk.variance() * std::clamp(seconds - settled_s, 2.0, 20.0); }
   Noise& noise() { return measured; }
   const Noise& noise() const { return measured; }
 
  private:
   double scatter(const Sensor& s, int window);
   Measurement mean(int window, int ago = 0) const;
-  double moved(const Sensor& s, int window, double drift) const;
+  double moved(const Sensor& s, const StillLimits& c, int window) const;
   double turned(const Sensor& s, int length, double drift) const;
   double tilted(const Sensor& s, int window, double drift) const;
   double swung(const Sensor& s, const StillLimits& c, int span) const;
@@ -57,7 +60,9 @@ class Watch {
   int began(const Sensor& s, const StillLimits& c) const;
   bool stands(const Sensor& s, const StillLimits& c, const Vector3& omega, const Matrix3& P, double dt);
   bool restless();
-  void learn(const StillLimits& c);
+  double leant(const Sensor& s, const StillLimits& c, const Measurement& d) const;
+  double axis_noise(const Sensor& s) const { return s.R_alpha(0, 0) / s.drift(0, 0); }
+  void learn(const Sensor& s, const StillLimits& c);
 
   Matrix<MEASURED, DEPTH> ring_y = Matrix<MEASURED, DEPTH>::Zero();
   Matrix<MEASURED, TOTALS> ring_total = Matrix<MEASURED, TOTALS>::Zero();
@@ -67,6 +72,9 @@ class Watch {
   Measurement sum = Measurement::Zero();
   Measurement sum_of_squares = Measurement::Zero();
   Noise measured;
+  Drift walk;
+  double seconds = 0.0;    // of all samples
+  double settled_s = 0.0;  // when the reference was last learnt
   Measurement reference = Measurement::Zero();  // mean y of the last standstill
   Measurement gathered = Measurement::Zero();   // of this standstill without its newest samples
   long count = 0;       // samples taken

@@ -2,6 +2,7 @@
 looks for first.
 """
 
+import math
 import re
 import time
 
@@ -118,7 +119,7 @@ class Devices(Panel):
         tiles = []
         for name in s.device.estimators("nav"):
             m = s.device.get("nav", name).message
-            speed = float(np.linalg.norm(m.v_n_mps)) * 3.6 if len(m.v_n_mps) == 3 else None
+            speed = float(np.hypot(*m.v_n_mps[:2])) * 3.6 if len(m.v_n_mps) == 3 else None
             sigma = float(np.hypot(m.sigma[6], m.sigma[7])) if len(m.sigma) >= 8 else None
             sub = f"{MODES.get(m.mode, '')} · 1σ {number(sigma, 2, 'm')}"
             tiles.append(_tile(s, name, "nav", number(speed, 1), "km/h", sub))
@@ -130,6 +131,10 @@ class Devices(Panel):
                 .replace("_", " ")
                 .lower()
             )
+            if fix.message.quality and math.isnan(fix.message.height_m):
+                quality += " · no height"
+            if fix.message.quality and not fix.message.v_n_mps:
+                quality += " · no velocity"
             satellites = str(fix.message.satellites) if fix.message.satellites else "–"
             tiles.append(_raw_tile("GNSS", FIX, satellites, "satellites", quality, s.stale("gnss")))
         return tag("div", *tiles, class_="gf-tiles")
@@ -164,7 +169,8 @@ class Devices(Panel):
         if s.store.dropped:
             texts.append(f"the dashboard could not keep up: {s.store.dropped} messages not shown")
         if s.store.refused:
-            texts.append(f"{s.store.refused} messages of too many or nameless devices not shown")
+            kinds = ", ".join(f"{kind} {n}" for kind, n in sorted(s.store.door.counts().items()))
+            texts.append(f"{s.store.refused} messages refused and not shown ({kinds}): see the log")
         return joined(alert(text) for text in texts)
 
     @staticmethod

@@ -1,5 +1,7 @@
 """Position in north, east, down with its 3-sigma band, and the numbers of a trajectory."""
 
+import math
+
 import numpy as np
 
 from dashboard.scene.drawing.chart import Curve
@@ -7,6 +9,7 @@ from dashboard.scene.drawing.geometry import MODES
 from dashboard.scene.drawing.page import Markup, note, rows
 from dashboard.scene.drawing.palette import FIX, number
 from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
+from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
 
 NAMES = ("North", "East", "Down")
@@ -62,7 +65,7 @@ class Position(Panel):
                 "latitude, longitude",
                 f"{number(m.latitude_deg, 7, '°')}, {number(m.longitude_deg, 7, '°')}",
             ),
-            ("height", number(m.height_m, 2, "m")),
+            ("height", height_text(m)),
             ("speed over ground", number(float(np.hypot(v[0], v[1])) * 3.6, 1, "km/h")),
             ("course", number(course, 1, "°") if np.hypot(v[0], v[1]) > 0.5 else "standing"),
             ("1σ north, east, down", " · ".join(number(float(x), 2) for x in sigma) + " m"),
@@ -71,6 +74,15 @@ class Position(Panel):
             ("way in the window", number(travelled, 0, "m")),
         ]
         return rows(items, s.stale("nav", names[0]))
+
+
+def height_text(m: pb.NavSolution | pb.GnssFix) -> str:
+    """The height and what it counts from, or why there is none."""
+    if not math.isfinite(m.height_m):
+        return "– (the receiver gives no height)"
+    if m.height_reference == pb.HEIGHT_REFERENCE_SEA_LEVEL:
+        return f"{number(m.height_m, 2, 'm')} above sea level (no geoid: ± 110 m)"
+    return number(m.height_m, 2, "m")
 
 
 def _cube_note(s: Snapshot) -> Markup:

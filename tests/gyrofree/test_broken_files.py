@@ -1,0 +1,178 @@
+"""Whatever file a command is given: a right result, or one sentence and an exit code. Every command
+is tried, by the parser's own list, with every file that it takes.
+"""
+
+import importlib
+import os
+import pkgutil
+import random
+import signal
+import subprocess
+import sys
+import traceback
+from pathlib import Path
+
+import pytest
+import typer
+from support.broken_files import broken, good
+from typer.testing import CliRunner
+
+import gyrofree.commands
+from gyrofree.commands.main import app
+
+ROUNDS = int(os.environ.get("GYROFREE_FUZZ_ROUNDS", "5"))  # of each command and file
+LONGEST_S = 30  # of one call; a command that hangs is a fault
+OUTPUTS = {"out", "plot", "folder", "layout_out", "link", "csv", "port_link"}
+FILES = {"session", "sessions", "layout", "layouts", "log", "imu", "gnss"}  # named by a text
+VALUES = {"name": "anna", "role": "viewer", "text": "a remark"}  # of what is no file
+GOOD = {  # of a file that is wanted beside the broken one
+    "log": "cube.csv",
+    "logs": "cube.csv",
+    "card": "card.toml",
+    "session": "session.mcap",
+    "sessions": "session.mcap",
+}
+ALSO = {  # further ways of a command
+    "run": [[], ["--attitude"], ["--estimators", "least-squares", "--resolve", "--tacho-aid"]],
+    "export": [["--format", form] for form in ("csv", "mcap", "mat", "gpx", "kml", "parquet")],
+    "import": [[], ["--units-as-named"]],
+    "replay": [[], ["--check"]],
+    "play": [["--link"], ["--units-as-named", "--link"]],
+    "sessions compare": [["--align", "start"]],
+    "demo": [["--source", "drive"]],
+}
+LONG = {"demo", "layout optimise", "reproduce in-motion", "reproduce gyro-free", "reprocess"}
+
+
+def commands(command=None, name=()):
+    command = command or typer.main.get_command(app)
+    if not hasattr(command, "commands"):
+        return {" ".join(name): command}
+    found = {}
+    for key, inner in command.commands.items():
+        found |= commands(inner, (*name, key))
+    return found
+
+
+COMMANDS = commands()
+
+
+def is_file(parameter) -> bool:
+    """Does this parameter name a file or folder to be read?"""
+    if parameter.name in OUTPUTS:
+        return False
+    return parameter.name in FILES or "Path" in str(parameter.type_descriptor.annotation)
+
+
+def pairs():
+    for name, command in sorted(COMMANDS.items()):
+        for parameter in command.params:
+            if getattr(parameter, "type_descriptor", None) and is_file(parameter):
+                yield name, parameter.name
+
+
+@pytest.fixture(scope="module")
+def seeds(tmp_path_factory):
+    return good(tmp_path_factory.mktemp("seeds") / "good")
+
+
+@pytest.fixture
+def no_services(monkeypatch):
+    """A service that could start has read its files well: that is all that is asked here."""
+    for module in pkgutil.iter_modules(gyrofree.commands.__path__):
+        loaded = importlib.import_module(f"gyrofree.commands.{module.name}")
+        if hasattr(loaded, "run_service"):
+            monkeypatch.setattr(loaded, "run_service", lambda body, verbose=False: None)
+    monkeypatch.setattr("gyrofree.running.demo.run", lambda plan: None)
+
+
+def arguments(command, spoilt, value, seeds, place):
+    """A command line in which one parameter is the broken file."""
+    words, last = [], []
+    for parameter in command.params:
+        option = next((word for word in parameter.opts if word.startswith("--")), "")
+        if parameter.name == spoilt:
+            (words if option else last).append(f"{option}={value}" if option else str(value))
+            if parameter.name == "sessions":
+                last.append(str(seeds["session.mcap"]))
+        elif parameter.name in OUTPUTS and option and parameter.name in ("out", "layout_out"):
+            words.append(f"{option}={place / 'out'}")
+        elif parameter.required:
+            known = seeds[GOOD[parameter.name]] if parameter.name in GOOD else None
+            word = known or VALUES.get(parameter.name)
+            assert word is not None, f"say what {parameter.name!r} may be: VALUES or GOOD"
+            (words if option else last).append(f"{option}={word}" if option else str(word))
+    return words, last
+
+
+class Hung(BaseException):
+    """A command did not end."""
+
+
+def called(line):
+    """Run a command line here; its exit code, what was said, what went wrong."""
+
+    def hung(*_):
+        raise Hung
+
+    old = signal.signal(signal.SIGALRM, hung)
+    signal.alarm(LONGEST_S)
+    try:
+        result = CliRunner().invoke(app, line)
+    except Hung:
+        return None, "", "did not end"
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, old)
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        return None, result.output, "".join(traceback.format_exception(result.exception)[-6:])
+    return result.exit_code, result.output, ""
+
+
+def judged(line, code, said, fault):
+    assert not fault, f"{line}\n{said[-500:]}\n{fault}"
+    assert code in (0, 1, 2, 3), (line, code)
+    assert "Traceback" not in said, (line, said)
+    assert code == 0 or said.strip(), f"{line}: exit code {code} without a word"
+    assert "\x1b[31m" not in said and "\0" not in said, f"{line}: control characters: {said!r}"
+
+
+@pytest.mark.parametrize(("name", "parameter"), list(pairs()))
+def test_a_broken_file_is_answered(name, parameter, seeds, tmp_path, no_services, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    rng = random.Random(f"{name} {parameter} 3")
+    rounds = 2 if name in LONG else ROUNDS
+    for k in range(rounds):
+        place = tmp_path / str(k)
+        value = broken(seeds, place, rng)
+        words, last = arguments(COMMANDS[name], parameter, value, seeds, place)
+        more = list(rng.choice(ALSO.get(name, [[]])))
+        if more[-1:] == ["--link"]:
+            more[-1] = f"--link={place / 'board'}"
+        line = [*name.split(), *words, *more, "--", *last]
+        judged(line, *called(line))
+
+
+def test_every_command_that_takes_a_file_is_tried():
+    tried = {name for name, _ in pairs()}
+    assert set(COMMANDS) - tried <= {"layout optimise", "calibrate plan", "calibrate simulate"}
+
+
+def test_a_sample_in_processes_of_their_own(seeds, tmp_path):
+    rng = random.Random(11)
+    for name, parameter in (("run", "log"), ("import", "log"), ("export", "session")):
+        for k in range(2):
+            place = tmp_path / f"{name}{k}"
+            value = broken(seeds, place, rng)
+            words, last = arguments(COMMANDS[name], parameter, value, seeds, place)
+            line = [*name.split(), *words, "--", *last]
+            done = subprocess.run(
+                [sys.executable, "-P", "-m", "gyrofree", *line],
+                cwd=tmp_path,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=LONGEST_S,
+            )
+            judged(line, done.returncode, done.stdout + done.stderr, "")
+    assert Path(tmp_path).is_dir()
