@@ -24,7 +24,8 @@ from inertial.rate.estimators import ESTIMATORS, ProductsRate
 from inertial.rate.names import LEADER
 from inertial.rate.sight import BLIND
 from inertial.rate.tachometer import SUFFIX
-from logs.cube_axes import axes_of
+from logs.cube_agreement import agreement
+from logs.cube_axes import axes_of, moving
 from logs.cube_log import CubeLog, read_log
 from logs.cube_parts import Monitored, Part, cut, monitored
 from logs.cube_run import EstimatorRun, reference
@@ -103,15 +104,19 @@ def run_cube(
         if t.blind
     ]
     progress(0.95, "bound")
-    bound = bound_of(data, used.layout(shape) if used is not None else shape, truth)
+    known = used.layout(shape) if used is not None else shape
+    f_axis = data.f_axis * np.array(shape.gain)
+    agree = agreement(known, f_axis if used is None else used.correct(f_axis), moving(data))
+    notes += [agree.text] if agree and agree.text else []
+    bound = bound_of(data, known, truth, agree)
     plain = [name.partition("+")[0] for name in tracks]
-    known = [*tracks, *(name for name in estimators or ESTIMATORS if name not in plain)]
+    asked = [*tracks, *(name for name in estimators or ESTIMATORS if name not in plain)]
     default = next(
         (name for name, of in zip(tracks, plain, strict=True) if of == LEADER),
         None,
     )
     result = {
-        "estimators": {name: score(tracks.get(name), truth, bound) for name in known},
+        "estimators": {name: score(tracks.get(name), truth, bound) for name in asked},
         "default": default or next(iter(tracks), None),
         "gaps": {
             "count": len(data.gaps),

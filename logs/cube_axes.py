@@ -34,17 +34,17 @@ def examine(data: CubeLog, shape: Layout) -> dict[str, dict[str, Any]]:
     """By axis: state "good", "stuck" or "saturated", noise (m/s^2, one sample), samples lost to
     either.
     """
-    moving = _moving(data)
+    moves = moving(data)
     noises = np.array([_noise(column) for column in data.f_axis.T])
     usual = float(np.median(noises))
     if usual < NOISELESS:
-        moving[:] = False  # a computed log: axes along the table's axis stand still in it
+        moves[:] = False  # a computed log: axes along the table's axis stand still in it
     elif usual > 0.4 * data.lsb_mps2:
-        moving[:] = True  # so much noise never reads the same for a second, at rest or not
+        moves[:] = True  # so much noise never reads the same for a second, at rest or not
     found = {}
     for k, name in enumerate(data.names):
         column, noise = data.f_axis[:, k], float(noises[k])
-        stuck = _longest_run(column, moving) * data.period_s
+        stuck = _longest_run(column, moves) * data.period_s
         saturated = 0
         if data.lsb_mps2:
             low, high = (data.lsb_mps2 * (limit + side) for limit, side in SATURATED)
@@ -66,7 +66,7 @@ def _noise(column: NDArray[np.float64]) -> float:
     return float(1.4826 * np.median(np.abs(steps - np.median(steps))) / np.sqrt(2.0))
 
 
-def _moving(data: CubeLog) -> NDArray[np.bool_]:
+def moving(data: CubeLog) -> NDArray[np.bool_]:
     """(n,), True in stretches of a second in which at least a third of the axes scatter."""
     n = max(8, int(round(1.0 / data.period_s)))
     moving = np.zeros(len(data.t_s), dtype=bool)
