@@ -44,6 +44,10 @@ class VehicleSettings(BaseModel):
         0.0,
         0.0,
     )  # m, from IMU to antenna: forward, right, down
+    # m/s, above which the course is taken as the heading; what never gets there is aligned by what
+    # its accelerometers feel
+    align_speed_mps: float = Field(default=4.0, ge=0.5, le=100.0)
+    align_standstill_s: float = Field(default=10.0, ge=1.0, le=600.0)  # s of rest that level it
 
 
 class EstimatorSettings(BaseModel):

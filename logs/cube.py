@@ -24,8 +24,7 @@ from inertial.rate.estimators import ESTIMATORS, ProductsRate
 from inertial.rate.names import LEADER
 from inertial.rate.sight import BLIND
 from inertial.rate.tachometer import SUFFIX
-from logs.cube_agreement import agreement
-from logs.cube_axes import axes_of, moving
+from logs.cube_axes import agreement, axes_of, moving
 from logs.cube_log import CubeLog, read_log
 from logs.cube_parts import Monitored, Part, cut, monitored
 from logs.cube_run import EstimatorRun, reference

@@ -12,7 +12,7 @@ from inertial.layouts.layout import GeometryError, Layout
 from inertial.rate.bound import IN_USE, rate_bound
 from inertial.rate.tachometer import SUFFIX
 from inertial.rotation import followed, level
-from logs.cube_agreement import Agreement
+from logs.cube_axes import Agreement
 from logs.cube_log import CubeLog
 from logs.cube_run import EstimatorRun, Reference
 

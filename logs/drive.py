@@ -22,6 +22,8 @@ from inertial.navigation.fix import Fix
 from inertial.navigation.navigation import NavigatorConfig
 from inertial.navigation.results import place_of
 from inertial.navigation.smoother import SMOOTHERS, smooth_drive
+from inertial.navigation.solution import WHEELS
+from inertial.navigation.standstill import AlignmentSettings
 from inertial.rotation import rotation_vector, to_matrix
 from logs.drive_log import DriveLog, DriveTruth, read_drive_log
 from logs.drive_result import SETTLED, Result, of_filter, of_smoother
@@ -55,6 +57,7 @@ def run_drive(
     filters: Sequence[str] | None = None,
     truth: Path | None = None,
     units_as_named: bool = False,
+    alignment: AlignmentSettings = AlignmentSettings(),
     plot: Path | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
@@ -74,12 +77,20 @@ def run_drive(
     tell(0.0, "reading")
     log = read_drive_log(folder, imu, gnss, truth, units_as_named)
     fed = [replace(fix, withheld=k % every != 0) for k, fix in enumerate(log.fixes)]
-    results = run_all(log, fed, names, lambda done, what: tell(0.05 + 0.6 * done, what))
+    config = NavigatorConfig(lever_arm_b=log.lever_arm_b, alignment=alignment)
+    said: list[str] = []
+    results = run_all(
+        log, fed, names, config, lambda done, what: tell(0.05 + 0.6 * done, what), said.append
+    )
     ends: dict[str, list[float | None]] = {name: [] for name in names}
     if outages:
         muted, windows = mute(fed, outages)
         without = run_all(
-            log, muted, names, lambda done, what: tell(0.65 + 0.3 * done, f"{what}, outages")
+            log,
+            muted,
+            names,
+            config,
+            lambda done, what: tell(0.65 + 0.3 * done, f"{what}, outages"),
         )
         ends = {name: outage_ends(without[name], windows) for name in names}
     scores = {
@@ -98,26 +109,49 @@ def run_drive(
     return {
         "filters": {name: scores[name] for name in names},
         "default": DEFAULT,
-        "notes": [*log.notes, *said_of(folder / imu, log.timing, False)],
+        "notes": [*log.notes, *said_of(folder / imu, log.timing, False), *said],
     }
 
 
 def run_all(
-    log: DriveLog, fixes: list[Fix], names: Sequence[str], tell: Progress
+    log: DriveLog,
+    fixes: list[Fix],
+    names: Sequence[str],
+    config: NavigatorConfig,
+    tell: Progress,
+    say: Callable[[str], None] = lambda note: None,
 ) -> dict[str, Result | None]:
-    """Every filter and smoother over the log; None for one that never came to navigate."""
-    config = NavigatorConfig(lever_arm_b=log.lever_arm_b)
+    """Every filter and smoother over the log; None for one that never came to navigate. `say` hears
+    why, how the others were aligned, and when they believed a car's wheels.
+    """
     forward = [name for name in names if name in FILTERS]
     out: dict[str, Result | None] = {}
-    runs = run_filters(log.imu, fixes, forward, config, progress=tell)
+    aligned_by = forward or [DEFAULT]  # smoothers start as the filters do
+    runs = run_filters(log.imu, fixes, aligned_by, config, progress=tell)
+    first = runs[aligned_by[0]]
+    if math.isfinite(first.began):
+        say(f"aligned at {first.began:.1f} s: {first.text}")
+    else:
+        say(f"not aligned, so nothing navigates: {first.text}{_usable(fixes, config)}")
+    for name in forward:
+        for t, wheels in runs[name].wheels:
+            say(f"{name}: from {t:.1f} s {WHEELS[wheels]}")
     for name in names:
-        if name in runs:
+        if name in forward:
             out[name] = of_filter(runs[name]) if math.isfinite(runs[name].began) else None
         else:
             tell(len(forward) / len(names), name)
             smoothed = smooth_drive(log.imu, fixes, name, config)
             out[name] = None if smoothed is None else of_smoother(smoothed)
     return out
+
+
+def _usable(fixes: list[Fix], config: NavigatorConfig) -> str:
+    """What is to be said of the fixes where they led to no start."""
+    usable = [fix for fix in fixes if not fix.withheld and not config.fix.objection(fix)]
+    if len(usable) < len(fixes):
+        return f"; {len(usable)} of {len(fixes)} fixes can be used for it"
+    return "" if all(fix.v_n is not None for fix in usable) else "; the fixes have no velocity"
 
 
 def mute(

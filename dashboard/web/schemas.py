@@ -134,7 +134,11 @@ def device_out(device: Device, stale_s: float) -> DeviceOut:
     ]
     estimators = [
         EstimatorOut(
-            name=name, state=s.state, message=s.message, us_per_sample=s.us_per_sample, gaps=s.gaps
+            name=text.plain(name),
+            state=text.plain(s.state),
+            message=text.plain(s.message),
+            us_per_sample=s.us_per_sample,
+            gaps=s.gaps,
         )
         for name, s in states
     ]
@@ -146,8 +150,8 @@ def device_out(device: Device, stale_s: float) -> DeviceOut:
         age_s=age_s,
         stale=stale,
         connected=link.connected and not stale,
-        port=link.port,
-        message=link.message if heard else "no link status yet",
+        port=text.plain(link.port),
+        message=text.plain(link.message) if heard else "no link status yet",
         sample_rate_hz=link.sample_rate_hz,
         latency_p99_s=link.latency_p99_s,
         clock_skew_ppm=link.clock_skew_ppm,
@@ -156,8 +160,8 @@ def device_out(device: Device, stale_s: float) -> DeviceOut:
         bad_chunks=link.bad_chunks,
         reconnects=link.reconnects,
         reboots=link.reboots,
-        firmware=board.firmware,
-        uid=board.uid,
+        firmware=text.plain(board.firmware),
+        uid=text.plain(board.uid),
         axes=board.axes,
         estimators=estimators,
     )

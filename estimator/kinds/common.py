@@ -7,7 +7,18 @@ from estimator.cost import Cost
 from estimator.orders.mute import MuteDesk
 from estimator.settings import EstimatorSettings
 from estimator.stream import Stream
+from inertial.navigation.navigation import NavigatorConfig
+from inertial.navigation.standstill import AlignmentSettings
 from messages.contract import gyrofree_pb2 as pb
+
+
+def navigator_config(settings: EstimatorSettings, device: str) -> NavigatorConfig:
+    """What the navigation filters of a device are told of its vehicle."""
+    vehicle = settings.vehicle_of(device)
+    alignment = AlignmentSettings(
+        standstill=vehicle.align_standstill_s, course_speed=vehicle.align_speed_mps
+    )
+    return NavigatorConfig(lever_arm_b=vehicle.lever_arm_b_m, alignment=alignment)
 
 
 class Common:

@@ -17,14 +17,13 @@ from estimator.convert.status import rate_state
 from estimator.devices.gyro_free import GyroFreeNavigation
 from estimator.devices.navigation import NavBoard
 from estimator.devices.rate import RateBoard, RateOutput, WrongAxes
-from estimator.kinds.common import Common
+from estimator.kinds.common import Common, navigator_config
 from estimator.kinds.navigation import navigated
 from estimator.orders.calibration import CalibrationDesk
 from estimator.output import Output
 from estimator.rate_messages import BoardMessages, rate_batch
 from estimator.stream import every
 from inertial.calibration.card import CardError
-from inertial.navigation.navigation import NavigatorConfig
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import AXES, CALIBRATION, ESTIMATOR, POSE, RATE
 
@@ -80,7 +79,7 @@ class Cube:
             return
         self._gyro_free = GyroFreeNavigation(
             self._device,
-            NavigatorConfig(lever_arm_b=s.vehicle_of(self._device).lever_arm_b_m),
+            navigator_config(s, self._device),
             s.gyro_free_navigation,
             s.nav_limit_hz,
             s.believed_rate,

@@ -7,10 +7,9 @@ Out: NavSolution, pose, Innovation, EstimatorStatus (kinds/navigation.py).
 
 from estimator.convert.samples import Array, Samples
 from estimator.devices.navigation import NavBoard
-from estimator.kinds.common import Common
+from estimator.kinds.common import Common, navigator_config
 from estimator.kinds.navigation import Batch, navigated
 from estimator.output import Output
-from inertial.navigation.navigation import NavigatorConfig
 
 
 class Vehicle:
@@ -18,7 +17,7 @@ class Vehicle:
 
     def __init__(self, device: str, common: Common) -> None:
         settings = common.settings
-        config = NavigatorConfig(lever_arm_b=settings.vehicle_of(device).lever_arm_b_m)
+        config = navigator_config(settings, device)
         board = NavBoard(device, config, settings.navigators, settings.nav_limit_hz)
         self.board = common.mutes.attend(device, board)
         self._common = common

@@ -83,6 +83,13 @@ def run(
     truth: Annotated[
         Path | None, typer.Option(help="Drives: CSV of the true attitude and position.")
     ] = None,
+    align_speed: Annotated[
+        float,
+        typer.Option(min=0.5, max=100.0, help="Drives: m/s above which the course is the heading."),
+    ] = 4.0,
+    align_standstill: Annotated[
+        float, typer.Option(min=1.0, max=600.0, help="Drives: s of rest that level the unit.")
+    ] = 10.0,
     units_as_named: UnitsAsNamed = False,
     plot: Plot = None,
     as_json: AsJson = False,
@@ -104,6 +111,7 @@ def run(
                     log, filters=names, plot=plot, units_as_named=units_as_named, progress=progress
                 )
             elif log.is_dir():
+                from inertial.navigation.standstill import AlignmentSettings
                 from logs.drive import run_drive
 
                 result = run_drive(
@@ -115,6 +123,9 @@ def run(
                     filters=names,
                     truth=truth,
                     units_as_named=units_as_named,
+                    alignment=AlignmentSettings(
+                        standstill=align_standstill, course_speed=align_speed
+                    ),
                     plot=plot,
                     progress=progress,
                 )

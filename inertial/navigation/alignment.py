@@ -21,6 +21,8 @@ from inertial.rotation import euler_angles, euler_matrix, roll_pitch
 
 Array = NDArray[np.float64]
 
+UNTESTED = 3.0  # factor on the sigma of a course that nothing felt confirms
+
 
 @dataclass(frozen=True)
 class Start:
@@ -59,8 +61,12 @@ class Alignment:
         self._C_still = np.eye(3)  # C at the last standstill
         self._f_still = self.mean_f  # m/s^2, what was felt there
         self._moving_since: float | None = None
+        self._fast_since: float | None = None  # s, above course_speed
+        self._resumed = False  # the heading was known before samples went missing
         self._sigma_v = 0.0  # m/s, level, of the newest velocity
+        self._speed = 0.0  # m/s, likewise
         self._now = 0.0  # s, of it
+        self._felt_at = -math.inf  # s, when the felt heading was looked for last
         self._felt_yaw = math.pi  # rad, sigma of the heading felt in motion
         self._t: float | None = None
         self._standstill = Standstill(settings)
@@ -82,7 +88,7 @@ class Alignment:
         if told is not None:
             self.mean_f, self.gyro_bias = told
             self.C = euler_matrix(*roll_pitch(self.mean_f), euler_angles(self.C)[2])
-            self.levelled = True
+            self.levelled, self._resumed = True, False
             self._C_still, self._f_still = self.C, self.mean_f
             self._window.clear()
 
@@ -103,6 +109,7 @@ class Alignment:
         self._C_still, self._f_still = np.eye(3), np.array([0.0, 0.0, -GRAVITY])  # as if level
         self._interrupt("samples were missing")
         self._forget()
+        self._resumed = True
         self._t = None
 
     def speed(self, speed: float) -> None:
@@ -121,7 +128,11 @@ class Alignment:
             self._moving_since = None
         elif self._moving_since is None:
             self._moving_since = t
-        self._now = t
+        self._now, self._speed = t, speed
+        if speed < self.settings.course_speed:
+            self._fast_since = None
+        elif self._fast_since is None:
+            self._fast_since = t
         if not self.settings.in_motion:
             return
         self._felt.fix(t, v_n, sigma_v)
@@ -152,6 +163,10 @@ class Alignment:
         """
         if self._moving_since is None or self._felt.first == math.inf:
             return None
+        slow = self._speed < self.settings.course_speed
+        if slow and self._now < self._felt_at + self.settings.look:
+            return None  # a look costs as much as seconds of navigation
+        self._felt_at = self._now
         level = None
         if self.levelled:
             if turned_back is None:
@@ -194,8 +209,15 @@ class Alignment:
                     felt, f"; the course is {math.degrees(apart):.0f} deg off it: no car's"
                 )
         how = "levelled at standstill, heading from the course"
-        if felt is None and s.in_motion:
-            how += ", not tested yet"
+        if felt is None and s.in_motion and not self._resumed:
+            if self._fast_since is not None and self._now - self._fast_since < s.patience:
+                self._way = (
+                    "level; the course is to be the heading, and what is felt does not tell yet"
+                )
+                return None
+            wide = UNTESTED * sigma
+            how += f", which nothing has tested: believed to {math.degrees(wide):.0f} deg"
+            return Start(C_nb, self.gyro_bias, np.zeros(3), None, how, sigma_yaw=wide)
         noisy = self._sigma_v / speed > 0.5 * s.sigma_course
         return Start(
             C_nb, self.gyro_bias, np.zeros(3), None, how, sigma_yaw=sigma if noisy else None

@@ -22,6 +22,7 @@ from inertial.navigation.drag import DragWatch
 from inertial.navigation.filters import FilterConfig, filter_of
 from inertial.navigation.fix import Fix, core_fix
 from inertial.navigation.navigation import NavigatorConfig
+from inertial.navigation.solution import Wheels
 from inertial.navigation.start import Startup, first_leg
 
 Array = NDArray[np.float64]
@@ -40,6 +41,7 @@ class FilterRun:
     seconds: float  # CPU time of mechanisation, covariance and updates
     epochs: int  # samples in that time
     leg: Any  # the core's Leg at the end; None when it never began
+    text: str = ""  # for people: how it was aligned, or what the alignment still waits for
 
     @property
     def t(self) -> Array:
@@ -60,6 +62,14 @@ class FilterRun:
     def withheld(self) -> NDArray[np.bool_]:
         """Fixes that it was not given, (k,)."""
         return self.status == results.WITHHELD
+
+    @property
+    def wheels(self) -> list[tuple[float, Wheels]]:
+        """When it began or ceased to believe a car's wheels, s; empty where it never did."""
+        return [
+            (self.fixes[k].t, Wheels(self.rows["wheels"][k]))
+            for k in np.flatnonzero(self.rows["switched"])
+        ]
 
     @property
     def innovation(self) -> Array:
@@ -179,6 +189,7 @@ class Drive:
         # first samples after one
         self.gaps = np.flatnonzero(np.diff(self.t) > config.longest_gap) + 1
         self._first: Found | None = None
+        self.text = ""  # for people: what the alignment of the first start said last
 
     def run(
         self, name: str, chosen: FilterConfig, begin: Callable[[Start], Start] | None
@@ -206,7 +217,7 @@ class Drive:
             found.startup.history = core.Live()
             found.startup.after_gap(leg.x)
             found = self._find(found.startup, end, max(found.next_fix, last))
-        return FilterRun(name, used, np.concatenate(rows), began, seconds, epochs, leg)
+        return FilterRun(name, used, np.concatenate(rows), began, seconds, epochs, leg, self.text)
 
     def stretch(self, found: Found) -> tuple[int, int, int]:
         """First sample after a start, first one after the gap that ends it, and first fix that is
@@ -223,6 +234,7 @@ class Drive:
         if self._first is None:
             startup = Startup(self.config.alignment, core.Live())
             self._first = self._find(startup, 0, 0)
+            self.text = startup.align.text if self._first is None else self._first.start.how
         return copy.deepcopy(self._first)
 
     def _find(self, startup: Startup, k: int, j: int) -> Found | None:

@@ -38,6 +38,8 @@ class ImuNoise:
     tau: float = 300.0  # s, of both
     # share of the readings' shaking from sample to sample that is noise to navigation (E-51)
     shake: float = 1.0
+    turn: float = 0.007  # of 1, scale and cross-axis errors of the gyros (E-59)
+    turn_length: float = 5.0  # s, over which a turn keeps its direction
     position: float = 1e-3  # m/sqrt(s), keeps the position covariance from closing completely
 
     def density(self) -> Array:
@@ -68,5 +70,6 @@ def make_model(noise: ImuNoise, scale: bool = False, lag: bool = False, car: boo
         density=np.concatenate([noise.density(), extra]),
         decay=np.concatenate([noise.decay(), extra]),
         shake=noise.shake,
+        turn=noise.turn**2 * noise.turn_length,
         **places,
     )

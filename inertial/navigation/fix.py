@@ -71,6 +71,12 @@ class Fix:
         """Whether the receiver gives a height at all."""
         return math.isfinite(self.height)
 
+    def beside(self, datum: float | None) -> "Fix":
+        """Without its height where that counts from the sea and those used so far (their datum, m;
+        None: there were none) from the ellipsoid: the two are tens of metres apart.
+        """
+        return replace(self, height=math.nan) if self.datum and datum == 0.0 else self
+
     def filled(self) -> "Fix":
         """With numbers, and sigmas that say that they mean nothing, for what is unknown: for those
         who cannot leave a component out.
@@ -102,6 +108,9 @@ class FixSettings:
     )  # m/s: a receiver's velocity lags in turns
     floor_yaw: float = 0.005  # rad, of a heading by two antennas
     timing: float = 0.002  # s, of the fix's time against the samples' clock: counts with the speed
+    wander: float = 0.75  # of its sigma wanders slowly and does not average out (E-58)
+    lag: float = 0.05  # s, its position is older than it says, where a filter does not estimate it
+    adapt: float = 0.05  # of the newest fix in what is known of its noise (E-57)
     false_alarm: float = (
         1e-6  # chance that the NIS gate refuses a good fix of a filter whose model is right
     )

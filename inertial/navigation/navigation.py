@@ -79,8 +79,11 @@ class Navigator:
         return self._live.head.x
 
     def covariance(self) -> Array:
-        """(n, n) at the newest sample."""
-        return self._live.head.covariance(self._live.model)
+        """(n, n) at the newest sample, with what wanders in the receiver's position (E-58)."""
+        head = self._live.head
+        P = head.covariance(self._live.model)
+        P[DP, DP] += np.diag(head.receiver.wander)
+        return P
 
     @property
     def navigating(self) -> bool:
@@ -170,7 +173,7 @@ class Navigator:
         reason = self.config.fix.objection(fix)
         if reason:
             return self._refuse(nothing_compared(fix), "rejected", reason)
-        fix = self.watch.take(fix)
+        fix = self.watch.take(fix.beside(self._datum if self._measured_height else None))
         self.counts["dragged"] += fix.drag > 0.0
         if self._origin is None:
             self._origin = (fix.latitude, fix.longitude, fix.height)

@@ -40,6 +40,7 @@ class AlignmentSettings:
     sigma_course: float = math.radians(4.0)  # rad, of the course against x_b in a car
     # s in motion below course_speed, after which the heading is looked for without the course
     patience: float = 15.0
+    look: float = 1.0  # s between two looks for it
     disagree: float = 3.0  # sigmas by which the felt heading may differ from the course
     longest_gap: float = 0.3  # s without samples, after which the standstill starts again
     in_motion: bool = True  # a vehicle that never stands is aligned under way

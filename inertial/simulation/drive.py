@@ -56,6 +56,7 @@ class Sensors:
     )  # m, Gauss-Markov: ionosphere, multipath
     fix_tau: float = 60.0  # s, of the wander
     fix_velocity: tuple[float, float, float] = (0.1, 0.1, 0.2)  # m/s, white
+    fix_hz: int = 1  # fixes a second
     latency: float = 0.05  # s: a fix tells where the car was that long before its time
     outliers: float = 0.0  # share of fixes with a gross error
     bursts: int = 0  # spells of 3 to 6 s with one gross error
@@ -232,7 +233,7 @@ def _shake(draw: np.random.Generator, speed: Array, moving: float, still: float)
 def _fixes(
     draw: np.random.Generator, truth: Truth, s: Sensors, lever: Array
 ) -> tuple[list[Fix], tuple[int, ...]]:
-    rows = np.arange(RATE, len(truth.t), RATE)  # every second from 1 s
+    rows = np.arange(RATE, len(truth.t), RATE // s.fix_hz)  # from 1 s
     error, gross = fix_errors(draw, len(rows), s)
     then = rows - round(s.latency * RATE)
     arm_n = truth.C_nb[then] @ lever
@@ -263,11 +264,11 @@ def _fixes(
 
 
 def fix_errors(draw: np.random.Generator, n: int, s: Sensors) -> tuple[Array, tuple[int, ...]]:
-    """Errors (n, 6) of consecutive fixes, 1 s apart: N E U m, v_n m/s; and which have a gross
+    """Errors (n, 6) of consecutive fixes: N E U m, v_n m/s; and which have a gross
     one.
     """
     position = (
-        gauss_markov(draw, n, np.array(s.fix_wander), s.fix_tau)
+        gauss_markov(draw, n, np.array(s.fix_wander), s.fix_tau * s.fix_hz)
         + draw.normal(size=(n, 3)) * s.fix_white
     )
     error = np.column_stack([position, draw.normal(size=(n, 3)) * s.fix_velocity])

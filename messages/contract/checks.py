@@ -37,6 +37,8 @@ KINDS = (  # what a refusal can be counted as
     "many",  # more devices or streams than there is room for
     "time",  # far from that of all others
     "answer",  # of a publisher: not what was asked for
+    "stale",  # of a publisher whose place another has taken
+    "repeated",  # it has come before, byte for byte
     "failure",  # we could not take it: a fault of ours
 )
 FLOATS = (FieldDescriptor.CPPTYPE_DOUBLE, FieldDescriptor.CPPTYPE_FLOAT)

@@ -139,7 +139,7 @@ def test_a_filter_is_led_astray_less_far(town, monkeypatch: pytest.MonkeyPatch) 
         )
         return math.hypot(north, east)
 
-    assert end(blind) > 50.0 and end(watched) < 0.6 * end(blind)
+    assert end(blind) > 10.0 and end(watched) < 0.6 * end(blind)
 
 
 def test_live_says_so_in_the_innovation_and_is_the_batch(town) -> None:

@@ -12,8 +12,8 @@ from support.estimator_drive import DT, drive, exact, fix_at
 
 from inertial.earth import ned_between
 from inertial.navigation.error_model import ImuNoise
-from inertial.navigation.fix import Fix
-from inertial.navigation.navigation import NAVIGATORS, Mode, Navigator
+from inertial.navigation.fix import Fix, FixSettings
+from inertial.navigation.navigation import NAVIGATORS, Mode, Navigator, NavigatorConfig
 from inertial.rotation import euler_angles, rotation_vector
 from tests.inertial.twins.strapdown import State
 
@@ -162,6 +162,22 @@ def test_sea_level_is_no_better_known_than_the_geoid(perfect: tuple[list[State],
     assert s.datum == 110.0 and abs(s.height + 47.0 - truth[-1].height) < 0.1
 
 
+def test_a_receiver_that_loses_its_geoid_does_not_lose_its_fixes(
+    perfect: tuple[list[State], Array],
+) -> None:
+    truth, imu = perfect
+    fixes = [
+        replace(f, height=f.height - 47.0, datum=110.0) if f.t > 50.0 else f
+        for f in drive(truth, imu).fixes
+    ]
+    navigator = Navigator()
+    play(navigator, imu, fixes)
+    s = navigator.solution()
+    assert navigator.counts["rejected"] == 0 and s.datum == 0.0
+    assert np.abs(s.p_ned - truth_ned(truth[-1], s.origin))[:2].max() < 0.1
+    assert abs(s.height - truth[-1].height) < 3.0 * s.sigma[8] + 1.0
+
+
 def test_a_gap_asks_for_the_heading_again(
     perfect: tuple[list[State], Array], caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -179,7 +195,8 @@ def test_nees_keeps_its_band() -> None:
     """Ten drives with noise as the filter models it: mean NEES of attitude, velocity and position
     near 9.
     """
-    noise, sigma_p, sigma_v, root = ImuNoise(), 0.3, 0.15, math.sqrt(DT)
+    noise, sigma_p, sigma_v, root = ImuNoise(turn=0.0), 0.3, 0.15, math.sqrt(DT)
+    config = NavigatorConfig(imu=noise, fix=FixSettings(wander=0.0, lag=0.0))
     truth, imu = exact(52.0, still=STILL)
     end, moving = truth[-1], imu[:, :1] > STILL
     nees = []
@@ -203,7 +220,7 @@ def test_nees_keeps_its_band() -> None:
             )
             for k in range(0, len(truth) - 100, 100)
         ]
-        navigator = Navigator()
+        navigator = Navigator(config)
         play(navigator, noisy, fixes)
         x = navigator.nominal
         psi = rotation_vector(end.C_nb @ x.C_nb.T)

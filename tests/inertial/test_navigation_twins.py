@@ -13,7 +13,7 @@ from inertial.navigation.filters import FILTERS, Constraints
 from tests.inertial.test_ins import run
 from tests.inertial.twins import filter as twin
 
-NOISE = ImuNoise(shake=0.0)
+NOISE = ImuNoise(shake=0.0, turn=0.0)
 
 
 def test_phi_is_that_of_the_differential_equation() -> None:

@@ -6,7 +6,7 @@ from support.array_log import calibrate_at_rest, read_array
 
 from inertial.layouts.catalogue import find
 from inertial.simulation.table import TableTest
-from logs.cube_agreement import agreement
+from logs.cube_axes import agreement
 
 
 def readings(layout, extra=0.0):

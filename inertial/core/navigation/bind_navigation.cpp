@@ -61,6 +61,7 @@ void bind_structs(nb::module_& m) {
   bind_fields<Interval>(m, "Interval", "integrals over the open interval");
   bind_fields<LocalEarth>(m, "LocalEarth", "the Earth's terms at the start of an interval");
   bind_fields<Shake>(m, "Shake", "noise that the readings show by themselves");
+  bind_fields<Receiver>(m, "Receiver", "what the fixes show of their own noise");
   bind_fields<Fix>(m, "Fix", "a fix as the filters take it");
   bind_fields<Measurement>(m, "Measurement", "y, H, R");
   bind_fields<Rules>(m, "Rules", "what a car's wheels say, and when");

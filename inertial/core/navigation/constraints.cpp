@@ -11,6 +11,7 @@ constexpr int FORWARD = 0, SIDE = 1, BELOW = 2;  // of the body
 constexpr int SIDEWAYS = 0, VERTICAL = 1, WHEEL_ROWS = 2;
 constexpr int ZERO_V = 0, ZERO_W = 3, STILL_ROWS = 6;
 
+constexpr double MOST_MOVED = 3.0;     // then it hovers or drifts: quiet, but no standstill
 constexpr double STRAIN_SHARE = 0.05;  // of the newest look in the mean: 10 s at two looks a second
 constexpr double MOST_STRAIN = 25.0;   // of one look
 constexpr int LEAST_TICKS = 8;         // of them, to judge a standstill
@@ -90,7 +91,7 @@ Measurement wheels(const Leg& leg, const Model& model, const Rules& rules) {
 
 bool standing(const Leg& leg, const Rules& rules) {
   const Vector3& v = leg.x.v_n;
-  if (std::sqrt(v[NORTH] * v[NORTH] + v[EAST] * v[EAST]) > rules.still_speed) return false;
+  if (norm_of(v) > rules.still_speed) return false;  // a steady climb is quiet too
   Spread f, omega;
   int count = 0;
   for (int k = TICKS - TICKS_A_SECOND; k < TICKS; ++k) {
@@ -107,13 +108,14 @@ bool standing(const Leg& leg, const Rules& rules) {
 
 Measurement constraint(const Leg& leg, const Model& model, const Rules& rules) {
   if (leg.ticks.back().length <= 0.0) return {};
-  if (standing(leg, rules)) return standstill(leg, model, rules);
+  if (standing(leg, rules)) return leg.moved > MOST_MOVED ? Measurement() : standstill(leg, model, rules);
   return model.has_car() && leg.wheels ? wheels(leg, model, rules) : Measurement();
 }
 
 bool constrain(Leg& leg, const Model& model, const Rules& rules, StateVector& error) {
   leg.since_constraint = 0.0;
   Measurement z = constraint(leg, model, rules);
+  leg.quiet = leg.quiet || standing(leg, rules);
   if (z.rows() == 0) return false;
   close(leg, model);
   leg.since_constraint = 0.0;

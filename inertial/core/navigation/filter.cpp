@@ -38,6 +38,59 @@ void answer(FixResult& out, const Leg& leg, const Covariance& P, Status status) 
   out.status = status;
   out.x = leg.x;
   out.P = P.topLeftCorner<MOVING, MOVING>();
+  for (int i = 0; i < 3; ++i) out.P(DP + i, DP + i) += leg.receiver.wander(i);
+}
+
+// R by what the fixes before have shown (E-57).
+void raise(Measurement& z, const Receiver& receiver) {
+  for (const auto& [group, first, size] : blocks_of(z.rows())) {
+    if (group == POSITION) z.R.block(first, first, size, size) *= receiver.position;
+    if (group == VELOCITY) z.R.block(first, first, size, size) *= receiver.velocity;
+  }
+}
+
+constexpr double MOST_NEWS = 4.0;     // NIS per row that one fix may show: a gross one is no noise
+constexpr double MOST_NOISE = 1000.0;
+
+void follow(double& noise, double nis_per_row, double adapt) {
+  const double news = std::min(nis_per_row, MOST_NEWS) - 1.0;
+  noise = std::clamp(noise * (1.0 + adapt * news), 1.0, MOST_NOISE);
+}
+
+// What this fix shows of the receiver's noise: by S before it is used.
+void learn(Receiver& receiver, const Measurement& z, const RowMatrix& S, double adapt) {
+  for (const auto& [group, first, size] : blocks_of(z.rows())) {
+    int said = 0;
+    for (int r = first; r < first + size; ++r) said += is_silent(z, r) ? 0 : 1;
+    if (said == 0 || group == HEADING) continue;
+    const double nis = whiten(S.block(first, first, size, size), z.y.segment(first, size)).nis;
+    if (nis >= 0.0) follow(group == POSITION ? receiver.position : receiver.velocity, nis / said, adapt);
+  }
+}
+
+// Quiet readings are a standstill only where the fixes' velocities say so too (E-60).
+void check_standstill(Leg& leg, const Fix& fix) {
+  constexpr double SHARE = 0.2, MOST = 25.0;
+  if (leg.quiet && fix.has_v) {
+    double sum = 0.0;
+    int known = 0;
+    for (int i = 0; i < 3; ++i) {
+      if (!std::isfinite(fix.v_n(i))) continue;
+      ++known;
+      sum += fix.v_n(i) * fix.v_n(i) / (leg.receiver.velocity * fix.sigma_v(i) * fix.sigma_v(i));
+    }
+    if (known > 0) leg.moved += SHARE * (std::min(sum / known, MOST) - leg.moved);
+  }
+  leg.quiet = false;
+}
+
+// The error that all its fixes have in common for a while (E-58).
+void remember_wander(Leg& leg, const Model& model, const Settings& s, const Fix& fix) {
+  const double lag = model.has_lag() ? 0.0 : s.lag;
+  for (int i = 0; i < 3; ++i) {
+    const double slow = s.wander * fix.sigma_p(i), late = lag * leg.x.v_n(i);
+    leg.receiver.wander(i) = leg.receiver.position * slow * slow + late * late;
+  }
 }
 
 // Whether to refuse the fix. A robust filter that doubts fix after fix is as lost as one that refuses
@@ -126,6 +179,7 @@ FixResult take(Leg& leg, const Model& model, const Settings& s, Memory& memory, 
   close(leg, model);
   Covariance P = predicted(leg.P, leg.Phi, leg.Q, s.fading);
   Measurement z = chosen(compared(leg, model, rate_b, s.lever_b, fix), fix);
+  raise(z, leg.receiver);
   Innovation innovation = innovate(P, z);
   Whitened white = whiten(innovation.S, z.y);
   FixResult out;
@@ -133,6 +187,8 @@ FixResult take(Leg& leg, const Model& model, const Settings& s, Memory& memory, 
   answer(out, leg, P, Status::WITHHELD);
   if (fix.withheld) return out;
 
+  learn(leg.receiver, z, innovation.S, s.adapt);
+  check_standstill(leg, fix);
   const bool weighs = s.huber < FOREVER && s.window == Horizon::NONE;
   const Weights weight = weighs ? huber_weights(innovation.S, z.y, s.huber) : Weights(Weights::Ones());
   const Status status = judge(memory, s, white.nis, said_rows(z), weight);
@@ -155,6 +211,7 @@ FixResult take(Leg& leg, const Model& model, const Settings& s, Memory& memory, 
   }
   leg.P = P;
   correct(leg, model, memory.estimate);
+  remember_wander(leg, model, s, fix);
   out.left = left_after(leg, model, s, fix, rate_b);
   answer(out, leg, P, status);
   return out;
@@ -194,7 +251,10 @@ FixResult take_one(Leg& leg, const Model& model, const Settings& settings, Memor
   Leg trial = leg;
   run_to(trial, model, settings.rules, samples, k, std::min(k + 1, stop), fix.t);
   FixResult out = take(trial, model, settings, memory, fix, samples[std::min(k, stop - 1)].omega_b);
-  if (was_used(out.status)) leg = trial;
+  if (was_used(out.status))
+    leg = trial;
+  else
+    leg.receiver = trial.receiver, leg.moved = trial.moved, leg.quiet = trial.quiet;
   return out;
 }
 

@@ -35,6 +35,9 @@ struct Settings {
   int passes = 0;           // of reweighting in the robust horizon
   bool literal = false;     // fuzzy inputs as read, not conditioned
   FuzzyRules fuzzy;
+  double wander = 0.0;      // share of a receiver's sigma that wanders and does not average out (E-58)
+  double lag = 0.0;         // s, of a receiver's position where the filter does not estimate it
+  double adapt = 0.0;       // share of the newest fix in what is known of the receiver's noise (E-57)
   Rules rules;
   bool tries = false;       // wheels are believed only while the data agree
   TrialSettings trial;
@@ -45,7 +48,8 @@ struct Settings {
     v("gates", s.gates), v("readmit", s.readmit), v("fading", s.fading), v("huber", s.huber);
     v("low_weight", s.low_weight), v("window", s.window), v("horizon", s.horizon);
     v("arrival", s.arrival), v("kappa", s.kappa), v("passes", s.passes), v("literal", s.literal);
-    v("fuzzy", s.fuzzy), v("rules", s.rules), v("tries", s.tries), v("trial", s.trial);
+    v("fuzzy", s.fuzzy), v("wander", s.wander), v("lag", s.lag), v("adapt", s.adapt);
+    v("rules", s.rules), v("tries", s.tries), v("trial", s.trial);
     v("lever_b", s.lever_b);
   }
 };

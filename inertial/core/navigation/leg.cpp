@@ -26,6 +26,10 @@ void add_half_noise(Covariance& Q, const Leg& leg, const Model& model) {
   const Matrix3 mean = leg.interval.U1 / leg.interval.length;
   Q.block<3, 3>(PSI, PSI) += spread(mean, half * model.shake * leg.shake.gyro);
   Q.block<3, 3>(DV, DV) += spread(mean, half * model.shake * leg.shake.accel);
+  // a turn that is told wrongly by its scale and cross-axis errors
+  const Vector3 omega_b = leg.interval.omega_b / leg.interval.length - leg.x.bias_gyro;
+  const double turn = half * model.turn * square_of(omega_b);
+  for (int i = PSI; i < PSI + 3; ++i) Q(i, i) += turn;
   static_assert(SHAKEN <= MOVING);
 }
 

@@ -12,6 +12,7 @@ struct Event {
   Kept before, after;     // covariance before and after what was measured; `after` becomes the smoothed
   StateVector applied;    // the correction
   Nominal x;              // after it; becomes the smoothed
+  Vector3 wander;         // m^2, of the receiver's position (E-58)
   StateVector error;      // left in the filter's solution
 
   Event(const Leg& leg, const Model& model)
@@ -20,6 +21,7 @@ struct Event {
         after(before),
         applied(StateVector::Zero(model.states)),
         x(leg.x),
+        wander(leg.receiver.wander),
         error(StateVector::Zero(model.states)) {}
 };
 
@@ -98,6 +100,7 @@ struct Forward {
     if (was_used(take(leg, model, settings, memory, fix, rate_b).status)) {
       event.applied = memory.estimate;
       event.x = leg.x;
+      event.wander = leg.receiver.wander;
     } else {  // a new leg begins all the same
       leg.P = event.before;
       leg.Phi.set_identity();
@@ -141,6 +144,7 @@ std::vector<Smoothed> smooth(Leg leg, const Model& model, const Settings& settin
     const Event& event = pass.events[at];
     const StateVector error = event.applied + event.error;
     out[j] = {z.y - product(z.H, error), event.x, event.after.topLeftCorner<MOVING, MOVING>()};
+    for (int i = 0; i < 3; ++i) out[j].P(DP + i, DP + i) += event.wander(i);
   }
   return out;
 }

@@ -83,6 +83,7 @@ struct Model {
   StateVector density = StateVector::Zero(CORE);   // diagonal of G (E-29), unit^2/s
   StateVector decay = StateVector::Zero(CORE);     // 1/s, of what only decays
   double shake = 1.0;  // share of the readings' shaking that is noise to navigation (E-51)
+  double turn = 0.0;   // s, turns' share that gyros tell wrongly, squared, by the length of a turn (E-59)
 
   bool has_scale() const { return scale_accel != ABSENT; }
   bool has_lag() const { return lag_position != ABSENT; }
@@ -93,7 +94,7 @@ struct Model {
     v("states", s.states), v("scale_accel", s.scale_accel), v("scale_gyro", s.scale_gyro);
     v("lag_position", s.lag_position), v("lag_velocity", s.lag_velocity);
     v("mount_pitch", s.mount_pitch), v("mount_yaw", s.mount_yaw), v("axle", s.axle);
-    v("density", s.density), v("decay", s.decay), v("shake", s.shake);
+    v("density", s.density), v("decay", s.decay), v("shake", s.shake), v("turn", s.turn);
   }
 };
 
@@ -197,6 +198,18 @@ struct Shake {
   }
 };
 
+// What the fixes show of their own noise, and what no filter of white noise can know (E-57, E-58).
+struct Receiver {
+  double position = 1.0;              // its position's variance over what it says, 1 or more
+  double velocity = 1.0;              // likewise
+  Vector3 wander = Vector3::Zero();   // m^2, of the part of its position's error that wanders slowly
+
+  template <class Self, class Visitor>
+  static void visit(Self& s, Visitor& v) {
+    v("position", s.position), v("velocity", s.velocity), v("wander", s.wander);
+  }
+};
+
 constexpr int TICKS = 16;  // remembered: 1.6 s
 constexpr int TICKS_A_SECOND = 10;
 constexpr double SAME_TIME_S = 1e-9;  // nearer than this two times are one
@@ -208,6 +221,8 @@ struct Leg {
   double since_constraint = 0.0;  // s
   bool wheels = true;           // whether the wheels' constraint, where the model has it, is applied
   double strain = 0.0;          // NIS per row of the wheels' constraint, mean over the last looks (E-56)
+  bool quiet = false;           // since the last fix the readings looked like a standstill
+  double moved = 0.0;           // squared velocity of fixes then over its variance, a mean (E-60)
   Covariance P;                 // just after the last measurement
   Transition Phi;               // since then, closed intervals
   Covariance Q;
@@ -215,6 +230,7 @@ struct Leg {
   Interval interval;
   LocalEarth earth;
   Shake shake;
+  Receiver receiver;
   std::array<Tick, TICKS> ticks{};  // newest last
 
   explicit Leg(int n = CORE)
@@ -224,9 +240,9 @@ struct Leg {
   template <class Self, class Visitor>
   static void visit(Self& s, Visitor& v) {
     v("x", s.x), v("time", s.time), v("since_constraint", s.since_constraint);
-    v("wheels", s.wheels), v("strain", s.strain);
+    v("wheels", s.wheels), v("strain", s.strain), v("quiet", s.quiet), v("moved", s.moved);
     v("P", s.P), v("Phi", s.Phi), v("Q", s.Q), v("tick", s.tick), v("interval", s.interval);
-    v("earth", s.earth), v("shake", s.shake), v("ticks", s.ticks);
+    v("earth", s.earth), v("shake", s.shake), v("receiver", s.receiver), v("ticks", s.ticks);
   }
 };
 

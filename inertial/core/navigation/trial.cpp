@@ -12,7 +12,8 @@ constexpr int COMPARED = DP;         // attitude and velocity
 constexpr double MOST_GAP_S = 2.0;   // between two fixes that counts as motion
 constexpr double MOST_SQUARE = 25.0; // of one look: it must not be remembered for ever
 
-double level_speed(const Vector3& v) { return std::sqrt(v[NORTH] * v[NORTH] + v[EAST] * v[EAST]); }
+// As the wheels' constraint sees it: below a speed, and backwards, it is silent.
+double forward_speed(const Nominal& x) { return dot(Vector3(x.C_nb.col(0)), x.v_n); }
 
 // The filter with wheels begins again from the one without.
 void begin_again(Trial& trial, const Leg& without, double t) {
@@ -82,7 +83,7 @@ bool judge_wheels(Trial& trial, Leg& leg, const TrialSettings& s, double t, cons
   if (lost || t - trial.last > s.outage) trial.settled = t + s.recovery;
   const double dt = std::min(t - trial.last, MOST_GAP_S);
   trial.last = t;
-  if (t >= trial.settled && level_speed(without.x.v_n) > s.least_speed) {
+  if (t >= trial.settled && forward_speed(without.x) > s.least_speed) {
     const double now = std::min(difference_of(with, without, s), MOST_SQUARE);
     trial.difference += std::min(1.0, dt / s.memory) * (now - trial.difference);
     agree(trial, without.x, trial.difference < s.agreed, dt);

@@ -26,7 +26,7 @@ struct TrialSettings {
   double heading = 0.0524;    // rad, sigma above which the filter without wheels cannot tell
   double floor_psi = 0.0035;  // rad, difference that says nothing: no model is better
   double floor_v = 0.05;      // m/s, likewise
-  double lost = 2.0;          // NIS per row above which the filter without wheels, if the other foresaw
+  double lost = 4.0;          // NIS per row above which the filter without wheels, if the other foresaw
                               // the fix better, is the one to blame: it drifts away without fixes
   double outage = 5.0;        // s without fixes, after which it must find its way again first
   double recovery = 20.0;     // s that it takes
