@@ -17,10 +17,9 @@ from inertial.layouts.catalogue import find
 from inertial.layouts.layout import GeometryError, Layout
 from inertial.plausible import doubt_of_gravity
 from inertial.rate import resolved
-from inertial.rate.axis_verdicts import leave_out
 from inertial.rate.batch import RateColumns
 from inertial.rate.beliefs import make
-from inertial.rate.estimators import ESTIMATORS, ProductsRate
+from inertial.rate.estimators import ESTIMATORS, ProductsRate, leave_out
 from inertial.rate.names import LEADER
 from inertial.rate.sight import BLIND
 from inertial.rate.tachometer import SUFFIX
@@ -237,7 +236,9 @@ def run_estimator(
         if part.missing:
             estimator.skip(part.missing)
         if part.mask != mask:
-            mask, refused = part.mask, leave_out(estimator, part.mask) or refused
+            mask = part.mask
+            if (error := leave_out(estimator, mask)) is not None:
+                refused = f"{name} knew nothing while axes were not good: {error}"
         for begin in range(part.begin, part.end, BLOCK):
             rows = slice(begin, min(begin + BLOCK, part.end))
             said.take(rows, estimator.feed(data.t_s[rows], f_axis[rows]))

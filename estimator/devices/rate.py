@@ -171,15 +171,20 @@ class RateBoard:
         """Tell the estimators when the axes they may use have changed; one that cannot do without
         says so itself.
         """
+        from inertial.rate.estimators import leave_out  # here: loads only where it is needed
+
         if mask == self._mask:
             return
-        from inertial.rate.axis_verdicts import leave_out  # here: loads only where it is needed
-
         names = [name for k, name in enumerate(self.wiring.axis_names) if mask >> k & 1]
         log.warning(
             "%s: axes not used: %s", self.device, ", ".join(names) or "none, all are good again"
         )
         self._mask = mask
         for estimator in self._estimators.values():
-            if refused := leave_out(estimator, mask):
-                log.warning("%s: %s", self.device, refused)
+            if (error := leave_out(estimator, mask)) is not None:
+                log.warning(
+                    "%s: %s knows nothing until axes are good again: %s",
+                    self.device,
+                    estimator.name,
+                    error,
+                )

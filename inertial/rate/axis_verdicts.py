@@ -1,12 +1,11 @@
 """What has been found of every axis of a board: faults named, axes left out and taken back."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.layouts.layout import RANK_TOLERANCE, GeometryError, Layout
+from inertial.layouts.layout import RANK_TOLERANCE, Layout
 from inertial.rate import axis_samples, parity
 from inertial.rate.axis_belief import Belief
 from inertial.rate.axis_fault import AxisState, Fault
@@ -20,17 +19,6 @@ def good_of(states: Mapping[str, str]) -> str:
     """How many axes are good and what the others are, for people; states by axis name."""
     bad = [f"{name} {state}" for name, state in states.items() if state != "good"]
     return ", ".join([f"{len(states) - len(bad)} of {len(states)} good", *bad])
-
-
-def leave_out(estimator: Any, mask: int) -> str:
-    """Tell a rate estimator which axes are not believed (bit k: axis k); why it goes on with those
-    it had, for people, where the rest would not do.
-    """
-    try:
-        estimator.exclude(mask)
-    except GeometryError as error:
-        return f"{estimator.name} goes on with the axes it had: {error}"
-    return ""
 
 
 class Verdicts:
