@@ -20,6 +20,7 @@ from estimator.worker import Worker
 from messages.bus import orders
 from messages.bus.fencing import Claim, Fence, claim, heard_of
 from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client
+from messages.clock import elapsed_ns
 from messages.contract.door import Door
 from messages.contract.topics import ESTIMATES, PIPELINE_INPUTS, REPLAY_SUFFIX
 from messages.history.answers import Asker, declare
@@ -196,7 +197,7 @@ def _on(worker: Worker, fence: Fence) -> Callable[[Any], None]:
                 worker.forget(gone)
             payload = sample.payload.to_bytes()
             worker.offer(
-                Arrival(address.topic, address.device, address.estimator, payload, time.time_ns())
+                Arrival(address.topic, address.device, address.estimator, payload, elapsed_ns())
             )
 
     return on_sample

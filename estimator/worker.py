@@ -17,6 +17,7 @@ from estimator.output import Output
 from estimator.pipeline import Pipeline
 from estimator.stream import worth_a_line
 from messages.bus import orders
+from messages.clock import elapsed_ns
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import Refusal
 from messages.contract.door import Door
@@ -82,6 +83,7 @@ class Worker:
         self.inbox = Inbox(BACKLOG, BACKLOG_BYTES)
         self._ready = 0  # messages that the mender has given on and the pipeline has not taken
         self._bad = 0
+        self._behind_s: dict[str, float] = {}  # by device: from arrival to its turn, newest
         self._save_at = time.monotonic() + SAVE_S
         self.failure: BaseException | None = None
 
@@ -178,6 +180,8 @@ class Worker:
         if message is None:
             return
         message.header.device = arrival.device
+        if arrival.at_ns and not arrival.late:
+            self._behind_s[arrival.device] = max(0, elapsed_ns() - arrival.at_ns) * 1e-9
         try:
             for output in self.pipeline.on(arrival.topic, message):
                 self._tell(output)
@@ -191,6 +195,8 @@ class Worker:
     def _tell(self, output: Output) -> None:
         if output.topic is ESTIMATOR:
             output.message.refused.update(self.door.of(output.device))
+            output.message.behind_s = self._behind_s.get(output.device, 0.0)
+            output.message.waiting = len(self.inbox)
         self._put(output)
 
     def _fail(self, device: str, what: str, error: Exception) -> None:
