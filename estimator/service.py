@@ -20,6 +20,7 @@ from estimator.worker import Worker
 from messages.bus import orders
 from messages.bus.fencing import Claim, Fence, claim, heard_of
 from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client
+from messages.clock import elapsed_ns
 from messages.contract.door import Door
 from messages.contract.topics import ESTIMATES, PIPELINE_INPUTS, REPLAY_SUFFIX
 from messages.history.answers import Asker, declare
@@ -30,6 +31,7 @@ from messages.history.spool import Spool
 log = logging.getLogger(__name__)
 
 LOOK_S = 0.2  # between two looks at what may end it
+GONE_S = 600.0  # a device silent for so long makes room where there is none left
 END_S = 3.0  # for what is queued when the service is to end
 
 
@@ -160,7 +162,7 @@ def _worker(
         put,
         lambda question: asker.ask(question, *question.stream, question.query),
         None if saved is None else lambda worker: saved.save(worker, publishers),
-        Door("estimator", most_devices=settings.max_devices),
+        Door("estimator", most_devices=settings.max_devices, gone_s=GONE_S),
     )
     if found is not None:
         for (device, name), (run_, last) in found[1].items():
@@ -191,9 +193,11 @@ def _on(worker: Worker, fence: Fence) -> Callable[[Any], None]:
             and worker.door.admit(key, address, len(sample.payload))
             and fence.admit(key, sample.attachment)
         ):
+            for gone in worker.door.gone():
+                worker.forget(gone)
             payload = sample.payload.to_bytes()
             worker.offer(
-                Arrival(address.topic, address.device, address.estimator, payload, time.time_ns())
+                Arrival(address.topic, address.device, address.estimator, payload, elapsed_ns())
             )
 
     return on_sample

@@ -49,6 +49,7 @@ class EstimatorOut(BaseModel):
     message: str
     us_per_sample: float
     gaps: int
+    behind_s: float = Field(description="from the arrival of samples to their estimates, s")
 
 
 class DeviceOut(BaseModel):
@@ -139,6 +140,7 @@ def device_out(device: Device, stale_s: float) -> DeviceOut:
             message=text.plain(s.message),
             us_per_sample=s.us_per_sample,
             gaps=s.gaps,
+            behind_s=s.behind_s,
         )
         for name, s in states
     ]

@@ -22,7 +22,7 @@ ROWS = 1024  # samples of one batch, so that the work for one message is bounded
 TEXT = 4000  # characters of a text without a rule
 BYTES = 1_000_000  # of a field of bytes without a rule
 ITEMS = 4096  # of a list without a rule
-ENTRIES = 1024  # of a map
+ENTRIES = 8192  # of a map
 NAMES = 1000  # sound ones that are remembered
 KINDS = (  # what a refusal can be counted as
     "bytes",  # no message of the type

@@ -69,6 +69,7 @@ class KeyCount(BaseModel):
     repeated: Count = 0  # the same header.sequence twice running
     unreadable: Count = 0  # payloads without a readable header; recorded all the same
     repaired: Count = 0  # of `messages`, filled in from what their publisher had kept
+    missing_samples: int = 0  # between its batches, by their index and the device's own clock
     # s, by the board's clock, that nobody spoke between one publisher's last message and the next's
     dark_s: float = 0.0
     last_run: int = 0  # of the newest message: where the session after a crash goes on

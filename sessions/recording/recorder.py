@@ -25,6 +25,7 @@ from messages.history.mending_state import Question
 from messages.text import plain
 from sessions.library.annotations import give_title
 from sessions.recording.intake import Entry, Intake
+from sessions.recording.keys import largest
 from sessions.recording.manifest import Manifest, SessionError, name_fault, slug
 from sessions.recording.session_clock import SessionClock
 from sessions.recording.settings import RecorderSettings
@@ -239,12 +240,8 @@ class Recorder:
         self._last = self._describe(store)
         self._store = None
         self._message = "" if closed else store.error
-        log.info(
-            "%s: %s, %d messages",
-            store.manifest.id,
-            "closed" if closed else "left open",
-            store.messages,
-        )
+        state = "closed" if closed else "left open"
+        log.info("%s: %s, %d messages", store.manifest.id, state, store.messages)
 
     def _finish_repairs(self, store: SessionStore) -> None:
         """Wait a little for answers that are under way; then what is held is written with its
@@ -323,8 +320,8 @@ class Recorder:
             messages=store.messages,
             bytes=store.size,
             durable_messages=store.durable_messages,
-            lost={key: lost for key, lost in store.lost().items() if lost},
-            repaired=store.repaired(),
+            lost=largest(store.lost()),
+            repaired=largest(store.repaired()),
             repairing=self._intake.held,
             refused=self._door.counts(),
         )
