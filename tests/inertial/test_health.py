@@ -340,6 +340,8 @@ class Told:
 
     def skip(self, n) -> None: ...
 
+    def withhold(self, nothing: bool) -> None: ...
+
     def exclude(self, mask: int) -> None:
         self.masks.append(mask)
 
