@@ -337,6 +337,9 @@ class Told:
 
     def skip(self, n) -> None: ...
 
+    def withhold(self, on):
+        pass
+
     def exclude(self, mask: int) -> None:
         self.masks.append(mask)
 
