@@ -4,11 +4,11 @@ The gateway gives again what came since, and, because the pipeline is determinis
 published already comes out again under the same numbers and is not published twice.
 """
 
+import contextlib
 import hashlib
 import logging
 import os
 import pickle
-import time
 from pathlib import Path
 
 import inertial
@@ -17,6 +17,7 @@ from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
 from estimator.worker import Worker
 from messages.bus.session import Publishers
+from messages.clock import Moment
 
 log = logging.getLogger(__name__)
 
@@ -34,35 +35,43 @@ class SavedState:
         self._mark = hashlib.sha256(
             f"{version} {settings!r}".encode()
         ).hexdigest()  # of another setup it is of no use
-        self._broken = False
+        self.message = ""  # why the newest state is not on the disk; empty when it is
 
     def save(self, worker: Worker, publishers: Publishers) -> None:
-        """Replace the file; a state that cannot be saved is said once, and costs the resumption
-        only.
+        """Replace the file. A state that cannot be saved costs the resumption only: it is said once
+        and tried again the next time, and that it is kept again is said as well.
         """
-        if self._broken or worker.mender.asking:
+        if worker.mender.asking:
             return
+        new = self._path.with_suffix(".new")
         try:
-            data = pickle.dumps(
-                (self._mark, worker.pipeline, worker.mender.taken(), publishers.sequences())
-            )
-            new = self._path.with_suffix(".new")
-            new.write_bytes(data)
+            content = self._mark, worker.pipeline, worker.mender.taken(), publishers.sequences()
+            new.write_bytes(pickle.dumps((list(Moment.now()), content)))
             os.replace(new, self._path)
         except Exception as error:  # whatever stands in an estimator's state: estimating goes on
-            self._broken = True
-            log.warning(
-                "%s: the state cannot be saved (%s): after a crash estimates begin anew",
-                self._path,
-                error,
-            )
+            with contextlib.suppress(OSError):
+                new.unlink(missing_ok=True)  # half a file takes the room that others want
+            self._say(error)
+            return
+        if self.message:
+            log.warning("%s: the state is saved again", self._path)
+        self.message = ""
+
+    def _say(self, error: Exception) -> None:
+        why = error.strerror if isinstance(error, OSError) else error
+        remedy = "make room; until then estimates begin anew after a crash"
+        message = f"{self._path}: the state cannot be saved ({why}): {remedy}"
+        if message != self.message:
+            log.warning("%s", message)
+        self.message = message
 
     def load(self) -> tuple[Pipeline, dict, dict] | None:
         """What was saved last; None when there is nothing that can be gone on with."""
         try:
-            if time.time() - self._path.stat().st_mtime > RESUME_S:
+            saved_at, content = pickle.loads(self._path.read_bytes())
+            if Moment(*saved_at).age_s > RESUME_S:
                 return None
-            mark, pipeline, taken, sequences = pickle.loads(self._path.read_bytes())
+            mark, pipeline, taken, sequences = content
         except FileNotFoundError:
             return None
         except Exception as error:  # cut by a power failure, or of another version

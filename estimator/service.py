@@ -10,13 +10,17 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+import zenoh
+
 from estimator.output import Output
 from estimator.pipeline import Pipeline
 from estimator.saved_state import SavedState, version
 from estimator.settings import EstimatorSettings
 from estimator.worker import Worker
 from messages.bus import orders
+from messages.bus.fencing import Claim, Fence, claim, heard_of
 from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client
+from messages.clock import elapsed_ns
 from messages.contract.door import Door
 from messages.contract.topics import ESTIMATES, PIPELINE_INPUTS, REPLAY_SUFFIX
 from messages.history.answers import Asker, declare
@@ -26,58 +30,111 @@ from messages.history.spool import Spool
 
 log = logging.getLogger(__name__)
 
+LOOK_S = 0.2  # between two looks at what may end it
+GONE_S = 600.0  # a device silent for so long makes room where there is none left
 END_S = 3.0  # for what is queued when the service is to end
 
 
 def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) -> None:
-    """Estimate until `stop` is set; sets it itself and raises when the worker fails."""
-    pipeline = Pipeline(settings)
-    spool = _open_spool(settings)
+    """Estimate until `stop` is set; sets it itself and raises when the worker fails. A second
+    estimator of the same name waits, and one that was stopped while another took its place does.
+    """
+    Pipeline(settings)  # raises at once for settings that name what does not exist
     try:
         session = open_client(bus, stop)
     except BusUnavailable:
         if stop.is_set():
             return
         raise
+    bases = [f"{bus.prefix}/{name}/estimates" for name in _leader(settings)]
+
+    def refused(other: str) -> None:
+        log.error(
+            "another estimator runs %s (%s): refused; this one waits until it has ended",
+            ", ".join(_leader(settings)),
+            other,
+        )
+
     with session:
-        publishers = Publishers(session, bus.prefix, spool)
-        asker = Asker(session, bus.prefix, lambda question, reply: worker.answered(question, reply))
-        saved = SavedState(settings.journal, settings, version()) if spool is not None else None
-        worker = _worker(pipeline, publishers, asker, saved, settings)
-        thread = threading.Thread(target=worker.work, args=(stop,), name="estimator", daemon=True)
-        thread.start()
-        answering = (
-            [declare(session, bus.prefix, "*", ESTIMATES, spool)] if spool is not None else []
-        )
-        # One subscriber for all topics: each has a thread of its own, and a fix must not overtake
-        # its samples.
-        subscriber = session.declare_subscriber(f"{bus.prefix}/*/*", _on(worker))
-        control = orders.take(session, bus.prefix, orders.ESTIMATOR, worker.take_order, "*")
-        log.info(
-            "estimating: rate %s; navigation %s",
-            ", ".join(settings.rate),
-            ", ".join(settings.navigators),
-        )
-        stop.wait()
-        subscriber.undeclare()
-        control.undeclare()
-        worker.finish()
-        thread.join(timeout=END_S)
-        behind = (
-            thread.is_alive()
-        )  # the next start goes on from the saved state, and this one's words go nowhere
-        for queryable in answering:
-            queryable.undeclare()
-        asker.close()
+        while not stop.is_set():
+            claimed = claim(
+                session,
+                bases,
+                time.time_ns(),
+                stop,
+                refused,
+                lambda: heard_of(session, bus.prefix, "*", ESTIMATES),
+            )
+            if claimed is None:
+                return
+            try:
+                _serve(settings, bus, session, claimed, stop)
+            finally:
+                claimed.release()
+
+
+def _leader(settings: EstimatorSettings) -> list[str]:
+    """The first estimator of the settings: two processes with one are the same twice."""
+    return [*settings.rate, *settings.navigators, *settings.attitudes][:1]
+
+
+def _serve(
+    settings: EstimatorSettings,
+    bus: BusSettings,
+    session: zenoh.Session,
+    claimed: Claim,
+    stop: threading.Event,
+) -> None:
+    """Estimate until `stop`, or until another has claimed the same."""
+    spool = _open_spool(settings)
+    publishers = Publishers(session, bus.prefix, spool)
+    publishers.number = claimed.number
+    if spool is not None:
+        spool.journal.outrun(claimed.number - 1)
+        publishers.number = spool.journal.run
+    asker = Asker(session, bus.prefix, lambda question, reply: worker.answered(question, reply))
+    saved = SavedState(settings.journal, settings, version()) if spool is not None else None
+    worker = _worker(Pipeline(settings), publishers, asker, saved, settings)
+    failed = threading.Event()
+    thread = threading.Thread(target=worker.work, args=(failed,), name="estimator", daemon=True)
+    thread.start()
+    answering = [declare(session, bus.prefix, "*", ESTIMATES, spool)] if spool is not None else []
+    fence = Fence(worker.door.refuse)
+    # One subscriber for all topics: each has a thread of its own, and a fix must not overtake
+    # its samples.
+    subscriber = session.declare_subscriber(f"{bus.prefix}/*/*", _on(worker, fence))
+    answering += [
+        orders.take(session, bus.prefix, orders.ESTIMATOR, worker.take_order, "*"),
+        fence.declare(session, bus.prefix),
+    ]
+    log.info(
+        "estimating: rate %s; navigation %s",
+        ", ".join(settings.rate),
+        ", ".join(settings.navigators),
+    )
+    while not (stop.is_set() or failed.is_set() or claimed.lost.is_set()):
+        stop.wait(LOOK_S)
+    if claimed.lost.is_set():
+        log.error("another estimator took over while this process was stopped: stepping back")
+        publishers.hold()
+    subscriber.undeclare()
+    worker.finish()
+    thread.join(timeout=END_S)
+    # the next start goes on from the saved state, and this one's words go nowhere
+    behind = thread.is_alive()
+    for queryable in answering:
+        queryable.undeclare()
+    asker.close()
     if spool is not None:
         spool.close()
-    if behind:
+    if behind and not claimed.lost.is_set():
         log.warning(
             "ended while samples waited%s",
             ": the next start takes them up" if saved is not None else "",
         )
         return
     if worker.failure is not None:
+        stop.set()
         raise worker.failure
     if saved is not None:
         saved.forget()
@@ -105,7 +162,7 @@ def _worker(
         put,
         lambda question: asker.ask(question, *question.stream, question.query),
         None if saved is None else lambda worker: saved.save(worker, publishers),
-        Door("estimator", most_devices=settings.max_devices),
+        Door("estimator", most_devices=settings.max_devices, gone_s=GONE_S),
     )
     if found is not None:
         for (device, name), (run_, last) in found[1].items():
@@ -124,19 +181,23 @@ def _open_spool(settings: EstimatorSettings) -> Spool | None:
         return None
 
 
-def _on(worker: Worker) -> Callable[[Any], None]:
+def _on(worker: Worker, fence: Fence) -> Callable[[Any], None]:
     def on_sample(sample: Any) -> None:
         key = str(sample.key_expr)
         address = worker.door.address(key)
         # a replay makes its own estimates
         if address is None or address.device.endswith(REPLAY_SUFFIX):
             return
-        if address.topic in PIPELINE_INPUTS and worker.door.admit(
-            key, address, len(sample.payload)
+        if (
+            address.topic in PIPELINE_INPUTS
+            and worker.door.admit(key, address, len(sample.payload))
+            and fence.admit(key, sample.attachment)
         ):
+            for gone in worker.door.gone():
+                worker.forget(gone)
             payload = sample.payload.to_bytes()
             worker.offer(
-                Arrival(address.topic, address.device, address.estimator, payload, time.time_ns())
+                Arrival(address.topic, address.device, address.estimator, payload, elapsed_ns())
             )
 
     return on_sample

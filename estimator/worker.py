@@ -17,6 +17,7 @@ from estimator.output import Output
 from estimator.pipeline import Pipeline
 from estimator.stream import worth_a_line
 from messages.bus import orders
+from messages.clock import elapsed_ns
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import Refusal
 from messages.contract.door import Door
@@ -45,6 +46,12 @@ class Ready(NamedTuple):
     """A message that its turn has come for: nothing before it is missing any more."""
 
     arrival: Arrival
+
+
+class Gone(NamedTuple):
+    """A device that has been silent for long and makes room for another."""
+
+    device: str
 
 
 class Worker:
@@ -76,6 +83,7 @@ class Worker:
         self.inbox = Inbox(BACKLOG, BACKLOG_BYTES)
         self._ready = 0  # messages that the mender has given on and the pipeline has not taken
         self._bad = 0
+        self._behind_s: dict[str, float] = {}  # by device: from arrival to its turn, newest
         self._save_at = time.monotonic() + SAVE_S
         self.failure: BaseException | None = None
 
@@ -87,6 +95,10 @@ class Worker:
                 len(self.inbox),
                 self.inbox.dropped,
             )
+
+    def forget(self, device: str) -> None:
+        """Called on the bus's thread: the device is gone."""
+        self.inbox.put(device, Gone(device))
 
     def answered(self, question: Question, reply: pb.HistoryReply | None) -> None:
         """Called on the asker's thread: what a gateway kept."""
@@ -114,6 +126,9 @@ class Worker:
                 device, item = turn
                 if isinstance(item, Order):
                     self._obey(item)
+                elif isinstance(item, Gone):
+                    self.pipeline.forget(item.device)
+                    self.mender.forget(item.device)
                 elif isinstance(item, Ready):
                     self._ready -= 1
                     self._handle(item.arrival)
@@ -165,6 +180,8 @@ class Worker:
         if message is None:
             return
         message.header.device = arrival.device
+        if arrival.at_ns and not arrival.late:
+            self._behind_s[arrival.device] = max(0, elapsed_ns() - arrival.at_ns) * 1e-9
         try:
             for output in self.pipeline.on(arrival.topic, message):
                 self._tell(output)
@@ -178,6 +195,8 @@ class Worker:
     def _tell(self, output: Output) -> None:
         if output.topic is ESTIMATOR:
             output.message.refused.update(self.door.of(output.device))
+            output.message.behind_s = self._behind_s.get(output.device, 0.0)
+            output.message.waiting = len(self.inbox)
         self._put(output)
 
     def _fail(self, device: str, what: str, error: Exception) -> None:

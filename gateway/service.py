@@ -2,7 +2,7 @@
 that decodes.
 
 Journal first: boards are read and journalled from the start, also with no router there. Publishing
-begins when the router comes and the name on the bus is ours (gateway/ports/identity.py).
+begins when the router comes and the name on the bus is ours (messages/bus/fencing.py).
 """
 
 import json
@@ -15,13 +15,19 @@ from concurrent.futures import Future
 import zenoh
 
 from gateway.board.device import DeviceLink
-from gateway.ports.identity import claim
 from gateway.ports.keeper import Keeper
 from gateway.settings import DeviceSettings, GatewaySettings
 from messages.bus import orders
-from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client
+from messages.bus.fencing import Claim, claim, heard_of
+from messages.bus.session import (
+    BusSettings,
+    BusUnavailable,
+    Publishers,
+    connected,
+    open_client,
+)
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import GATEWAY, history_key
+from messages.contract.topics import GATEWAY, check_name, history_key
 from messages.history.answers import declare
 from messages.history.journal import Journal
 from messages.history.journal_folder import JournalBusy
@@ -32,6 +38,12 @@ HISTORY_BYTES = 4 << 20  # of records in one reply; who wants more asks on from 
 LOOK_S = 0.1  # a board that failed is noticed after so long ...
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 30.0  # ... and begins anew after a pause that grows
 BUSY_RETRY_S = 0.2  # a journal that another gateway has is asked for again after so long
+
+REFUSED = (
+    "%s: another gateway serves this device name (%s); refused. Stop the other one, or give this"
+    " board another `name` in [[gateway.devices]]; here it is neither read nor journalled until the"
+    " name is free"
+)
 
 
 def run(
@@ -109,6 +121,25 @@ class _Line:
             log.exception("%s: reading failed, and begins anew", self.link.name)
             self.failed.set()
 
+    def serve(self, session: zenoh.Session, claimed: Claim, stop: threading.Event) -> None:
+        """Publish under the claim's number until `stop`, a failure, or another's claim."""
+        stopped = threading.Event()
+        self.link.on_stopped = lambda: (self.publishers.hold(), stopped.set())
+        self.link.outrun(claimed.number - 1)
+        self.publishers.number = self.link.journal.run
+        self.publishers.attach(session)
+        while not (stop.is_set() or self.failed.is_set() or claimed.lost.wait(LOOK_S)):
+            # after a stop nothing is said before it is known that nobody took our place
+            if stopped.is_set() and connected(session) and claimed.look():
+                stopped.clear()
+                self.publishers.attach(session)
+        if claimed.lost.is_set():
+            log.error(
+                "%s: another gateway took this device while this process was stopped or cut off:"
+                " stepping back",
+                self.link.name,
+            )
+
     def close(self) -> None:
         """Stop reading and close the journal; may be called again."""
         self._halt.set()
@@ -182,18 +213,28 @@ def _publish(
     stop: threading.Event,
     keeper: Keeper,
 ) -> None:
-    """Serve the name on the bus until `stop`. Refused, the line is closed, and opened again when
-    the name is free.
+    """Serve the name on the bus until `stop`, or until another gateway has it. Refused, the line is
+    closed, and opened again when the name is free.
     """
     refused = threading.Event()
 
-    def give_up() -> None:
+    def give_up(other: str) -> None:
+        log.error(REFUSED, device.name, other)
         refused.set()
         line.close()
 
-    token = claim(session, prefix, device.name, stop, give_up)
-    if token is None:
+    claimed = claim(
+        session,
+        [f"{check_name(prefix)}/{check_name(device.name)}/gateway"],
+        line.link.journal.run,
+        stop,
+        give_up,
+        lambda: heard_of(session, prefix, device.name, GATEWAY),
+    )
+    if claimed is None:
         return
+    if refused.is_set():
+        log.warning("%s: the other gateway is gone, this one serves it now", device.name)
     queryables = []
     mine = _open_line(device, settings, prefix, stop, keeper) if refused.is_set() else line
     try:
@@ -207,15 +248,13 @@ def _publish(
                 declare(session, prefix, device.name, GATEWAY, link.spool),
                 orders.take(session, prefix, orders.BOARD, take_order_of(link), device.name),
             ]
-            mine.publishers.attach(session)
-            while not stop.is_set() and not mine.failed.is_set():
-                stop.wait(LOOK_S)
+            mine.serve(session, claimed, stop)
     finally:
         if mine is not None:
             mine.close()
         for queryable in queryables:
             queryable.undeclare()
-        token.undeclare()
+        claimed.release()
 
 
 def take_order_of(link: DeviceLink) -> Callable[[orders.Order[pb.BoardCommand, pb.Reply]], None]:

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from dashboard.settings import DashboardSettings
 from estimator.settings import EstimatorSettings
 from gateway.settings import GatewaySettings
-from inertial.toml_file import text_of
+from inertial.toml_file import parsed, text_of
 from messages.bus.session import BusSettings
 from sessions.recording.settings import RecorderSettings
 
@@ -47,7 +47,7 @@ def load(path: Path) -> Settings:
             f"{path}: {error.strerror}; name another file with --config FILE"
         ) from None
     try:
-        values = tomllib.loads(text)
+        values = parsed(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path}: not TOML: {error}") from None
     return check(values, str(path), text)

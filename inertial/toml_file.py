@@ -4,6 +4,7 @@ wrong with it.
 
 import codecs
 import errno
+import re
 import stat
 import tomllib
 from collections.abc import Callable
@@ -15,6 +16,7 @@ import tomli_w
 T = TypeVar("T")
 
 LARGEST = 16 * 1024**2  # bytes of a file of settings
+DEEP_KEY = re.compile(r"""(?:[\w"'-]{1,64}[ \t]*\.[ \t]*){33}""")  # tomllib is quadratic in them
 
 MARKS = (
     (codecs.BOM_UTF8, "utf-8"),
@@ -45,6 +47,16 @@ def text_of(path: Path) -> str:
         return data.decode("cp1252", errors="replace")
 
 
+def parsed(text: str) -> dict[str, Any]:
+    """A table of TOML. Raises TOMLDecodeError, also for what nests deeper than people write."""
+    if DEEP_KEY.search(text):
+        raise tomllib.TOMLDecodeError("a key of more than 32 parts")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise tomllib.TOMLDecodeError("nested too deeply") from None
+
+
 def write_whole(table: dict[str, Any], path: Path) -> None:
     """Write a table; a file that is there stays as it was until the new one is complete. Raises
     OSError.
@@ -71,7 +83,7 @@ def read_versioned(
     `remedy` is what to do about another version.
     """
     try:
-        table = tomllib.loads(text_of(path))
+        table = parsed(text_of(path))
     except tomllib.TOMLDecodeError as fault:
         raise error(f"{path}: no {kind}: {fault}") from None
     if table.get("version") != version:

@@ -37,6 +37,7 @@ Progress = Callable[[float, str], None]
 SHOW_GAPS = 20
 BLOCK = 8192  # samples that an estimator is given at once
 SAID = ("omega_b", "P", "q_nb", "angle_z", "alpha_b", "f_b", "still", "p_n")  # what is kept
+SCORED = ("omega_b", "P", "angle_z")  # ... where nothing is drawn
 TACHO_SIGMA = (
     0.03  # rad/s; a log says neither how well its tachometer measured nor when its pulses came
 )
@@ -81,7 +82,10 @@ def run_cube(
     )
     if tacho_aid and data.tacho is None:
         raise LogError(f"--tacho-aid: {log} has no column tacho_rad_s")
-    tracks, watched, notes = run_log(data, shape, used, estimators, progress, tacho_aid, resolve)
+    lean = plot is None and not resolve
+    tracks, watched, notes = run_log(
+        data, shape, used, estimators, progress, tacho_aid, resolve, lean
+    )
     truth = reference(data)
     aided = [name for name in tracks if name.endswith(SUFFIX)]
     if truth.name == "tachometer":
@@ -153,9 +157,10 @@ def run_log(
     progress: Progress = nothing,
     tacho_aid: bool = False,
     resolve: bool = False,
+    lean: bool = False,
 ) -> tuple[dict[str, EstimatorRun], Monitored, list[str]]:
     """Tracks of the estimators that can use this layout, what the axis monitor says, and why others
-    cannot. Raises LogError, CardError.
+    cannot. lean: only what is scored is kept of the tracks. Raises LogError, CardError.
     """
     gain = np.array(shape.gain)
     f_axis = data.f_axis if np.all(gain == 1.0) else data.f_axis * gain
@@ -185,6 +190,7 @@ def run_log(
                     card,
                     tacho_aid,
                     resolve,
+                    lean,
                 )
             tracks[track.name] = track
         except GeometryError as error:
@@ -206,6 +212,7 @@ def run_estimator(
     card: Card | None = None,
     tacho_aid: bool = False,
     resolve: bool = False,
+    lean: bool = False,
 ) -> EstimatorRun:
     """Every sample of a log through one estimator, in the parts that the axis monitor cut; missing
     samples are announced to it as on the live path.
@@ -216,7 +223,7 @@ def run_estimator(
     """
     estimator, n = make(ESTIMATORS[name], shape, card), len(data.t_s)
     reports = _reports(data) if tacho_aid else {}
-    said = _Said(n)
+    said = _Said(n, SCORED if lean else SAID)
     busy, mask = 0, 0
     for part in cut(parts, list(reports)):
         began = time.thread_time_ns()
@@ -241,7 +248,8 @@ def run_estimator(
 class _Said:
     """What an estimator says of a log of n samples, block by block."""
 
-    def __init__(self, n: int) -> None:
+    def __init__(self, n: int, fields: Sequence[str]) -> None:
+        self._fields = fields
         self._n, self._aided, self._blind, self._why = n, False, 0, ""
         self._columns: dict[str, NDArray[Any]] = {}
 
@@ -250,8 +258,10 @@ class _Said:
         for field in SAID:
             column = getattr(said, field)
             if field not in self._columns:
-                self._columns[field] = np.empty((self._n, *column.shape[1:]), column.dtype)
-            self._columns[field][rows] = column
+                kept = self._n if field in self._fields else 0
+                self._columns[field] = np.empty((kept, *column.shape[1:]), column.dtype)
+            if field in self._fields:
+                self._columns[field][rows] = column
         self._aided |= bool(said.aided.any())
         blind = np.nonzero((said.sight == BLIND).all(axis=1))[0]
         self._blind += len(blind)

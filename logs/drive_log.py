@@ -23,7 +23,7 @@ from inertial.navigation.fix import (
 )
 from inertial.plausible import doubt_of_gravity, doubt_of_rate
 from inertial.timing import Timing
-from inertial.toml_file import text_of
+from inertial.toml_file import parsed, text_of
 from logs.quantities import read_si, refuse, rising, timing_of
 from logs.sheet import LogError, Table, open_sheet
 
@@ -190,7 +190,7 @@ def _lever(path: Path) -> tuple[float, float, float]:
     if not path.is_file():
         return 0.0, 0.0, 0.0
     try:
-        value = tomllib.loads(text_of(path)).get("lever_arm_b_m", [0.0, 0.0, 0.0])
+        value = parsed(text_of(path)).get("lever_arm_b_m", [0.0, 0.0, 0.0])
         a, b, c = (float(v) for v in value)
     except (tomllib.TOMLDecodeError, TypeError, ValueError):
         raise LogError(

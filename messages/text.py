@@ -90,9 +90,13 @@ def html(text: object, longest: int = LONGEST) -> Markup:
     return text if isinstance(text, Markup) else _escape(plain(text, longest))
 
 
-def paragraph(text: object) -> Markup:
+def paragraph(text: object, longest: int = 1 << 20) -> Markup:
     """Text of several lines inside HTML."""
-    return text if isinstance(text, Markup) else _escape(printed(text))
+    if isinstance(text, Markup):
+        return text
+    whole = str(text)
+    cut = whole if len(whole) <= longest else whole[: longest - 1] + "…"
+    return _escape(printed(cut))
 
 
 def template_value(value: object) -> object:

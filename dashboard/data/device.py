@@ -28,6 +28,10 @@ SLOW_STALE_S = {
     "innovation": 10.0,
 }
 
+# Estimates that just came, but of samples that came so long before, are no present state either.
+BEHIND_STALE_S = 2.0
+ESTIMATED = ("rate", "nav", "attitude")
+
 
 @dataclass
 class Latest:
@@ -110,7 +114,13 @@ class Device:
     def stale(self, topic: str, estimator: str = "", now: float | None = None) -> bool:
         """True when there is none or it is older than its topic allows."""
         latest = self.get(topic, estimator)
-        return latest is None or latest.age(now) > SLOW_STALE_S.get(topic, STALE_S)
+        old = latest is None or latest.age(now) > SLOW_STALE_S.get(topic, STALE_S)
+        return old or (topic in ESTIMATED and self.behind_s(estimator) > BEHIND_STALE_S)
+
+    def behind_s(self, estimator: str) -> float:
+        """By how much an estimator says that it is behind its samples, s."""
+        status = self.get("estimator", estimator)
+        return 0.0 if status is None else float(status.message.behind_s)
 
     def ring(self, topic: str, estimator: str, **widths: int) -> Ring:
         """The ring of a topic, made at first use; `widths` of columns that depend on the device."""

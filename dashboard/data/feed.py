@@ -16,6 +16,7 @@ import zenoh
 from google.protobuf.message import Message
 
 from dashboard.data.store import Store
+from messages.bus.fencing import Fence
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 from messages.contract.checks import Refusal
@@ -61,6 +62,7 @@ class Feed:
         self._received = self._refused = 0
         self.taken = 0  # messages that went into the store
         self._mender = Mender(self._ask, hold=False, refuse=self._door.refuse)
+        self._fence = Fence(self._door.refuse)
         self._answers: deque = deque()
         self._known: set[str] = set()  # devices whose past was asked for
         self._asker = Asker(session, prefix, lambda *answer: self._answers.append(answer))
@@ -74,22 +76,27 @@ class Feed:
 
     def _run(self) -> None:
         subscriber = self._session.declare_subscriber(f"{self._prefix}/**", self._on_sample)
+        answering = self._fence.declare(self._session, self._prefix)
         log.info("showing %s/*", self._prefix)
         while not self._stop.wait(BUSY_S if self._watched.is_set() else IDLE_S):
             self._drain()
         subscriber.undeclare()
+        answering.undeclare()
         self._asker.close()
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
         """Zenoh's thread."""
+        key = str(sample.key_expr)
+        if not self._fence.admit(key, sample.attachment):
+            return
         self._received += 1
         size = len(sample.payload)
         if size > MESSAGE_BYTES:
-            self._door.too_large(str(sample.key_expr), size, MESSAGE_BYTES)
+            self._door.too_large(key, size, MESSAGE_BYTES)
             self._refused += 1
         elif len(self._queue) < QUEUE and self._bytes_in - self._bytes_out < QUEUE_BYTES:
             self._bytes_in += size
-            self._queue.append((str(sample.key_expr), sample.payload.to_bytes(), time.monotonic()))
+            self._queue.append((key, sample.payload.to_bytes(), time.monotonic()))
 
     def _drain(self) -> None:
         while self._answers:

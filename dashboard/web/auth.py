@@ -13,9 +13,8 @@ import json
 import logging
 import secrets
 import threading
-import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 
 from starlette.requests import HTTPConnection
 
@@ -29,6 +28,7 @@ from dashboard.web.users import (
     redeem_link_token,
     write_private,
 )
+from messages.clock import Clock, Moment
 
 __all__ = [
     "Gate",
@@ -50,12 +50,14 @@ PARALLEL = 2  # passwords verified at once: each takes 32 MiB and a core
 
 @dataclass
 class SignIn:
-    """One sign-in; times in s since 1970."""
+    """One sign-in; times in s since 1970 by the gate's clock, which nobody sets."""
 
     user: str
     csrf: str
     created: float
     seen: float
+    password: str = ""  # mark of the one it began under; empty: of a version that kept none
+    moment: list[str | int] = field(default_factory=list)  # of its beginning: messages.clock.Moment
 
 
 class WaitError(Exception):
@@ -97,6 +99,7 @@ class Backoff:
         if now > allowed + self._longest:
             count = 0
         if now < allowed:
+            allowed = min(allowed, now + self._longest)  # also when the clock went back
             self._failures[key] = (count, allowed)
             raise WaitError(allowed - now)
         over = count + 1 - self._free
@@ -114,10 +117,16 @@ class Gate:
     """All of sign-in behind four verbs: sign_in, redeem, session_of, sign_out."""
 
     def __init__(
-        self, settings: DashboardSettings, users: UserStore, clock: Callable[[], float] = time.time
+        self,
+        settings: DashboardSettings,
+        users: UserStore,
+        clock: Callable[[], float] | None = None,
     ) -> None:
-        self.settings, self.users, self._clock = settings, users, clock
-        self.backoff = Backoff(settings.free_attempts, settings.longest_wait_s, clock)
+        """clock: s since 1970; None: by elapsed time, whatever is done to the wall clock."""
+        self.settings, self.users = settings, users
+        self._own = clock is None
+        self._clock = clock or _elapsed()
+        self.backoff = Backoff(settings.free_attempts, settings.longest_wait_s, self._clock)
         self._file = settings.users.with_name(settings.users.name + ".signed-in")
         self._lock = threading.Lock()
         self._sessions: dict[str, SignIn] = self._load()
@@ -141,7 +150,8 @@ class Gate:
         WaitError.
         """
         self.backoff.attempt(address)
-        name = redeem_link_token(self.settings.users, token, self._clock())
+        now = None if self._own else self._clock()
+        name = redeem_link_token(self.settings.users, token, now)
         if name is None or self.users.get(name) is None:
             log.warning("sign-in link refused from %s: used, expired or unknown", address)
             return None
@@ -164,10 +174,9 @@ class Gate:
             return None
         old = now - session.created > self.settings.session_hours * 3600
         idle = now - session.seen > self.settings.idle_hours * 3600
+        back = now < session.seen - 1.0  # its age is not known any more
         user = self.users.get(session.user)
-        if (
-            old or idle or user is None or user.created > session.created + 1
-        ):  # a new password ends old sign-ins
+        if old or idle or back or user is None or not _same_password(user, session):
             self._end(key)
             return None
         session.seen = now
@@ -180,7 +189,11 @@ class Gate:
     def _begin(self, name: str, address: str, means: str) -> str:
         token, now = secrets.token_urlsafe(32), self._clock()
         with self._lock:
-            self._sessions[_digest(token)] = SignIn(name, secrets.token_urlsafe(24), now, now)
+            user = self.users.get(name)
+            mark = "" if user is None else _mark(user)
+            self._sessions[_digest(token)] = SignIn(
+                name, secrets.token_urlsafe(24), now, now, mark, list(Moment.now())
+            )
             while len(self._sessions) > SESSIONS:
                 self._sessions.pop(next(iter(self._sessions)))
             self._save()
@@ -194,14 +207,24 @@ class Gate:
 
     def _load(self) -> dict[str, SignIn]:
         try:
-            return {
+            found = {
                 key: SignIn(**entry) for key, entry in json.loads(self._file.read_text()).items()
             }
+            return {key: self._moved(one) for key, one in found.items()}
         except FileNotFoundError:
             return {}
-        except (OSError, ValueError, TypeError, AttributeError) as error:
+        except (OSError, ValueError, TypeError, AttributeError, RecursionError) as error:
             log.warning("%s: %s: everybody has to sign in again", self._file, error)
             return {}
+
+    def _moved(self, session: SignIn) -> SignIn:
+        """A sign-in of an earlier process, its times by this one's clock."""
+        began = Moment.of(session.moment)
+        if self._own and began is not None:
+            used_s = max(0.0, session.seen - session.created)
+            session.created = self._clock() - began.age_s
+            session.seen = min(session.created + used_s, self._clock())
+        return session
 
     def _save(self) -> None:
         try:
@@ -211,6 +234,23 @@ class Gate:
             )
         except OSError as error:
             log.warning("%s: %s: a restart will sign everybody out", self._file, error.strerror)
+
+
+def _elapsed() -> Callable[[], float]:
+    clock = Clock()
+    return lambda: clock.now_ns() * 1e-9
+
+
+def _mark(user: User) -> str:
+    """Of a password and when it was given."""
+    return _digest(f"{user.hash} {user.created}")
+
+
+def _same_password(user: User, session: SignIn) -> bool:
+    """A new password ends the sign-ins under the old one."""
+    if session.password:
+        return hmac.compare_digest(session.password, _mark(user))
+    return user.created <= session.created + 1
 
 
 def _digest(token: str) -> str:

@@ -13,6 +13,7 @@ from dashboard.web.api import SignedIn, file_of
 from dashboard.web.front import Front, front_of
 from dashboard.web.pages import render
 from dashboard.web.schemas import session_out
+from messages.text import plain
 from sessions.library.annotations import read_annotations
 from sessions.library.compare import METHODS, MOST, CompareError, Comparison, as_dict, compare
 from sessions.library.overlay import POINTS, drawing
@@ -121,9 +122,11 @@ def _add_notes(front: Front, result: Comparison, drawn: dict[str, Any]) -> None:
         try:
             notes = read_annotations(front.catalogue.root / one.curves.session).notes
         except SessionError:
-            continue
+            notes = []
         out["marks"] += [
             {"t": note.at_s + one.offset_s, "text": note.text, "author": note.author}
             for note in notes
             if note.at_s is not None
         ]
+        for mark in out["marks"]:  # also what was recorded from the bus
+            mark |= {key: plain(mark[key]) for key in ("text", "author") if key in mark}

@@ -13,6 +13,7 @@ import logging
 import resource
 import time
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -88,7 +89,7 @@ class Connections:
         """Count a new connection, or end it when nobody can give way."""
         address = _network(transport)
         new = Connection(transport, protocol, address, time.monotonic())
-        if not self._exempt(address):
+        if not self._exempt(transport):
             same = [one for one in self._open if one.address == address]
             if len(same) >= self._settings.connections_per_address and not self._evict(same):
                 self._end(new, "too many of one address")
@@ -158,17 +159,22 @@ class Connections:
         if one in self._open and now - since > limit:
             self._end(one, why)
 
-    def _exempt(self, address: str) -> bool:
+    def _exempt(self, transport: asyncio.Transport) -> bool:
         """A proxy of ours brings everybody's connections; it limits them itself."""
-        for trusted in self._settings.trusted_proxies:
-            try:
-                network = ipaddress.ip_network(trusted, strict=False)
-                if ipaddress.ip_network(address, strict=False).subnet_of(network):
-                    return True
-            except (ValueError, TypeError):
-                if trusted in ("*", address):
-                    return True
-        return False
+        peer = transport.get_extra_info("peername")
+        return bool(peer) and trusted(peer[0], self._settings.trusted_proxies)
+
+
+def trusted(address: str, proxies: Collection[str]) -> bool:
+    """Is this the address of one of our proxies? They are addresses, networks or `*`."""
+    for proxy in proxies:
+        try:
+            if ipaddress.ip_address(address) in ipaddress.ip_network(proxy, strict=False):
+                return True
+        except ValueError:
+            if proxy in ("*", address):
+                return True
+    return False
 
 
 def _network(transport: asyncio.Transport) -> str:

@@ -11,7 +11,7 @@ from dashboard.web.api import Operator, SignedIn, file_of
 from dashboard.web.front import Front, front_of
 from dashboard.web.schemas import Line, Strict
 from dashboard.web.session_api import JobOut, start_job
-from dashboard.web.uploads import Upload, UploadError, samples_and_fixes
+from dashboard.web.uploads import FILES, Upload, UploadError, samples_and_fixes
 from messages import text
 
 routes = APIRouter(prefix="/api")
@@ -79,6 +79,8 @@ async def take_piece(
     with found.lock:
         path = found.folder / file
         have = path.stat().st_size if path.exists() else 0
+        if not path.exists() and len(list(found.folder.iterdir())) >= FILES:
+            raise HTTPException(409, f"{file}: {FILES} files are here already: begin anew")
         if at != have:
             raise HTTPException(
                 409, f"{file}: {have} bytes are here, so the next piece begins there, not at {at}"
@@ -105,12 +107,18 @@ def finish_import(request: Request, upload: int, body: ImportOrder, who: Operato
         raise HTTPException(409, str(error)) from None
     order = ["import", str(samples), "--device", body.device, "--name", body.name]
     order += ["--gnss", str(fixes)] if fixes else []
-    return start_job(front, "import", samples.name, order, who.name, makes="session")
+    found.reading = True
+    end = {"makes": "session", "then": lambda: front.uploads.forget(upload)}
+    try:
+        return start_job(front, "import", samples.name, order, who.name, **end)
+    except HTTPException:
+        found.reading = False  # it can be tried again
+        raise
 
 
 def _upload(front: Front, number: int, user: str) -> Upload:
     found = front.uploads.open.get(number)  # of the user who began it
-    if found is None or found.user != user:
+    if found is None or found.user != user or found.reading:
         raise HTTPException(404, f"no upload {number}: begin anew")
     return found
 

@@ -13,7 +13,7 @@ import tempfile
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -92,8 +92,10 @@ class Jobs:
         user: str,
         accept: tuple[int, ...] = (0,),
         makes: str = "files",
+        then: Callable[[], None] = lambda: None,
     ) -> Job:
-        """Queue `<command> <arguments>`; exit codes in `accept` are well. Raises ControlError.
+        """Queue `<command> <arguments>`; exit codes in `accept` are well; `then` is called at its
+        end. Raises ControlError.
 
         One that makes `files` gets `--out <folder>`; one that makes a `session` prints its id.
         """
@@ -105,7 +107,7 @@ class Jobs:
             self._jobs[number] = job
             while len(self._jobs) > KEPT and next(iter(self._jobs.values())).ended is not None:
                 shutil.rmtree(self._jobs.popitem(last=False)[1].out, ignore_errors=True)
-        work = (job, list(arguments), accept, makes)
+        work = (job, list(arguments), accept, makes, then)
         threading.Thread(target=self._run, args=work, name=f"job {number}", daemon=True).start()
         return job
 
@@ -120,7 +122,14 @@ class Jobs:
             self._process.terminate()
         shutil.rmtree(self._scratch, ignore_errors=True)
 
-    def _run(self, job: Job, arguments: list[str], accept: tuple[int, ...], makes: str) -> None:
+    def _run(
+        self,
+        job: Job,
+        arguments: list[str],
+        accept: tuple[int, ...],
+        makes: str,
+        then: Callable[[], None],
+    ) -> None:
         with self._turn:
             if self._closed:
                 job.ended, job.state = time.monotonic(), "failed"
@@ -135,6 +144,7 @@ class Jobs:
                 log.exception("job %d (%s of %s)", job.number, job.kind, job.session)
                 job.message = str(error) or type(error).__name__
             finally:
+                then()
                 job.message = plain(job.message)
                 job.ended = time.monotonic()
                 job.state = "done" if well else "failed"

@@ -2,6 +2,7 @@
 wait for them.
 """
 
+import logging
 import os
 import shutil
 import subprocess
@@ -14,6 +15,8 @@ from pathlib import Path
 from sessions.library.curves import Curves, load, stamp
 from sessions.library.curves_build import LONG_CHUNKS, build, ensure
 from sessions.library.scan import extent
+
+log = logging.getLogger(__name__)
 
 SHORT = 8_000_000  # bytes of a recording that is read here: starting a process would take longer
 KEPT = 8  # sessions in memory, some MB each
@@ -86,10 +89,14 @@ class Readings:
 
     def _read(self, path: Path, reading: Reading) -> None:
         """A short one here; else one process, its numbers are the share done."""
-        if reading.of[0] < SHORT:
-            self._read_here(path, reading)
-        else:
-            self._read_there(path, reading)
+        try:
+            if reading.of[0] < SHORT:
+                self._read_here(path, reading)
+            else:
+                self._read_there(path, reading)
+        except Exception as error:  # whatever it was, nobody may wait for it for ever
+            log.exception("%s", path)
+            reading.fault = str(error) or type(error).__name__
         with self._lock:
             self._running.pop(path, None)
             if reading.fault:

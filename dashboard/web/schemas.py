@@ -49,6 +49,7 @@ class EstimatorOut(BaseModel):
     message: str
     us_per_sample: float
     gaps: int
+    behind_s: float = Field(description="from the arrival of samples to their estimates, s")
 
 
 class DeviceOut(BaseModel):
@@ -134,7 +135,12 @@ def device_out(device: Device, stale_s: float) -> DeviceOut:
     ]
     estimators = [
         EstimatorOut(
-            name=name, state=s.state, message=s.message, us_per_sample=s.us_per_sample, gaps=s.gaps
+            name=text.plain(name),
+            state=text.plain(s.state),
+            message=text.plain(s.message),
+            us_per_sample=s.us_per_sample,
+            gaps=s.gaps,
+            behind_s=s.behind_s,
         )
         for name, s in states
     ]
@@ -146,8 +152,8 @@ def device_out(device: Device, stale_s: float) -> DeviceOut:
         age_s=age_s,
         stale=stale,
         connected=link.connected and not stale,
-        port=link.port,
-        message=link.message if heard else "no link status yet",
+        port=text.plain(link.port),
+        message=text.plain(link.message) if heard else "no link status yet",
         sample_rate_hz=link.sample_rate_hz,
         latency_p99_s=link.latency_p99_s,
         clock_skew_ppm=link.clock_skew_ppm,
@@ -156,8 +162,8 @@ def device_out(device: Device, stale_s: float) -> DeviceOut:
         bad_chunks=link.bad_chunks,
         reconnects=link.reconnects,
         reboots=link.reboots,
-        firmware=board.firmware,
-        uid=board.uid,
+        firmware=text.plain(board.firmware),
+        uid=text.plain(board.uid),
         axes=board.axes,
         estimators=estimators,
     )

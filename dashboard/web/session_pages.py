@@ -19,6 +19,7 @@ from sessions.library.annotations import Annotations, read_annotations
 from sessions.recording.manifest import Manifest, SessionError
 
 routes = APIRouter(include_in_schema=False)
+NO_REPORT = {"verdict": "", "specification": "", "estimator": ""}  # of a file that says less
 
 TRENDS = (
     ("accel_bias_x_mg", "equivalent bias x, mg"),
@@ -83,13 +84,21 @@ def trend_page(
         points = [
             Point(row.id, row.start_s, value)
             for row, report in mine
-            if (value := report.get("figures", {}).get(name)) is not None
+            if (value := _figure(report, name)) is not None
         ]
         if points:
             trends.append(Trend(label, points, draw(points)))
     return render(
         request, "trend.html", who, device=device, devices=devices, trends=trends, reports=len(mine)
     )
+
+
+def _figure(report: dict, name: str) -> float | None:
+    """A figure of a report; None when it is not in it, or is no number."""
+    figures = report.get("figures")
+    value = figures.get(name) if isinstance(figures, dict) else None
+    good = isinstance(value, float | int) and not isinstance(value, bool) and abs(value) < 1e300
+    return float(value) if good else None
 
 
 def _manifest(front: Front, session: str) -> Manifest | None:
@@ -114,9 +123,10 @@ def _report(front: Front, session: str) -> dict | None:
                 encoding="utf-8"
             )
         )
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return None
-    return found if isinstance(found, dict) and "device" in found else None
+    whole = isinstance(found, dict) and isinstance(found.get("device"), str)
+    return NO_REPORT | found if whole else None
 
 
 def _completeness(manifest: Manifest | None) -> list[Completeness]:

@@ -11,6 +11,7 @@ from pathlib import Path
 HEAD = 8192  # bytes of a file that its header and some rows are in
 LATITUDE = re.compile(r"(?<![a-z])lat(itude)?(?![a-z])")
 RECEIVER = re.compile(r"gnss|gps")
+FILES = 4  # of one upload
 AT_ONCE = 4  # uploads that have not been finished; the oldest gives way
 
 
@@ -54,6 +55,7 @@ class Upload:
 
     user: str
     folder: Path
+    reading: bool = False  # a job makes a session of it: no more pieces
     lock: threading.Lock = field(default_factory=threading.Lock)
 
 
@@ -70,12 +72,20 @@ class Uploads:
         with self._lock:
             number = next(self._numbers)
             self.open[number] = Upload(user, Path(tempfile.mkdtemp(prefix="gyrofree-upload-")))
-            while len(self.open) > AT_ONCE:
-                self._forget(next(iter(self.open)))
+            idle = [key for key, one in self.open.items() if not one.reading]
+            for key in idle[:-AT_ONCE]:
+                self._forget(key)
             return number
 
     def _forget(self, number: int) -> None:
-        shutil.rmtree(self.open.pop(number).folder, ignore_errors=True)
+        gone = self.open.pop(number, None)
+        if gone is not None:
+            shutil.rmtree(gone.folder, ignore_errors=True)
+
+    def forget(self, number: int) -> None:
+        """It is a session now, or has failed to become one."""
+        with self._lock:
+            self._forget(number)
 
     def close(self) -> None:
         """Forget all."""

@@ -23,6 +23,8 @@ from pathlib import Path
 from argon2 import PasswordHasher
 from argon2.exceptions import InvalidHashError, VerificationError
 
+from messages.clock import Moment
+
 USER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._@-]{0,63}")
 PASSWORD_MIN = 10  # characters
 PASSWORD_MAX = 256  # characters; argon2 would take any length, and any time
@@ -93,7 +95,7 @@ def load_users(path: Path) -> dict[str, User]:
         raise UsersError(
             f"{path}: {error.strerror}; the dashboard's user must be able to read it"
         ) from None
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
         raise UsersError(
             f"{path}: no users file ({type(error).__name__}: {error}); restore a copy, or remove it"
             " and add users again"
@@ -198,7 +200,13 @@ def issue_link_token(users_file: Path, user: str, lifetime_s: float = 900.0) -> 
     token = secrets.token_urlsafe(32)
     link = _link_file(users_file, token)
     try:
-        write_private(link, json.dumps({"user": user, "expires": time.time() + lifetime_s}))
+        written = {
+            "user": user,
+            "expires": time.time() + lifetime_s,
+            "lifetime_s": lifetime_s,
+            "moment": list(Moment.now()),
+        }
+        write_private(link, json.dumps(written))
     except OSError as error:
         raise UsersError(
             f"{link.parent}: {error.strerror}; choose another [dashboard] users"
@@ -206,16 +214,21 @@ def issue_link_token(users_file: Path, user: str, lifetime_s: float = 900.0) -> 
     return token
 
 
-def redeem_link_token(users_file: Path, token: str, now: float) -> str | None:
-    """Name of the user the token is for, once; None when unknown, used or expired (now: s since
-    1970).
+def redeem_link_token(users_file: Path, token: str, now: float | None = None) -> str | None:
+    """Name of the user the token is for, once; None when unknown, used or expired: by what has
+    elapsed since it was made, or at `now`, s since 1970.
     """
     link = _link_file(users_file, token)
     try:
         content = json.loads(link.read_text(encoding="utf-8"))
         # of two that race, only one removes the file; the other gets FileNotFoundError
         link.unlink()
-        return str(content["user"]) if now < float(content["expires"]) else None
+        made = Moment.of(content.get("moment"))
+        if now is None and made is not None:
+            valid = made.age_s < float(content["lifetime_s"])
+        else:
+            valid = (time.time() if now is None else now) < float(content["expires"])
+        return str(content["user"]) if valid else None
     except (OSError, ValueError, KeyError, TypeError):
         return None
 

@@ -16,6 +16,8 @@ from inertial.navigation.navigation import NAVIGATORS, Correction, NavigatorConf
 
 log = logging.getLogger(__name__)
 
+AHEAD_S = 600.0  # a fix further ahead of all else says nothing of the time
+
 Array = NDArray[np.float64]
 
 
@@ -112,7 +114,9 @@ class NavBoard:
         """Hand a fix to every filter; one that comes before the first sample has nothing to
         correct.
         """
-        self._newest = max(self._newest, fix.t)
+        known = self._newest > -math.inf
+        if not known or fix.t < self._newest + AHEAD_S:  # an order to mute goes by this time
+            self._newest = max(self._newest, fix.t)
         if self.muted(fix.t):
             fix = replace(fix, withheld=True, muted=True)
         for navigator in self.navigators.values():

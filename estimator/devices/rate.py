@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.stream import Stream, every, worth_a_line
-from inertial.layouts.layout import GeometryError
 from inertial.rate.batch import RateColumns, RateState
 from inertial.rate.beliefs import Beliefs, make
 
@@ -172,6 +171,8 @@ class RateBoard:
         """Tell the estimators when the axes they may use have changed; one that cannot do without
         says so itself.
         """
+        from inertial.rate.estimators import leave_out  # here: loads only where it is needed
+
         if mask == self._mask:
             return
         names = [name for k, name in enumerate(self.wiring.axis_names) if mask >> k & 1]
@@ -180,9 +181,10 @@ class RateBoard:
         )
         self._mask = mask
         for estimator in self._estimators.values():
-            try:
-                estimator.exclude(mask)
-            except GeometryError as error:
+            if (error := leave_out(estimator, mask)) is not None:
                 log.warning(
-                    "%s: %s goes on with the axes it had: %s", self.device, estimator.name, error
+                    "%s: %s knows nothing until axes are good again: %s",
+                    self.device,
+                    estimator.name,
+                    error,
                 )

@@ -11,7 +11,7 @@ import logging
 import queue
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 
 from firmware_protocol.codec import Frame
@@ -64,6 +64,7 @@ class DeviceLink:
         self._next_put: Put | None = None  # None: there is no bus yet
         self._live = False
         self._looked = time.monotonic()
+        self.on_stopped: Callable[[], object] = lambda: None  # this process did not run for a while
         self.journal = Journal(
             folder, settings.journal_bytes, settings.segment_bytes, settings.sync_s
         )
@@ -147,6 +148,7 @@ class DeviceLink:
             hurry = held or self.orders.waiting
             try:
                 chunk = self.queue.get(timeout=min(left, JOIN_WAIT_S) if hurry else left)
+                self._look()
             except queue.Empty:
                 if held:
                     self.samples.flush()
@@ -165,6 +167,7 @@ class DeviceLink:
         if now - before > STOPPED_S:
             self.watch.stopped(now - before)
             self.report.stopped(now - before)
+            self.on_stopped()
             log.warning("%s: this process was stopped for %.1f s", self.name, now - before)
         return now
 
@@ -197,6 +200,11 @@ class DeviceLink:
         """
         self._next_put = put
         self.queue.put(None)  # behind the chunks that were read without a bus
+
+    def outrun(self, run: int) -> None:
+        """What is published from now on has a run above this one."""
+        self.journal.outrun(run)
+        self.out.run = self.journal.run
 
     def wake(self) -> None:
         """Let `run` look at its stop event now."""

@@ -33,7 +33,7 @@ class Outgoing:
         not leave.
         """
         self._door = door
-        self._device, self._run = device, run
+        self._device, self.run = device, run
         self._state, self._clock, self._wall = state, clock, wall
         self._put: Put | None = None
         self._known: Known | None = None
@@ -65,7 +65,7 @@ class Outgoing:
         # once the wall clock was set, which of its times was UTC is not known
         header.utc_sigma_s = self._clock.sigma_s + abs(self._wall.offset_s)
         header.source = self._state.source
-        header.run = self._run
+        header.run = self.run
         wrong = check(message)
         if wrong:  # frames, each of which may be believed, can make together what may not be
             key = f"{self._device}/{topic.name}"

@@ -133,6 +133,8 @@ class GnssDecoder:
         if sentence.name == "GSA":
             self._gsa, self._gsa_age = sentence, 0
         tod_ns = sentence.tod_ns
+        if tod_ns is None and sentence.place is not None:
+            raise Refused(sentence.name, "without its time")
         if tod_ns is None:  # VTG and GSA have no time: they belong to what is open
             if sentence.name not in ("VTG", "GSA") or self._nmea is None:
                 return []

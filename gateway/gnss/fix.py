@@ -90,11 +90,17 @@ def _with_sigma(fix: Fix, gst: Sentence | None, gsa: Sentence | None) -> Fix:
         return replace(fix, sigma_ned_m=(north, east, NAN if up is None else up))
     hdop = fix.hdop or (gsa.hdop if gsa is not None else 0.0)
     vdop = gsa.vdop if gsa is not None else 0.0
-    usual = USUAL_SIGMA_M.get(fix.quality)
-    if usual is None or not hdop:
+    if not hdop or fix.quality not in USUAL_SIGMA_M:
         return fix
-    level, up = usual * max(hdop, 1.0), 2.0 * usual * max(vdop, hdop, 1.0)
+    level, up = usual_sigma(fix.quality)
+    level, up = level * max(hdop, 1.0), up * max(vdop, hdop, 1.0)
     return replace(fix, sigma_ned_m=(level, level, up))
+
+
+def usual_sigma(quality: int) -> tuple[float, float]:
+    """m, north or east, and up, of a fix in good geometry."""
+    level = USUAL_SIGMA_M.get(quality, USUAL_SIGMA_M[AUTONOMOUS])
+    return level, 2.0 * level
 
 
 def _with_course(fix: Fix, rmc: Sentence | None, vtg: Sentence | None) -> Fix:
@@ -178,7 +184,8 @@ def _with_velocity(fix: Fix, parts: Mapping[str, Nav]) -> Fix:
     cov, sigma = parts.get("NAV-COV"), source.v_sigma
     if cov is not None and cov.v_sigma is not None:
         sigma = cov.v_sigma
-    if sigma is not None and sigma[2] >= MOST_SPEED_ACCURACY_MPS:
+    flat = any(part.flat for part in parts.values())  # then no climb is measured either
+    if sigma is not None and (flat or sigma[2] >= MOST_SPEED_ACCURACY_MPS):
         down, sigma = NAN, (*sigma[:2], NAN)
     return replace(
         fix,

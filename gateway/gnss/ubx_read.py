@@ -28,7 +28,12 @@ WEEK_MS = 7 * DAY_S * 1000
 MOST_ACCURACY_M = 10e3  # a position or height that is no better is none
 MOST_SPEED_ACCURACY_MPS = 50.0
 FIX_2D = 2
-DATED, TIMED, UTC_KNOWN = 1, 2, 4  # bits of NAV-PVT's valid and of NAV-TIMEUTC's
+DATED, TIMED, RESOLVED = (
+    1,
+    2,
+    4,
+)  # bits of NAV-PVT's valid; before the last, leap seconds are guessed
+UTC_KNOWN = 4  # bit of NAV-TIMEUTC's valid
 GEOCENTRE_M = (6.2e6, 6.6e6)  # distance of an antenna from it
 
 PVT = struct.Struct("<IHBBBBBBIiBBBBiiiiIIiiiiiIIHH")
@@ -113,7 +118,7 @@ def _pvt(name: str, p: tuple) -> Nav:
     tow, year, month, day, hour, minute, second, valid, _, nano, fix_type, flags, _, sats = p[:14]
     lon, lat, height, altitude, h_acc, v_acc, v_north, v_east, v_down = p[14:23]
     ground_speed, course, speed_acc, flags3 = p[23], p[24], p[25], p[28]
-    timed = valid & DATED and valid & TIMED
+    timed = valid & DATED and valid & TIMED and valid & RESOLVED
     place = _place(name, lat / 1e7, lon / 1e7, h_acc / 1e3)
     v_n, v_sigma = _velocity(name, (v_north / 1e3, v_east / 1e3, v_down / 1e3), speed_acc / 1e3)
     known = height_or_none(height / 1e3) if v_acc / 1e3 < MOST_ACCURACY_M else None

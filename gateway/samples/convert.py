@@ -6,7 +6,7 @@ from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
 
 from firmware_protocol.codec import FLAG_SIMULATED
 from firmware_protocol.frames import Hello, Imu6, Status, field_names
-from gateway.gnss.fix import Fix
+from gateway.gnss.fix import Fix, usual_sigma
 from inertial.constants import GEOID_SIGMA, GRAVITY
 from messages.contract import gyrofree_pb2 as pb
 
@@ -127,7 +127,7 @@ def gnss_fix(fix: Fix) -> pb.GnssFix:
         fix_utc_ns=fix.fix_utc_ns,
         quality=fix.quality,
         satellites=fix.satellites,
-        hdop=fix.hdop,
+        hdop=fix.hdop or math.nan,
         talker=fix.talker,
         latitude_deg=math.nan,
         longitude_deg=math.nan,
@@ -148,7 +148,9 @@ def gnss_fix(fix: Fix) -> pb.GnssFix:
     elif fix.height_msl_m is not None:  # nobody says how far the sea is from the ellipsoid there
         message.height_m = fix.height_msl_m
         message.height_reference = pb.HEIGHT_REFERENCE_SEA_LEVEL
-        sigma = None if sigma is None else (*sigma[:2], math.hypot(sigma[2], GEOID_SIGMA))
+        level, up = usual_sigma(fix.quality)
+        north, east, own = sigma or (level, level, up)
+        sigma = (north, east, math.hypot(own if math.isfinite(own) else up, GEOID_SIGMA))
     elif sigma is not None:
         sigma = (*sigma[:2], math.nan)
     message.position_sigma_ned_m.extend(sigma or ())

@@ -16,6 +16,7 @@ from gyrofree.commands.options import (
 )
 from gyrofree.running.process import EXIT_CONFIG, fail
 from sessions.library.annotations import SessionNote, add_note, change_annotations
+from sessions.recording.manifest import check_id
 
 
 def note(
@@ -29,8 +30,8 @@ def note(
     config: Config = None,
 ) -> None:
     """Add a remark to a session; the recording itself is never changed."""
-    folder = catalogue_of(settings_of(config)).root / session
     try:
+        folder = catalogue_of(settings_of(config)).root / check_id(session)
         notes = add_note(
             folder, SessionNote(text=text, author=author, at_s=at, written_utc_ns=time.time_ns())
         ).notes
@@ -52,7 +53,6 @@ def tag(
     config: Config = None,
 ) -> None:
     """Title, tags and outcome of a session."""
-    folder = catalogue_of(settings_of(config)).root / session
 
     def change(was):
         tags = (set(was.tags) | set(add or ())) - set(remove or ())
@@ -64,6 +64,7 @@ def tag(
         return type(was).model_validate(was.model_dump() | new)
 
     try:
+        folder = catalogue_of(settings_of(config)).root / check_id(session)
         changed = change_annotations(folder, change)
     except (ValueError, OSError) as error:
         raise fail(str(error).splitlines()[0], EXIT_CONFIG) from None

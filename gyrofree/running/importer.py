@@ -103,6 +103,7 @@ def _fixes(source: BoardLog) -> Iterator[Item]:
             longitude_deg=math.degrees(fix.longitude),
             height_m=fix.height,
             height_msl_m=math.nan,  # a log does not say
+            hdop=math.nan,
             height_reference=pb.HEIGHT_REFERENCE_ELLIPSOID
             if fix.has_height
             else pb.HEIGHT_REFERENCE_UNKNOWN,

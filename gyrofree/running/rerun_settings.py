@@ -14,6 +14,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from estimator.settings import EstimatorSettings
+from inertial.toml_file import parsed as parse_toml
 from messages.text import file_name, plain
 
 # settings that name a file -> the setting of the folder that such files are saved to
@@ -49,7 +50,7 @@ def with_changes(settings: EstimatorSettings, changes: list[str]) -> EstimatorSe
     for text in changes:
         key, equals, value = (part.strip() for part in text.partition("="))
         try:
-            parsed = tomllib.loads(f"value = {value}")["value"]
+            parsed = parse_toml(f"value = {value}")["value"]
         except tomllib.TOMLDecodeError:
             parsed = value
         place, *inner = key.split(".")

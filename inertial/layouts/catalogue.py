@@ -21,7 +21,7 @@ import numpy as np
 import tomli_w
 
 from inertial.layouts.layout import SENSORS, GeometryError, Layout, Sensor
-from inertial.toml_file import text_of
+from inertial.toml_file import parsed, text_of
 
 HERE = Path(__file__).resolve().parent
 MOST_AXES = 64
@@ -81,7 +81,7 @@ def _read_built_in(name: str) -> tuple[Layout, bool]:
 def load(path: Path) -> Layout:
     """Layout of a file; raises GeometryError."""
     try:
-        values = tomllib.loads(text_of(path))
+        values = parsed(text_of(path))
     except OSError as error:
         raise GeometryError(
             f"{path}: {error.strerror}; want a layout file, docs/layouts.md describes it"

@@ -71,6 +71,12 @@ class Fix:
         """Whether the receiver gives a height at all."""
         return math.isfinite(self.height)
 
+    def beside(self, datum: float | None) -> "Fix":
+        """Without its height where that counts from the sea and those used so far (their datum, m;
+        None: there were none) from the ellipsoid: the two are tens of metres apart.
+        """
+        return replace(self, height=math.nan) if self.datum and datum == 0.0 else self
+
     def filled(self) -> "Fix":
         """With numbers, and sigmas that say that they mean nothing, for what is unknown: for those
         who cannot leave a component out.

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.core import navigation as core
-from inertial.toml_file import text_of
+from inertial.toml_file import parsed, text_of
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ class FuzzyRules:
 def read_rules(path: Path = DEFAULT_FILE) -> FuzzyRules:
     """Rules from TOML; raises FuzzyError that names the file, the key and what is wanted."""
     try:
-        data = tomllib.loads(text_of(path))
+        data = parsed(text_of(path))
     except (OSError, tomllib.TOMLDecodeError) as error:
         raise FuzzyError(f"{path}: {error}") from None
     known = {"force_mps2", "rate_radps", "combine", "rules"}

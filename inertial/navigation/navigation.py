@@ -173,7 +173,7 @@ class Navigator:
         reason = self.config.fix.objection(fix)
         if reason:
             return self._refuse(nothing_compared(fix), "rejected", reason)
-        fix = self.watch.take(fix)
+        fix = self.watch.take(fix.beside(self._datum if self._measured_height else None))
         self.counts["dragged"] += fix.drag > 0.0
         if self._origin is None:
             self._origin = (fix.latitude, fix.longitude, fix.height)

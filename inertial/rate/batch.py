@@ -99,6 +99,7 @@ class RateColumns:
     bias: Array  # (n, 12) or (n, 6)
     phase: NDArray[np.uint8]  # (n,), of Phase
     sight: NDArray[np.uint8]  # (n, 3), of sight.VALID, AMBIGUOUS, BLIND, by component of omega
+    doubt: NDArray[np.uint8]  # (n,), into sight.DOUBTS: why nothing is valid
     sign_variance: Array  # (rad/s)^2, (n,), of omega along itself for the question of its sign
     bound_sigma: Array  # rad/s, (n, 3), posterior Cramer-Rao bound; 0 where it is not known
     aided: NDArray[np.bool_]  # (n,), omega was corrected by the tachometer, now or before
@@ -138,7 +139,9 @@ class RateColumns:
 
     def sight_reason(self, k: int) -> str:
         """Why components of omega were not valid at sample k, for people; empty when all were."""
-        phase = self.phase[k]
+        phase, doubt = self.phase[k], sight.DOUBTS[self.doubt[k]]
+        if doubt:
+            return doubt
         if phase == Phase.WAITING:
             return WAITING + (LOST if self.began_anew else "")
         if not self.sight[k].any():

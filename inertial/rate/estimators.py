@@ -13,9 +13,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.layouts.layout import Layout
+from inertial.layouts.layout import GeometryError, Layout
 from inertial.rate import bound, least_squares, products_ekf, tachometer
-from inertial.rate.batch import Phase, RateColumns, RateState, columns
+from inertial.rate.batch import RateColumns, RateState, columns
 from inertial.rate.observed import sensor
 from inertial.rate.rows import Rows
 from inertial.rate.samples import BRIDGED, Samples
@@ -49,6 +49,10 @@ class RateEstimator(Protocol):
 
     def skip(self, n: int) -> None:
         """n samples are missing before the next one."""
+        ...
+
+    def withhold(self, on: bool) -> None:
+        """Take the samples from here on for none, as when their axes are stale: unknown is said."""
         ...
 
     def tacho(self, t_s: float, rate: float, sigma: float, signed: bool = True) -> None:
@@ -120,6 +124,10 @@ class LeastSquaresRate(_Stepping):
         if n > BRIDGED:
             self._core.gap()
 
+    def withhold(self, on: bool) -> None:
+        """See RateEstimator.withhold."""
+        self._core.native.withhold(on)
+
     def tacho(self, t_s: float, rate: float, sigma: float, signed: bool = True) -> None:
         """See RateEstimator.tacho: no aid."""
 
@@ -154,8 +162,6 @@ class ProductsRate(_Stepping):
         self.core = products_ekf.ProductsFilter(layout, config, self.method, follows)
         self.calibration = calibration
         self._taken, self._reports = Samples(), tachometer.Reports()
-        # of a standing body, which may have begun to turn
-        self._unseen = config.unseen_rate**2 * np.eye(3)
         self._axis_b, self._aided = np.array([0.0, 0.0, 1.0]), False
 
     def feed(self, t_s: Array, f_axis: Array) -> RateColumns:
@@ -174,9 +180,6 @@ class ProductsRate(_Stepping):
         return self._columns(rows, aided)
 
     def _columns(self, rows: Rows, aided: NDArray[np.bool_] | None = None) -> RateColumns:
-        still = rows["phase"] == int(Phase.STILL)  # numpy takes long over an enumeration's member
-        if still.any():
-            rows["P"][still] += self._unseen
         return columns(
             rows,
             products=self.core.sensor.m,
@@ -192,6 +195,10 @@ class ProductsRate(_Stepping):
         """See RateEstimator.skip; the next step predicts across the gap."""
         if n > BRIDGED:
             self.core.gap()
+
+    def withhold(self, on: bool) -> None:
+        """See RateEstimator.withhold."""
+        self.core.native.withhold(on)
 
     def exclude(self, mask: int) -> None:
         """See RateEstimator.exclude."""
@@ -272,6 +279,19 @@ class FreeBodyRate(ProductsRate):
     name = "products-free"
     with_bound = False
     default = products_ekf.Config(fixed_axis=False, gravity_aid=False)
+
+
+def leave_out(estimator: RateEstimator, mask: int) -> GeometryError | None:
+    """Go on without the axes of the mask's bits; where the rest cannot see omega' and p, samples
+    are taken for none until another mask comes, and the error says why.
+    """
+    try:
+        estimator.exclude(mask)
+    except GeometryError as error:
+        estimator.withhold(True)
+        return error
+    estimator.withhold(False)
+    return None
 
 
 ESTIMATORS: dict[str, Any] = {

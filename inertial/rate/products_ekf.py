@@ -100,6 +100,7 @@ def tuning(layout: Layout, config: Config, method: str = "ekf") -> native.RateTu
         "products_gate": c.products_gate,
         "force_gate": c.force_gate,
         "unseen_alpha": c.unseen_alpha**2,
+        "unseen_rate": c.unseen_rate**2,
         "forget": 1.0 / c.forget_s,
         "bias": axis_bias(layout, c) ** 2,
         "tilt": (c.tilt * g) ** 2,

@@ -17,6 +17,15 @@ ALL_VALID, ALL_BLIND = (VALID,) * 3, (BLIND,) * 3
 BLIND_SIGMA = 0.05  # rad/s
 DEG = 180.0 / np.pi
 
+DOUBTS = (
+    "",
+    "turning about a vertical axis or standing with large biases: not told apart yet",
+    "the innovations contradict the estimate",
+    "no usable data: axes at the end of their range, frozen or stale",
+    "this estimator has no noise model: how far it may be off is not known while it turns",
+)
+"""Why nothing of an estimate is valid, for people, by the number that the core says (Doubt)."""
+
 
 def reason(
     sights: tuple[int, int, int], variances: Array, sign_variance: float, two: bool, size: float

@@ -13,7 +13,7 @@ import zenoh
 from google.protobuf.message import DecodeError, Message
 
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.checks import check
+from messages.contract.checks import MESSAGE_BYTES, check
 from messages.contract.topics import (
     TopicError,
     check_name,
@@ -122,14 +122,20 @@ def _read(reply: zenoh.Reply, kind: Kind[C, A], patience_s: float) -> A:
             raise NoAnswer(f"{kind.who} did not answer within {patience_s:g} s: {kind.look}")
         reason = said.decode(errors="replace")[:REASON_LENGTH]
         raise Refused(f"{kind.who}: {reason}")
-    payload = reply.ok.payload.to_bytes()
+    size, answer = len(reply.ok.payload), kind.answer()
     try:
-        return kind.answer.FromString(payload)
+        if size > MESSAGE_BYTES:
+            raise DecodeError
+        answer.ParseFromString(reply.ok.payload.to_bytes())
     except DecodeError:
         raise NoAnswer(
-            f"{kind.who} answered with {len(payload)} bytes that are no {kind.answer.__name__}: is"
-            " it of another version?"
+            f"{kind.who} answered with {size} bytes that are no {kind.answer.__name__}: is it of"
+            " another version?"
         ) from None
+    wrong = check(answer)
+    if wrong:
+        raise NoAnswer(f"{kind.who} answered with what cannot be: {wrong[0]}")
+    return answer
 
 
 class Order(Generic[C, A]):

@@ -17,6 +17,7 @@ import zenoh
 from google.protobuf.message import Message
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from messages.bus.fencing import packed
 from messages.contract.door import read
 from messages.contract.topics import NAME, REPLAY_SUFFIX, Topic
 from messages.history.spool import Spool
@@ -182,6 +183,7 @@ class Publishers:
         self._by_key: dict[str, zenoh.Publisher] = {}
         self._sequence: dict[str, int] = {}
         self._published: dict[str, int] = {}  # by an earlier life of this process
+        self.number = 0  # that fences these messages (messages/bus/fencing.py); 0: none does
 
     def resume(self) -> None:
         """Count on from what the spool holds, for a publisher whose run goes on over its
@@ -206,6 +208,10 @@ class Publishers:
     def attach(self, session: zenoh.Session) -> None:
         """Publish from now on."""
         self._session = session
+
+    def hold(self) -> None:
+        """Only keep from now on, until the next `attach`."""
+        self._session = None
 
     def put(self, topic: Topic[M], device: str, message: M, estimator: str = "") -> None:
         """Publish; a message with a header gets this key's next sequence unless the caller set
@@ -241,7 +247,7 @@ class Publishers:
             self._by_key[key] = session.declare_publisher(
                 key, congestion_control=zenoh.CongestionControl.DROP
             )
-        self._by_key[key].put(payload)
+        self._by_key[key].put(payload, attachment=packed(self.number))
 
 
 def decode(topic: Topic[M], payload: bytes) -> M | None:

@@ -22,7 +22,7 @@ ROWS = 1024  # samples of one batch, so that the work for one message is bounded
 TEXT = 4000  # characters of a text without a rule
 BYTES = 1_000_000  # of a field of bytes without a rule
 ITEMS = 4096  # of a list without a rule
-ENTRIES = 1024  # of a map
+ENTRIES = 8192  # of a map
 NAMES = 1000  # sound ones that are remembered
 KINDS = (  # what a refusal can be counted as
     "bytes",  # no message of the type
@@ -37,6 +37,8 @@ KINDS = (  # what a refusal can be counted as
     "many",  # more devices or streams than there is room for
     "time",  # far from that of all others
     "answer",  # of a publisher: not what was asked for
+    "stale",  # of a publisher whose place another has taken
+    "repeated",  # it has come before, byte for byte
     "failure",  # we could not take it: a fault of ours
 )
 FLOATS = (FieldDescriptor.CPPTYPE_DOUBLE, FieldDescriptor.CPPTYPE_FLOAT)

@@ -5,7 +5,9 @@ the 1st, 2nd, 4th, 8th ..., so that a flood stays readable. Nothing that comes i
 """
 
 import logging
+import math
 import threading
+import time
 from collections import Counter
 from typing import TypeVar
 
@@ -27,16 +29,24 @@ OTHERS = "others"
 class Door:
     """The door of one room; may be used by several threads."""
 
-    def __init__(self, room: str, most_devices: int = DEVICES, most_streams: int = 4096) -> None:
+    def __init__(
+        self,
+        room: str,
+        most_devices: int = DEVICES,
+        most_streams: int = 4096,
+        gone_s: float = math.inf,
+    ) -> None:
         """most_devices, most_streams: so many are let in, the first that come; a stream is a
-        device's topic with its estimator.
+        device's topic with its estimator. gone_s: a device silent for so long makes room.
         """
+        self._gone_s = gone_s
+        self._gone: list[str] = []
         self.refused: Counter[str] = Counter()  # kind -> messages
         self._log = logging.getLogger(room)
         self._most_devices, self._most_streams = most_devices, most_streams
         self._by_device: dict[str, Counter[str]] = {}
         self._addresses: dict[str, Address | None] = {}
-        self._inside: set[str] = set()  # devices
+        self._inside: dict[str, float] = {}  # devices, and when they were heard last
         self._streams: set[tuple[str, str, str]] = set()
         self._lock = threading.Lock()
 
@@ -89,15 +99,16 @@ class Door:
         if size > MESSAGE_BYTES:
             refusal = _size(size)
         elif stream in self._streams:
+            self._inside[device] = time.monotonic()
             return True
-        elif device not in self._inside and len(self._inside) >= self._most_devices:
+        elif device not in self._inside and self._is_full():
             refusal = Refusal("many", "device", "one more", f"at most {self._most_devices}")
             device = OTHERS
         elif len(self._streams) >= self._most_streams:
             refusal = Refusal("many", "stream", "one more", f"at most {self._most_streams}")
             device = OTHERS
         else:
-            self._inside.add(device)
+            self._inside[device] = time.monotonic()
             self._streams.add(stream)
             return True
         self.refuse(key, refusal, device)
@@ -107,10 +118,24 @@ class Door:
         """A message whose bytes were not even fetched."""
         self.refuse(key, _size(size, most), device_of(key))
 
-    def forget(self, device: str) -> None:
-        """A device is gone: there is room for another."""
-        self._inside.discard(device)
-        self._streams = {stream for stream in self._streams if stream[0] != device}
+    def gone(self) -> list[str]:
+        """Devices that made room for others, each told once."""
+        found, self._gone = self._gone, []
+        return found
+
+    def _is_full(self) -> bool:
+        """Whether no device more may come; the one silent for longest goes if it has been so for
+        long enough.
+        """
+        if len(self._inside) < self._most_devices:
+            return False
+        oldest = min(self._inside, key=lambda name: self._inside[name], default="")
+        if oldest and time.monotonic() - self._inside[oldest] > self._gone_s:
+            del self._inside[oldest]
+            self._streams = {stream for stream in self._streams if stream[0] != oldest}
+            self._gone.append(oldest)
+            return False
+        return True
 
     def header(self, address: Address, payload: bytes, key: str) -> bool:
         """Whether the header in front of a message may be believed; of the rest nothing is looked

@@ -19,6 +19,8 @@ def complete(message: pb.GnssFix) -> pb.GnssFix:
     if unknown_sea and message.height_m == 0.0 and message.talker not in ("", "UBX"):
         message.height_m = math.nan
         message.height_reference = pb.HEIGHT_REFERENCE_UNKNOWN
+    if message.hdop == 0.0:
+        message.hdop = math.nan
     if unknown_sea:
         message.height_msl_m = math.nan
     return message

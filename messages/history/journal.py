@@ -4,7 +4,7 @@ with it.
 The gateway journals every raw read of a board with it, and gateway and estimator what they publish
 (spool.py). journal_file.py says what stands in a segment. One write per record; a thread calls
 fdatasync, which may take half a second and must never hold up the writer. `durable_seq` is what has
-reached the disk. Sequence numbers go on over restarts; `run` is new at every start. A tail that a
+reached the disk. Sequence numbers go on over restarts; `run` grows with each. A tail that a
 crash has torn is cut at the next start. A lock on the file `lock` in the folder keeps a second
 gateway out; the system frees it when the process ends, however that happens.
 """
@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from itertools import zip_longest
 from pathlib import Path
 
+from messages.history import journal_folder as on_disk
 from messages.history.journal_file import (
     RECORD_MAGIC,
     SEGMENT_HEAD,
@@ -28,7 +29,7 @@ from messages.history.journal_file import (
     scan,
     walk,
 )
-from messages.history.journal_folder import JournalBusy, end_of, first_of, lock_folder, remedy_of
+from messages.history.journal_folder import JournalBusy, end_of, first_of
 
 log = logging.getLogger(__name__)
 
@@ -59,8 +60,7 @@ class Journal:
         self.max_age_s = max_age_s
         self.segment_bytes = segment_bytes
         self.run = time.time_ns()
-        self.unkept_bytes = 0
-        self.cut_bytes = 0
+        self.unkept_bytes = self.cut_bytes = 0
         self.durable_seq = 0
         self.last_seq = 0
         self.max_sync_s = 0.0
@@ -76,6 +76,7 @@ class Journal:
         self._retry_at = 0.0
         self._sync_s = sync_s
         self._stop = threading.Event()
+        self._ages = on_disk.Ages()
         try:
             self._recover()
         except JournalBusy:
@@ -113,6 +114,11 @@ class Journal:
             if self._size >= self.segment_bytes:
                 self._finish_segment()
             return self.last_seq
+
+    def outrun(self, run: int) -> None:
+        """Our run is above this one, whatever the wall clock says; the folder remembers it."""
+        self.run = max(self.run, run + 1)
+        on_disk.keep_run(self.folder, self.run)
 
     def close(self) -> None:
         """Sync, close and let the folder go."""
@@ -183,7 +189,7 @@ class Journal:
         read.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
-        lock = lock_folder(self.folder)
+        lock = on_disk.lock_folder(self.folder)
         try:
             for name in self.segments()[-2:]:
                 last = last_whole(end_of(name))
@@ -206,6 +212,7 @@ class Journal:
             raise
         self.durable_seq = self.last_seq
         self._folder_lock = lock
+        self.outrun(on_disk.newest_run(self.folder))
 
     def _open_segment(self) -> bool:
         if time.monotonic() < self._retry_at:
@@ -252,7 +259,7 @@ class Journal:
             self._fd = None
         self._retry_at = time.monotonic() + RETRY_S
         if not self._write_message:
-            remedy = remedy_of(error)
+            remedy = on_disk.remedy_of(error)
             self._write_message = (
                 f"journal {self.folder}: {error.strerror}; data are shown but NOT KEPT; {remedy}"
             )
@@ -316,14 +323,8 @@ class Journal:
         self.durable_seq = last
 
     def _retain(self) -> None:
-        names = self.segments()
-        states = [name.stat() for name in names]
-        total = sum(state.st_size for state in states)
-        now = time.time()
-        for name, state in zip(names[:-1], states, strict=False):  # never the newest
-            old = self.max_age_s and now - state.st_mtime > self.max_age_s
-            if total <= self.max_bytes and not old:
-                return
+        for name in on_disk.superfluous(
+            self.segments(), self.max_bytes, self.max_age_s, self._ages
+        ):
             name.unlink(missing_ok=True)
-            total -= state.st_size
             log.info("%s: removed, the journal keeps %d bytes", name, self.max_bytes)

@@ -29,6 +29,7 @@ from messages.history.mending_state import (
     header_of,
     say,
     take_out,
+    wanted_whole,
     wrong_item,
 )
 
@@ -55,11 +56,12 @@ class Mender:
         sources: tuple[str, ...] = ("gateway", "estimator"),
         since_ns: int = 0,
         refuse: Callable[[str, Refusal, str], None] | None = None,
+        now_ns: Callable[[], int] | None = None,
     ) -> None:
         """`topics` limits what is asked for; none: everything. A run that began after `since_ns` is
-        wanted whole. `refuse(key, why, device)` is told what of an answer is not taken.
+        wanted whole, `now_ns()` is its clock. `refuse(key, why, device)` is told what is not taken.
         """
-        self._refuse = refuse or say
+        self._refuse, self._now_ns = refuse or say, now_ns
         self._ask, self._hold, self._max_held = ask, hold, max_held
         self._topics, self._sources, self._since_ns = topics, sources, since_ns
         self._keys: dict[tuple[str, str], KeyState] = {}
@@ -122,11 +124,10 @@ class Mender:
         """The publisher's answer (None: there is none); what can be given on now, in order."""
         stream = self._streams.setdefault(question.stream, Stream())
         out: list[Arrival] = []
-        about = "/".join(question.stream)
         for item in reply.items if reply is not None else ():
             refusal = wrong_item(question.stream[0], item)
             if refusal is not None:
-                self._refuse(f"answer about {about}", refusal, question.stream[0])
+                self._refuse(question.about, refusal, question.stream[0])
                 continue
             skipped = self._skipped(stream, question, item)
             if skipped is not None:
@@ -138,7 +139,7 @@ class Mender:
             if refusal is None:
                 self._ask(question.more(reply.next))
                 return out
-            self._refuse(f"answer about {about}", refusal, question.stream[0])
+            self._refuse(question.about, refusal, question.stream[0])
         if stream.waiting:
             self._ask(Question(question.stream, stream.waiting.popleft()))
             return out
@@ -162,8 +163,7 @@ class Mender:
         key = self._keys.get((arrival.device, arrival.name))
         if key is None:
             key = self._keys[arrival.device, arrival.name] = KeyState(header.run, header.sequence)
-            whole = 0 < self._since_ns < header.run and 1 < header.sequence <= FARTHEST
-            if not whole:
+            if not wanted_whole(header, self._since_ns, self._now_ns):
                 return [arrival]
             key.last = 0
         if header.run == key.run and header.sequence == key.last + 1:

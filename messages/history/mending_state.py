@@ -2,6 +2,7 @@
 
 import logging
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -16,6 +17,7 @@ from messages.contract.topics import BY_NAME, NAME, Topic
 log = logging.getLogger(__name__)
 
 MOST_REPLIES = 10_000  # of one answer; a reply has about a MB
+CLOCKS_NS = 5_000_000_000  # two clocks that are set by one another differ by less
 FARTHEST = 10_000_000  # messages; a sequence that jumps further has begun anew: a day at 100 Hz
 
 
@@ -41,6 +43,11 @@ class Question(NamedTuple):
     stream: tuple[str, str]  # device, source
     query: pb.HistoryQuery
     replies: int = 0  # parts of the answer that have come
+
+    @property
+    def about(self) -> str:
+        """What a refusal of its answer names."""
+        return f"answer about {'/'.join(self.stream)}"
 
     def goes_on(self, reply: pb.HistoryReply) -> Refusal | None:
         """Why a reply that says there is more is not asked for more: each part must bring
@@ -129,6 +136,16 @@ def wrong_item(device: str, item: pb.HistoryItem) -> Refusal | None:
         found = f"{header.run}, {header.sequence}"
         return Refusal("answer", "payload", found, f"{item.run}, {item.sequence}")
     return None
+
+
+def wanted_whole(header: pb.Header, since_ns: int, now_ns: Callable[[], int] | None = None) -> bool:
+    """Is a run that is heard for the first time wanted from its beginning? It began after since_ns
+    (0: none is), and by its publisher's own clock no longer ago than that.
+    """
+    if not (0 < since_ns < header.run and 1 < header.sequence <= FARTHEST):
+        return False
+    age_ns = header.utc_ns - header.run
+    return now_ns is None or age_ns <= now_ns() - since_ns + CLOCKS_NS
 
 
 def take_out(missing: list[list[int]], gap: list[int], sequence: int) -> None:

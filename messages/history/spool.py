@@ -23,6 +23,7 @@ from itertools import groupby, zip_longest
 from operator import itemgetter
 from pathlib import Path
 
+from messages.clock import Clock
 from messages.contract import gyrofree_pb2 as pb
 from messages.history.journal import Journal
 from messages.history.journal_file import (
@@ -69,6 +70,7 @@ class Spool:
         segment_bytes: int = 4 << 20,
     ) -> None:
         self.journal = Journal(folder, max_bytes, segment_bytes, max_age_s=max_age_s)
+        self._clock = Clock()
         self._lock = threading.Lock()
         self._runs: dict[
             int, dict[tuple[str, str, int], list[int]]
@@ -90,7 +92,8 @@ class Spool:
             return
         data = HEAD.pack(run, sequence, utc_ns, len(name), len(owner)) + name + owner + payload
         with self._lock:
-            if not self.journal.append(PUBLISHED, data, time.monotonic_ns(), time.time_ns()):
+            at_ns = self._clock.now_ns()  # like the headers' times: without the wall clock's steps
+            if not self.journal.append(PUBLISHED, data, time.monotonic_ns(), at_ns):
                 return
             segment, offset = self.journal.place
             if segment not in self._runs:
@@ -197,7 +200,7 @@ class Spool:
                 chosen = name
                 if found[0] <= sequence:
                     break
-            elif chosen is not None or older(name, key[2]):
+            elif chosen is not None or (first_of(name) <= self._until and older(name, key[2])):
                 break
         behind = None
         for entry in map(entry_of, records_in(chosen) if chosen else ()):

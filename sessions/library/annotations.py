@@ -16,7 +16,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from messages import text
-from sessions.recording.manifest import SESSION_NAME, SessionError
+from sessions.recording.manifest import SESSION_NAME, Nanoseconds, SessionError
 
 FILE = "annotations.json"
 TAG = re.compile(r"[a-z0-9][a-z0-9_.-]{0,31}")
@@ -30,8 +30,9 @@ class SessionNote(BaseModel):
 
     text: str = Field(min_length=1, max_length=2000)
     author: str = ""
-    written_utc_ns: int = 0  # ns since 1970
-    at_s: float | None = None  # s from the session's start; None: about all of it
+    written_utc_ns: Nanoseconds = 0  # ns since 1970
+    # s from the session's start; None: about all of it
+    at_s: float | None = Field(default=None, allow_inf_nan=False)
 
 
 class Annotations(BaseModel):

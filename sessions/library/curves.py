@@ -240,6 +240,7 @@ def _facts(path: Path) -> dict[str, Any] | None:
         KeyError,
         EOFError,
         AttributeError,
+        RecursionError,
     ):  # AttributeError: a bare array, no archive
         return None
     except Exception as error:  # a cut archive: zipfile and zlib have errors of their own

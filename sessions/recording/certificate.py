@@ -28,6 +28,8 @@ WIRE = (
     "reboots",
 )
 
+HARMLESS = {"repeated", "stale"}  # refused, and yet nothing is missing
+
 
 class TopicCertificate(BaseModel):
     """Messages of one topic."""
@@ -47,11 +49,12 @@ class DeviceCertificate(BaseModel):
     model_config = ConfigDict(extra="ignore")
 
     complete: bool = (
-        True  # nothing lost, damaged or refused on the bus, no sample lost on the line, never dark
+        True  # nothing lost, damaged or refused on the bus, no sample missing, never dark
     )
     topics: dict[str, TopicCertificate] = {}
     wire: dict[str, int] = {}  # counters of LinkStatus over the session
     refused: dict[str, int] = {}  # messages not recorded, by what was wrong with them
+    missing_samples: int = 0  # by index and the device's clock, whatever the line said
     dark_s: float = 0.0  # s, by the board's clock, that nobody read it between two gateways' runs
 
 
@@ -82,6 +85,7 @@ def certify(
             lost=count.lost,
             damaged=count.unreadable,
         )
+        device.missing_samples += count.missing_samples
         if address.topic.source == LINK.source:
             device.dark_s = max(device.dark_s, count.dark_s)
     for name, counts in (refused or {}).items():
@@ -89,9 +93,9 @@ def certify(
             found.setdefault(name, DeviceCertificate()).refused = counts
     for device in found.values():
         bad = any(topic.lost or topic.damaged for topic in device.topics.values())
-        device.complete = not (
-            bad or device.refused or device.wire.get("lost_samples") or device.dark_s
-        )
+        lacks = device.refused.keys() - HARMLESS
+        missing = device.missing_samples or device.wire.get("lost_samples")
+        device.complete = not (bad or lacks or missing or device.dark_s)
     return found
 
 

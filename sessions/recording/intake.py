@@ -11,10 +11,13 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.checks import Refusal
 from messages.contract.door import Door
 from messages.history.mending import Mender
 from messages.history.mending_state import Arrival, Question
 from sessions.recording.manifest import Manifest
+
+REMEMBERED = 20_000  # messages; one that comes again is recognised among so many
 
 
 class Entry(NamedTuple):
@@ -44,7 +47,13 @@ class Intake:
         self._now_ns = now_ns
         self._prefix = prefix
         self._door = door
-        self._mender = None if ask is None else Mender(ask, since_ns=since_ns, refuse=door.refuse)
+        self._mender = (
+            None
+            if ask is None
+            else Mender(ask, since_ns=since_ns, refuse=door.refuse, now_ns=now_ns)
+        )
+        self._newest: deque[int] = deque()  # hashes of the newest messages, and the same as a set
+        self._known: set[int] = set()
         self._answers: deque[tuple[Question, pb.HistoryReply | None]] = deque()
         self._keys: dict[
             tuple[str, str, str], str
@@ -117,4 +126,18 @@ class Intake:
                 key = self._keys[name] = arrival.topic.key(
                     self._prefix, arrival.device, arrival.estimator
                 )
-            yield Entry(at_ns, key, arrival.payload, arrival.late)
+            if self._new(key, arrival):
+                yield Entry(at_ns, key, arrival.payload, arrival.late)
+
+    def _new(self, key: str, arrival: Arrival) -> bool:
+        """Has this very message not come lately?"""
+        mark = hash((key, arrival.payload))
+        if mark in self._known:
+            why = Refusal("repeated", "message", "the same, byte for byte", "each message once")
+            self._door.refuse(key, why, arrival.device)
+            return False
+        self._known.add(mark)
+        self._newest.append(mark)
+        if len(self._newest) > REMEMBERED:
+            self._known.discard(self._newest.popleft())
+        return True

@@ -5,10 +5,14 @@ sources.
 from google.protobuf.message import DecodeError
 
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.door import OTHERS
 from messages.contract.header import first_field
-from messages.contract.topics import Address
+from messages.contract.topics import ACCEL, ADC, IMU, Address
 from messages.history.mending_state import FARTHEST
 from sessions.recording.manifest import KeyCount
+from sessions.recording.sample_count import SampleCount
+
+SAMPLED = (ACCEL, IMU, ADC)
 
 
 class KeyState:
@@ -27,6 +31,7 @@ class KeyState:
         "repeated",
         "unreadable",
         "repaired",
+        "samples",
         "dark_us",
         "_last_us",
         "_step_us",
@@ -45,6 +50,7 @@ class KeyState:
         )
         self.repaired = self.dark_us = self._last_us = self._step_us = 0
         self._last_epoch: int | None = None
+        self.samples = SampleCount(address.topic) if address.topic in SAMPLED else None
         self.last_run: int | None = None
         self.last_sequence = 0
         self.sources: set[int] = set()
@@ -59,6 +65,7 @@ class KeyState:
             repeated=self.repeated,
             unreadable=self.unreadable,
             repaired=self.repaired,
+            missing_samples=0 if self.samples is None else self.samples.missing,
             dark_s=self.dark_us * 1e-6,
             last_run=self.last_run or 0,
             last_sequence=self.last_sequence,
@@ -76,7 +83,8 @@ class KeyState:
             if self.foreign is not None:
                 at = self.foreign.FromString(payload).timestamp
                 return at.seconds * 1_000_000_000 + at.nanos  # what is no time, the store sees
-            header = pb.Header.FromString(first_field(payload))
+            front = first_field(payload)
+            header = pb.Header.FromString(front)
         except (DecodeError, ValueError):
             self.unreadable += 1
             return 0
@@ -98,4 +106,14 @@ class KeyState:
         self._step_us = max(0, header.device_us - self._last_us)
         self._last_epoch, self._last_us = header.epoch, header.device_us
         self.sources.add(header.source)
+        if self.samples is not None:
+            head = len(front) + (2 if len(front) < 0x80 else 3)  # tag and length stand before it
+            self.samples.take(payload, header, head)
         return header.utc_ns
+
+
+def largest(counts: dict[str, int], most: int = 200) -> dict[str, int]:
+    """The largest counts above 0, and what all others come to: a status has to stay short."""
+    found = sorted(((n, key) for key, n in counts.items() if n), reverse=True)
+    rest = sum(n for n, _ in found[most:])
+    return {key: n for n, key in found[:most]} | ({OTHERS: rest} if rest else {})

@@ -9,7 +9,7 @@ import os
 import re
 import unicodedata
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -54,17 +54,22 @@ def name_of(recording: Path) -> str:
     return recording.parent.name if recording.name in (RECORDING, RECOVERED) else recording.stem
 
 
+Count = Annotated[int, Field(ge=0, lt=2**63)]
+Nanoseconds = Annotated[int, Field(ge=-(2**63), lt=2**63)]  # so that any time can be written
+
+
 class KeyCount(BaseModel):
     """What came in on one bus key."""
 
     model_config = ConfigDict(extra="ignore")
 
-    messages: int = 0
-    lost: int = 0  # sum of forward jumps of header.sequence within one run
-    restarts: int = 0  # header.run changed or header.sequence went back: the publisher began anew
-    repeated: int = 0  # the same header.sequence twice running
-    unreadable: int = 0  # payloads without a readable header; recorded all the same
-    repaired: int = 0  # of `messages`, filled in from what their publisher had kept
+    messages: Count = 0
+    lost: Count = 0  # sum of forward jumps of header.sequence within one run
+    restarts: Count = 0  # header.run changed or header.sequence went back: the publisher began anew
+    repeated: Count = 0  # the same header.sequence twice running
+    unreadable: Count = 0  # payloads without a readable header; recorded all the same
+    repaired: Count = 0  # of `messages`, filled in from what their publisher had kept
+    missing_samples: int = 0  # between its batches, by their index and the device's own clock
     # s, by the board's clock, that nobody spoke between one publisher's last message and the next's
     dark_s: float = 0.0
     last_run: int = 0  # of the newest message: where the session after a crash goes on
@@ -83,7 +88,7 @@ class ClockStep(BaseModel):
 
     model_config = ConfigDict(extra="ignore")
 
-    at_utc_ns: int = 0  # on the session's axis
+    at_utc_ns: Nanoseconds = 0  # on the session's axis
     step_s: float = 0.0  # by how much it went forward
 
 
@@ -108,18 +113,18 @@ class Manifest(BaseModel):
     number: int = 0  # grows from session to session of a folder, whatever the wall clock says
     # Receive time of the start and of the last message counted here, ns since 1970: the wall clock
     # at the start, and what has elapsed since.
-    start_utc_ns: int = 0
-    end_utc_ns: int = 0
+    start_utc_ns: Nanoseconds = 0
+    end_utc_ns: Nanoseconds = 0
     clock_steps: list[ClockStep] = []
     written: list[str | int] = []  # when this was written: messages.clock.Moment
-    bytes: int = 0  # of the file
+    bytes: Count = 0  # of the file
     sha256: str = ""  # of the closed or recovered file
     keys: dict[str, KeyCount] = {}
     channels: dict[
         int, str
     ] = {}  # MCAP channel id -> bus key, so that a file can be read without its first chunk
-    overflow: int = 0  # messages not recorded because the disk or the process could not keep up
-    unknown: int = 0  # messages on keys that are not in the topic table; not recorded
+    overflow: Count = 0  # messages not recorded because the disk or the process could not keep up
+    unknown: Count = 0  # messages on keys that are not in the topic table; not recorded
     # messages not recorded, by device and what was wrong with them (messages/contract/door.py)
     refused: dict[str, dict[str, int]] = {}
     recovery: str = ""  # what the recovery found and kept

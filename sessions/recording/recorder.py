@@ -15,6 +15,7 @@ import zenoh
 
 from messages import text
 from messages.bus import orders
+from messages.bus.fencing import Fence
 from messages.bus.session import BusSettings
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import MESSAGE_BYTES, Refusal
@@ -24,6 +25,7 @@ from messages.history.mending_state import Question
 from messages.text import plain
 from sessions.library.annotations import give_title
 from sessions.recording.intake import Entry, Intake
+from sessions.recording.keys import largest
 from sessions.recording.manifest import Manifest, SessionError, name_fault, slug
 from sessions.recording.session_clock import SessionClock
 from sessions.recording.settings import RecorderSettings
@@ -64,6 +66,7 @@ class Recorder:
         self._clock = SessionClock()
         self._bytes_in = self._bytes_out = 0  # of the inbox: counted each by one thread
         self._door = self._new_door()
+        self.fence = Fence(lambda *refusal: self._door.refuse(*refusal))
         self._intake = Intake(bus.prefix, None, 0, self._door)
         self._overflow = 0
         self._store: SessionStore | None = None
@@ -75,20 +78,19 @@ class Recorder:
 
     def on_sample(self, sample: zenoh.Sample) -> None:
         """Zenoh's thread: note the receive time and leave."""
-        if not self._recording:
+        key = str(sample.key_expr)
+        if not self.fence.admit(key, sample.attachment) or not self._recording:
             return
         size, waiting = len(sample.payload), self._bytes_in - self._bytes_out
         if size > MESSAGE_BYTES:
-            self._door.too_large(str(sample.key_expr), size)
+            self._door.too_large(key, size)
             return
-        if (
-            len(self._inbox) >= self.settings.max_inbox
-            or waiting + size > self.settings.max_inbox_bytes
-        ):
+        room = self.settings.max_inbox_bytes - waiting
+        if len(self._inbox) >= self.settings.max_inbox or size > room:
             self._overflow += 1
             return
         self._bytes_in += size
-        self._inbox.append((self._clock.now_ns(), str(sample.key_expr), sample.payload.to_bytes()))
+        self._inbox.append((self._clock.now_ns(), key, sample.payload.to_bytes()))
 
     def on_order(self, order: Order) -> None:
         """Zenoh's thread: keep the order for the loop."""
@@ -238,12 +240,8 @@ class Recorder:
         self._last = self._describe(store)
         self._store = None
         self._message = "" if closed else store.error
-        log.info(
-            "%s: %s, %d messages",
-            store.manifest.id,
-            "closed" if closed else "left open",
-            store.messages,
-        )
+        state = "closed" if closed else "left open"
+        log.info("%s: %s, %d messages", store.manifest.id, state, store.messages)
 
     def _finish_repairs(self, store: SessionStore) -> None:
         """Wait a little for answers that are under way; then what is held is written with its
@@ -322,8 +320,8 @@ class Recorder:
             messages=store.messages,
             bytes=store.size,
             durable_messages=store.durable_messages,
-            lost={key: lost for key, lost in store.lost().items() if lost},
-            repaired=store.repaired(),
+            lost=largest(store.lost()),
+            repaired=largest(store.repaired()),
             repairing=self._intake.held,
             refused=self._door.counts(),
         )

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 from google.protobuf.descriptor import FieldDescriptor
 from google.protobuf.json_format import MessageToDict
-from google.protobuf.message import Message
+from google.protobuf.message import DecodeError, Message
 from numpy.typing import NDArray
 
 from messages.contract import fixes, rates
+from messages.contract.checks import check
 from messages.contract.topics import ACCEL, ADC, GNSS, IMU, RATE, Topic
 
 Column = NDArray[Any]
@@ -59,8 +60,13 @@ class Samples:
 
 
 def decode(topic: Topic, payload: bytes) -> Message:
-    """A recorded message of this topic in its present form. Raises DecodeError."""
+    """A recorded message of this topic in its present form. Raises DecodeError for bytes that are
+    none, and for one that the contract does not allow.
+    """
     message = topic.type.FromString(payload)
+    wrong = check(message)
+    if wrong:
+        raise DecodeError(str(wrong[0]))
     if topic is GNSS:
         return fixes.complete(message)
     return rates.complete(message) if topic is RATE else message

@@ -50,6 +50,7 @@ def run(
         )
         samples = session.declare_subscriber(f"{bus.prefix}/**", recorder.on_sample)
         control = orders.take(session, bus.prefix, orders.RECORDER, recorder.on_order)
+        fence = recorder.fence.declare(session, bus.prefix)
         _go_on(recorder, settings.root)
         # the session that begins now has its session.json before recovery looks at the folders
         recorder.step()
@@ -68,6 +69,7 @@ def run(
         finally:
             samples.undeclare()
             control.undeclare()
+            fence.undeclare()
             recorder.close()
             asker.close()
             publishers.put(STATUS, RECORDER, recorder.status())

@@ -31,6 +31,7 @@ FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
 INK, DIM, LINE = colors.HexColor("#16202a"), colors.HexColor("#5b6770"), colors.HexColor("#d6dce1")
 VERDICTS = {"pass": colors.HexColor("#00704f"), "fail": colors.HexColor("#b03a00")}
 MARGIN = 18 * mm
+CELL = 2500  # characters of a fact, so that it fits on a page
 WIDTH = A4[0] - 2 * MARGIN
 
 
@@ -129,7 +130,7 @@ def _pairs(rows: list[tuple[str, str]]) -> Table:
     cells = [
         [
             Paragraph(html(name), _style("name", 8, textColor=DIM)),
-            Paragraph(paragraph(value), _style("value", 8)),
+            Paragraph(paragraph(value, CELL), _style("value", 8)),
         ]
         for name, value in rows
     ]

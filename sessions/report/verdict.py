@@ -16,7 +16,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
-from inertial.toml_file import text_of
+from inertial.toml_file import parsed, text_of
 from sessions.report.metrics import Metric
 
 DEFAULT = Path(__file__).parent / "acceptance.toml"
@@ -74,7 +74,7 @@ def load_spec(path: Path | None) -> Spec:
     """The file, or the one that comes with gyrofree; raises SpecError."""
     path = path or DEFAULT
     try:
-        return Spec.model_validate(tomllib.loads(text_of(path)))
+        return Spec.model_validate(parsed(text_of(path)))
     except OSError as error:
         raise SpecError(f"{path}: {error.strerror}") from None
     except tomllib.TOMLDecodeError as error:

@@ -1,10 +1,10 @@
 """Is a number called valid only where the data bear it out? A line per condition and profile.
 
-For every condition of inertial/simulation/disturbed.py, three profiles, ten seeds, products-ekf as
-it comes: of the samples whose components are called valid, the share that is off by more than 5
-sigma (wanted: at most 0.001), and the mean NEES per component (wanted: between 0.5 and 2); what
-share of the time is called valid, and the rate RMS over it, deg/s.
-Usage: python tests/bench/bench_honesty.py [seeds] [part of a condition's name ...]
+For every condition of inertial/simulation/disturbed.py, three profiles, ten seeds, an estimator as
+it comes (products-ekf unless others are named): of the samples whose components are called valid,
+the share that is off by more than 5 sigma (wanted: at most 0.001), and the mean NEES per component
+(wanted: between 0.5 and 2); what share of the time is called valid, the rate RMS over it, deg/s.
+Usage: python tests/bench/bench_honesty.py [seeds] [estimator ...] [part of a condition's name ...]
 """
 
 import json
@@ -41,12 +41,12 @@ def estimate(log: Record, name: str = "products-ekf"):
     return np.concatenate(omega), np.concatenate(P), np.concatenate(valid)
 
 
-def figures(condition: str, profile: str, seeds: int) -> dict:
+def figures(name: str, condition: str, profile: str, seeds: int) -> dict:
     """Over all seeds, the worst axis of each figure."""
     beyond, nees, share, rms, worst = [], [], [], [], []
     for seed in range(1, seeds + 1):
         log = record(seed, profile, **CONDITIONS[condition])
-        omega, P, valid = estimate(log)
+        omega, P, valid = estimate(log, name)
         error, sigma = omega - log.omega_b, np.sqrt(np.einsum("kii->ki", P))
         said = np.maximum(valid.sum(axis=0), 1)
         beyond.append(((np.abs(error) > 5.0 * sigma) & valid).sum(axis=0) / said)
@@ -67,18 +67,16 @@ def figures(condition: str, profile: str, seeds: int) -> dict:
 def main() -> None:
     """All figures."""
     seeds = int(sys.argv[1]) if len(sys.argv) > 1 else 10
-    wanted = sys.argv[2:]
-    for condition in CONDITIONS:
-        if wanted and not any(word in condition for word in wanted):
-            continue
-        for profile in PROFILES:
-            print(
-                json.dumps(
-                    {"bench": "honesty", "condition": condition, "profile": profile, "seeds": seeds}
-                    | figures(condition, profile, seeds)
-                ),
-                flush=True,
-            )
+    wanted = [word for word in sys.argv[2:] if word not in ESTIMATORS]
+    names = [word for word in sys.argv[2:] if word in ESTIMATORS] or ["products-ekf"]
+    for name in names:
+        for condition in CONDITIONS:
+            if wanted and not any(word in condition for word in wanted):
+                continue
+            for profile in PROFILES:
+                said = {"bench": "honesty", "estimator": name, "condition": condition}
+                said |= {"profile": profile, "seeds": seeds}
+                print(json.dumps(said | figures(name, condition, profile, seeds)), flush=True)
 
 
 if __name__ == "__main__":

@@ -8,6 +8,8 @@ import httpx
 import pytest
 from support.front_door import message, open_door, wait_for
 
+from dashboard.web.connections import trusted
+
 HEAD = b"GET /login HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 
 
@@ -155,6 +157,14 @@ def _rest(link: socket.socket) -> bytes:
     except OSError:
         pass
     return b""
+
+
+def test_proxies_of_ours_are_known_by_address_and_network():
+    ours = ["10.1.0.0/16", "::1", "192.168.1.5", "proxy"]
+    for address in ("10.1.2.3", "::1", "192.168.1.5", "proxy"):
+        assert trusted(address, ours) and trusted(address, ["*"])
+    for address in ("10.2.0.1", "::2", "192.168.1.6", "unknown", ""):
+        assert not trusted(address, ours) and not trusted(address, [])
 
 
 def test_scenes_of_one_user_and_of_all_are_counted(tmp_path):

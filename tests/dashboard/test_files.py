@@ -85,6 +85,8 @@ def test_files_are_taken_as_they_are_called(door, form):
             order = {"device": "cube", "name": unicodedata.normalize(form, name[:-4])}
             job = ended(client, client.post(f"/api/imports/{upload}/finish", json=order))
             assert job["state"] == "done", job
+            again = client.post(f"/api/imports/{upload}/files/x.csv", content=b"x")
+            assert again.status_code == 404  # it is read and gone
             made = client.get(f"/api/sessions/{job['made']}").json()
             named = made["title"] or made["id"].split("-", 2)[2].removesuffix("-2")
             assert named == unicodedata.normalize("NFC", name[:-4])

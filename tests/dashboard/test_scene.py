@@ -57,6 +57,22 @@ class Direct:
         self.store.put(topic, device, estimator, message)
 
 
+class Flat(Direct):
+    """As Direct, of a receiver that gives neither heights nor velocities."""
+
+    def put(self, topic, device, message, estimator="") -> None:
+        if topic in (tp.GNSS, tp.NAV):
+            message.height_m, message.height_reference = np.nan, pb.HEIGHT_REFERENCE_UNKNOWN
+        if topic is tp.GNSS:
+            message.ClearField("v_n_mps")
+        if topic is tp.NAV:
+            message.p_ned_m[2] = message.origin_height_m = np.nan
+            message.sigma[8], message.position_covariance[8] = 1e4, 1e8
+        if topic is tp.INNOVATION:
+            message.value[2] = message.value[5] = np.nan
+        super().put(topic, device, message, estimator)
+
+
 @pytest.fixture
 def store() -> Store:
     return Store()
@@ -365,10 +381,10 @@ def server():
     running.stop()
 
 
-@pytest.mark.parametrize("kind", ["cube", "drive", "nothing"])
+@pytest.mark.parametrize("kind", ["cube", "drive", "flat drive", "nothing"])
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.title)
 def test_every_page_is_made_from_every_kind_of_device(store, server, page, kind):
-    feeder = Feeder(Direct(store))
+    feeder = Feeder(Flat(store) if kind == "flat drive" else Direct(store))
     for k in range(700):
         feeder.cube(k * 0.01) if kind == "cube" else feeder.drive(k * 0.05)
     if kind == "nothing":

@@ -14,6 +14,8 @@ from support.front_door import open_door, wait_for
 from support.table_session import SESSION, table_root
 
 from dashboard.web.jobs import Jobs
+from sessions.library.annotations import SessionNote, add_note
+from sessions.recording.manifest import SessionError
 
 ROOM = Path(__file__).resolve().parents[2]
 
@@ -99,6 +101,40 @@ def test_notes_and_labels_are_kept_and_found(door):
             client.post(f"/api/sessions/{SESSION}/labels", json={"tags": ["NO TAG"]}).status_code
             == 409
         )
+
+
+ACTING = ["a\u202eb", "\u2066x", "a\x1b[2J", "a\x00b", "z" + "\u0301" * 9, "\ufeff"]
+
+
+@pytest.mark.parametrize("word", ACTING)
+def test_titles_and_notes_that_act_are_refused_with_a_sentence(door, word):
+    with door.client("otto") as client:
+        before = client.get(f"/api/sessions/{SESSION}/annotations").json()
+        for path, body in (
+            ("labels", {"title": word}),
+            ("notes", {"text": word}),
+        ):
+            answer = client.post(f"/api/sessions/{SESSION}/{path}", json=body)
+            assert answer.status_code == 422, answer.text
+            assert "character" in answer.json()["faults"][0]["what"]
+        answer = client.post("/api/recording/start", json={"note": word, "name": word})
+        assert answer.status_code == 422 and len(answer.json()["faults"]) == 2
+        assert client.get(f"/api/sessions/{SESSION}/annotations").json() == before
+    with pytest.raises(SessionError, match="character"):
+        note = SessionNote(text="x", author=word)
+        add_note(door.front.catalogue.root / SESSION, note)
+
+
+def test_words_of_every_language_are_kept_in_one_form(door):
+    with door.client("otto") as client:
+        for title in ("Prüfstand 2 (Ä)", "Pru\u0308fstand 2 (A\u0308)"):
+            kept = client.post(f"/api/sessions/{SESSION}/labels", json={"title": title}).json()
+            assert kept["title"] == "Prüfstand 2 (Ä)"
+        for text in ("测试 עברית عربي Tiếng Việt 👩\u200d🔬", "two\nlines\tand a tab"):
+            notes = client.post(f"/api/sessions/{SESSION}/notes", json={"text": text}).json()[
+                "notes"
+            ]
+            assert notes[-1]["text"] == text
 
 
 def test_a_viewer_changes_nothing_and_only_an_admin_deletes(door):

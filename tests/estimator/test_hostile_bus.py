@@ -179,6 +179,18 @@ def test_an_order_that_fails_is_answered(monkeypatch):
     assert not answers[0].ok and "ZeroDivisionError" in answers[0].message
 
 
+def test_a_device_that_made_room_is_forgotten_and_may_come_again():
+    desk = Desk()
+    good = batches("table", 40)
+    for batch in good[:20]:
+        desk.give("t/table/accel", batch.SerializeToString())
+    desk.worker.forget("table")
+    for batch in good[20:]:
+        desk.give("t/table/accel", batch.SerializeToString())
+    desk.end()
+    assert len(desk.rates("table")) == 40 and not desk.worker.door.counts()
+
+
 def test_devices_take_turns():
     inbox = Inbox(100_000, 1 << 30)
     for k in range(5000):

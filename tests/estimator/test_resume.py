@@ -178,3 +178,18 @@ def test_an_estimator_killed_right_after_an_order_goes_on_with_the_card_that_was
     assert [m.header.sequence for m in said] == list(range(1, len(said) + 1))
     assert [m.calibration for m in said] == [""] * 20 + [named[-1]] * 40
     spool.close()
+
+
+def test_a_full_disk_costs_the_state_only_as_long_as_it_is_full(tmp_path, caplog):
+    spool = Spool(tmp_path)
+    publishers, saved = Publishers(None, "p", spool), SavedState(tmp_path, SETTINGS, "1")
+    worker = Worker(Pipeline(SETTINGS), put_into(publishers))
+    work(worker, arrivals()[:20])
+    (tmp_path / "state.new").symlink_to("/dev/full")
+    saved.save(worker, publishers)
+    assert "No space left" in saved.message and "make room" in caplog.text
+    assert saved.load() is None
+    saved.save(worker, publishers)
+    assert not saved.message and "saved again" in caplog.text
+    assert saved.load() is not None
+    spool.close()

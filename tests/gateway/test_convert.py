@@ -1,6 +1,7 @@
 """Raw to physical: sign, range, both ends; and what the settings refuse."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from pydantic import ValidationError
@@ -96,6 +97,8 @@ def test_fix_without_geoid_says_how_little_it_knows_of_its_height():
     assert message.position_sigma_ned_m[:2] == [1, 1] and message.position_sigma_ned_m[2] > 110.0
     assert message.height_reference == pb.HEIGHT_REFERENCE_SEA_LEVEL and message.height_m == 50.0
     assert math.isnan(convert.location_fix(message, "car").altitude)
+    silent = convert.gnss_fix(replace(fix, sigma_ned_m=None))
+    assert silent.position_sigma_ned_m[2] > 110.0 and silent.position_sigma_ned_m[0] == 1.6
     taken = fix_of(message, 1, 0.0)
     assert taken.datum == 110.0 and taken.sigma_p[2] == pytest.approx(2.0)
 

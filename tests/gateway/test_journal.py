@@ -7,6 +7,7 @@ import sys
 import time
 
 import pytest
+from support.wall_clock import YEAR_S, WallClock
 
 from messages.history.journal import Journal
 from messages.history.journal_file import SEGMENT_HEAD, records, scan, walk
@@ -210,3 +211,45 @@ def test_killed_while_writing(tmp_path):
     last = journal.last_seq
     journal.close()
     assert last > 100 and [r.sequence for r in all_records(tmp_path)] == list(range(1, last + 1))
+
+
+AGEING = """
+import sys, time
+from pathlib import Path
+from messages.history.journal import Journal
+folder = Path(sys.argv[1])
+journal = Journal(folder, segment_bytes=2000, sync_s=0.02, max_age_s=3600.0)
+print(journal.run, flush=True)
+for line in sys.stdin:
+    for _ in range(100):
+        journal.append(0, b"x" * 100, time.monotonic_ns(), time.time_ns())
+    time.sleep(0.2)
+    print(len(journal.segments()), flush=True)
+journal.close()
+"""
+
+
+@pytest.mark.parametrize("offset_s", [-YEAR_S, YEAR_S])
+def test_a_set_wall_clock_removes_no_segment_and_leads_no_run_back(tmp_path, offset_s):
+    wall = WallClock(tmp_path / "wall")
+    runs = []
+    for _ in range(2):
+        with subprocess.Popen(
+            [sys.executable, "-c", AGEING, str(tmp_path / "journal")],
+            env=wall.environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        ) as process:
+            runs.append(int(process.stdout.readline()))
+            counts = []
+            for _ in range(2):
+                process.stdin.write("\n")
+                process.stdin.flush()
+                counts.append(int(process.stdout.readline()))
+                if len(runs) == 1:
+                    wall.set(offset_s)
+            if len(runs) == 1:
+                assert counts[1] > counts[0] + 3
+            process.stdin.close()
+    assert runs[1] > runs[0]

@@ -89,6 +89,7 @@ def test_a_fix_in_two_dimensions_has_no_height():
     assert fix.latitude_deg is not None and fix.height_m is None and fix.height_msl_m is None
     flat = one(nav_pvt(T0, fix=2, height=0, msl=0, v_acc=0xFFFFFFFF))
     assert flat.latitude_deg is not None and flat.height_m is None and flat.height_msl_m is None
+    assert flat.v_n[:2] == (0.2, 6.3) and math.isnan(flat.v_n[2])
 
 
 def test_sigma_is_of_gst_else_of_the_dilution_of_precision():
@@ -127,6 +128,7 @@ def test_what_ubx_says_to_be_nothing_is_nothing():
     high = one(nav_pvt(T0, v_acc=0xFFFFFFFF))
     assert high.latitude_deg is not None and high.height_m is None
     assert one(nav_pvt(T0, valid=0)).fix_utc_ns == 0
+    assert one(nav_pvt(T0, valid=3)).fix_utc_ns == 0  # its leap seconds are still guessed
     assert one(nav_pvt(T0)).height_m == pytest.approx(357.6)
     assert one(nav_pvt(T0, size=84)).height_m == pytest.approx(357.6)
 
@@ -183,6 +185,7 @@ def test_places_of_the_earths_frame(latitude, longitude, height):
         (gga(at(1), alt="nan"), "GGA altitude"),
         (gga(at(1), sep="999"), "GGA separation"),
         (gga("773519"), "GGA time of day"),
+        (gga(""), "GGA without its time"),
         (gga(at(1), q="x"), "GGA quality"),
         (gga(at(1), n="-3"), "GGA satellites"),
         (rmc(at(1), spd="inf"), "RMC speed"),

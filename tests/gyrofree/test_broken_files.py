@@ -6,6 +6,7 @@ import importlib
 import os
 import pkgutil
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,7 +15,7 @@ from pathlib import Path
 
 import pytest
 import typer
-from support.broken_files import broken, good
+from support.broken_files import SPOILS, WHOLE, broken, good
 from typer.testing import CliRunner
 
 import gyrofree.commands
@@ -41,6 +42,7 @@ ALSO = {  # further ways of a command
     "sessions compare": [["--align", "start"]],
     "demo": [["--source", "drive"]],
 }
+KEEPS = {"sessions", "users", "export", "report", "rerun", "replay", "reprocess"}
 LONG = {"demo", "layout optimise", "reproduce in-motion", "reproduce gyro-free", "reprocess"}
 
 
@@ -151,6 +153,44 @@ def test_a_broken_file_is_answered(name, parameter, seeds, tmp_path, no_services
             more[-1] = f"--link={place / 'board'}"
         line = [*name.split(), *words, *more, "--", *last]
         judged(line, *called(line))
+
+
+STATE = ("session.json", "recording.mcap", "curves.npz", "annotations.json", "users.json")
+
+
+@pytest.mark.parametrize("name", sorted(n for n in COMMANDS if n.split()[0] in KEEPS))
+def test_what_is_kept_may_be_broken_too(name, seeds, tmp_path, no_services, monkeypatch):
+    """Sessions and users as a crash, a bad disk or an editor left them."""
+    monkeypatch.chdir(tmp_path)
+    rng = random.Random(f"{name} 5")
+    session = "20240101-000000-table"
+    for k in range(2 if name in LONG else ROUNDS):
+        root = tmp_path / str(k)
+        shutil.copytree(seeds["session.mcap"].parent / "kept", root)
+        for _ in range(rng.choice([1, 2])):
+            part = rng.choice(STATE)
+            path = root / part if part == "users.json" else root / "sessions" / session / part
+            data = path.read_bytes() if path.is_file() else b'{"notes": [{"at_s": 1.0}]}'
+            for _ in range(rng.choice([1, 3])):
+                data = rng.choice(SPOILS)(data, rng) if data else data
+            path.write_bytes(rng.choice([data, data, WHOLE[rng.choice(sorted(WHOLE))]]))
+        config = root / "gyrofree.toml"
+        config.write_text(
+            f'[recorder]\nroot = "{root}/sessions"\n'
+            f'[dashboard]\nusers = "{root}/users.json"\nsessions_root = "{root}/sessions"\n'
+        )
+        words = [*name.split(), f"--config={config}"]
+        words += ["--yes"] if name == "sessions delete" else []
+        words += [f"--out={root / 'out'}"] if name in ("export", "report") else []
+        words += rng.choice(ALSO.get(name, [[]])) if name in ("export", "replay") else []
+        words += ["--role=viewer"] if name == "users add" else []
+        last = [session, session] if name == "sessions compare" else [session]
+        last = (
+            [] if name in ("sessions list", "sessions retain", "users list", "reprocess") else last
+        )
+        last = ["anna"] if name in ("users add", "users remove") else last
+        last += ["a remark"] if name == "sessions note" else []
+        judged([*words, "--", *last], *called([*words, "--", *last]))
 
 
 def test_every_command_that_takes_a_file_is_tried():

@@ -162,6 +162,22 @@ def test_sea_level_is_no_better_known_than_the_geoid(perfect: tuple[list[State],
     assert s.datum == 110.0 and abs(s.height + 47.0 - truth[-1].height) < 0.1
 
 
+def test_a_receiver_that_loses_its_geoid_does_not_lose_its_fixes(
+    perfect: tuple[list[State], Array],
+) -> None:
+    truth, imu = perfect
+    fixes = [
+        replace(f, height=f.height - 47.0, datum=110.0) if f.t > 50.0 else f
+        for f in drive(truth, imu).fixes
+    ]
+    navigator = Navigator()
+    play(navigator, imu, fixes)
+    s = navigator.solution()
+    assert navigator.counts["rejected"] == 0 and s.datum == 0.0
+    assert np.abs(s.p_ned - truth_ned(truth[-1], s.origin))[:2].max() < 0.1
+    assert abs(s.height - truth[-1].height) < 3.0 * s.sigma[8] + 1.0
+
+
 def test_a_gap_asks_for_the_heading_again(
     perfect: tuple[list[State], Array], caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -321,7 +321,8 @@ def test_a_start_while_turning_is_ambiguous_until_the_motion_tells_the_sign():
     table = TableTest(1, profile=TURNING)
     states, omegas = run(ProductsRate(table.layout), table, 16.0)
     assert states[3].sight == (BLIND,) * 3 and "keep still" in states[3].sight_reason
-    assert states[12].sight[2] == AMBIGUOUS and "began while turning, at" in states[12].sight_reason
+    assert states[12].sight == (AMBIGUOUS,) * 3 and "not told apart yet" in states[12].sight_reason
+    assert states[40].sight[2] == AMBIGUOUS and "began while turning, at" in states[40].sight_reason
     seen = [s.sight[2] for s in states]
     assert AMBIGUOUS in seen and VALID in seen[300:]
     assert np.rad2deg(np.abs(states[-1].omega_b - omegas[-1])).max() < 6.0

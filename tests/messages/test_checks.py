@@ -152,6 +152,19 @@ def test_a_flood_of_names_keys_and_devices_is_bounded():
     assert len(door._addresses) <= 4096 + 1
 
 
+def test_a_device_that_is_silent_for_long_makes_room(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr("messages.contract.door.time.monotonic", lambda: now[0])
+    door = Door("room", most_devices=2, gone_s=60.0)
+    for k, admitted in ((0, True), (1, True), (2, False)):
+        now[0] += 1.0
+        assert door.admit("key", door.address(f"t/d{k}/accel"), 9) == admitted
+    now[0] = 61.5
+    assert door.admit("key", door.address("t/d1/accel"), 9)  # still there
+    assert door.admit("key", door.address("t/d2/accel"), 9) and door.gone() == ["d0"]
+    assert not door.admit("key", door.address("t/d0/accel"), 9) and door.gone() == []
+
+
 @pytest.mark.parametrize("key", ["t/Cube/accel", "T/cube/accel", "t//accel", "t/cube/rate/<b>"])
 def test_a_key_with_a_name_that_is_none_is_refused(key):
     with pytest.raises(topics.TopicError, match="want"):

@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 from mcap.reader import make_reader
 from scipy.io import loadmat
+from support.hostile import HOSTILE
 from support.mcap_protobuf_free import decoded
 from support.table_session import table_recording
 
@@ -21,7 +22,8 @@ from estimator.settings import EstimatorSettings
 from inertial.simulation.table import TableTest
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
-from messages.contract.topics import ACCEL, GNSS, NAV, RATE
+from messages.contract.topics import ACCEL, GNSS, NAV, NOTE, RATE
+from messages.text import cell
 from sessions.export.export import ExportError, export
 from sessions.export.table import Selection, tables
 from sessions.recording.mcap_append import McapLog
@@ -248,3 +250,26 @@ def test_a_table_in_memory_is_the_recording(recording):
     readings = found["gyrofree/cube/accel"]
     assert readings.vector("a11_mps2", "a43_mps2").shape == (3000, 2)
     assert readings.data["utc_s"][-1] - readings.data["utc_s"][0] == pytest.approx(29.99, abs=1e-3)
+
+
+def test_no_cell_of_a_csv_begins_a_formula(tmp_path):
+    """Notes of whoever was on the bus, opened by a spreadsheet; numbers stay what they are."""
+    path = tmp_path / "recording.mcap"
+    words = ["=1+1", "+cmd|' /C calc'!A0", "-2+3", "@SUM(A1)", "\t=1", "plain, with comma", '="x"']
+    with path.open("wb") as stream:
+        log = McapLog(stream.fileno(), 1024)
+        channel = log.open_channel("gyrofree/cube/note", NOTE)
+        for k, word in enumerate([*words, *HOSTILE]):
+            at = 1_700_000_000_000_000_000 + k * 10**9
+            note = pb.Note(header=pb.Header(device="cube", utc_ns=at, sequence=k + 1), text=word)
+            log.add(channel, at, at, note.SerializeToString(), k + 1)
+        log.finish()
+        log.push()
+    [file] = export(path, "csv", tmp_path / "out")
+    with file.open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == len(words) + len(HOSTILE)
+    for row, word in zip(rows, [*words, *HOSTILE], strict=True):
+        assert row["text"] == cell(word)
+        assert row["text"][:1] not in ("=", "+", "-", "@", "\t", "\r", "\n")
+        assert float(row["utc_s"]) > 1.6e9 and not {"\x1b", "\u202e"} & set(row["text"])

@@ -1,19 +1,26 @@
 """The report: true to the simulator that made the run, the same bytes again, honest verdicts."""
 
 import dataclasses
+import html
 import io
 import json
+import re
 
 import numpy as np
 import pytest
 from pypdf import PdfReader
+from support.hostile import HOSTILE
 from support.table_session import SESSION, table_recording, table_root
 
+from messages.text import printed
 from sessions.recording.manifest import read_manifest
 from sessions.report.analysis import analyse
 from sessions.report.build import build
 from sessions.report.data import ReportError, Tacho, load_run
+from sessions.report.document import Document
+from sessions.report.html import to_html
 from sessions.report.metrics import metrics
+from sessions.report.pdf import to_pdf
 from sessions.report.segments import reference, segment
 from sessions.report.stability import allan_of, consistency
 from sessions.report.table_test import Plateau, scale_factor
@@ -175,3 +182,24 @@ def test_consistency_of_a_chi_square_is_one():
     assert found.low < found.mean < found.high
     assert found.beyond == pytest.approx(0.05, abs=0.015)
     assert consistency("x", dof * 2.0, dof).mean == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("word", HOSTILE, ids=range(len(HOSTILE)))
+def test_a_report_shows_texts_as_text(word):
+    """Of a manifest that somebody brought along."""
+    said = Document(
+        title=word,
+        verdict="pass",
+        facts=[("Note", word), (word, word)],
+        checks=[(word, word, word, "pass")],
+        grids=[],
+        pictures=[],
+        provenance=[(word, word)],
+    )
+    page = to_html(said)
+    body = page.split("</style>")[-1]
+    shown = html.unescape(re.sub(r"<[^>]*>", "", body))
+    assert printed(word)[:200] in shown
+    assert not {"\u202e", "\x1b", "\u200b"} & set(page)
+    assert not re.search(r"<(script|img|svg|iframe|a)\b", body)
+    assert to_pdf(said).startswith(b"%PDF")

@@ -85,7 +85,13 @@ def good(folder: Path) -> dict[str, Path]:
     )
     shutil.copy(table_recording(), folder / "session.mcap")
     shutil.copy(table_recording().parent / "session.json", folder / "session.json")
-    (folder / "users.json").write_text(json.dumps({"version": 1, "users": {}}))
+    users = {"version": 1, "users": {}}
+    (folder / "users.json").write_text(json.dumps(users))
+    kept = folder / "kept"
+    shutil.copytree(table_recording().parent, kept / "sessions" / table_recording().parent.name)
+    (kept / "users.json").write_text(json.dumps(users))
+    for path in (kept, *kept.rglob("*")):
+        path.chmod(0o755)
     return {path.name: path for path in folder.iterdir()}
 
 

@@ -246,6 +246,8 @@ def _data(
         out.append(shade.on[on].astype(float))
     out.append(LATE_HEIGHT * series.stretch_mask(late, edges))
     out.append(series.moment_mask(marks, edges))
-    t = curves[primary].t
+    t, y = curves[primary].t, curves[primary].y
+    if not np.isfinite(y).any():
+        t = t[:0]  # samples without a value are no values: all of it is a gap
     out.append(series.gap_mask(t, edges, max(series.gap_limit(t), 2.5 * (edges[1] - edges[0]))))
     return tuple(out)

@@ -50,6 +50,7 @@ Sensor blank_sensor() {
   s.Q.setZero();
   s.theta_b.setZero();
   s.used.setZero();
+  s.limit.setZero();
   return s;
 }
 
@@ -70,6 +71,7 @@ void bind_sensor(nb::module_& m) {
   matrix(c, "Q", &Sensor::Q);
   matrix(c, "theta_b", &Sensor::theta_b);
   vector(c, "used", &Sensor::used);
+  vector(c, "limit", &Sensor::limit);
   matrix(c, "basis", &Sensor::basis);
   vector(c, "spread", &Sensor::spread);
 }
@@ -102,6 +104,7 @@ void bind_tuning(nb::module_& m) {
   c.def_rw("pivot_drift", &Tuning::pivot_drift).def_rw("still_rate", &Tuning::still_rate);
   c.def_rw("first_still_rate", &Tuning::first_still_rate).def_rw("products_gate", &Tuning::products_gate);
   c.def_rw("force_gate", &Tuning::force_gate).def_rw("unseen_alpha", &Tuning::unseen_alpha);
+  c.def_rw("unseen_rate", &Tuning::unseen_rate);
   c.def_rw("forget", &Tuning::forget).def_rw("bias", &Tuning::bias).def_rw("tilt", &Tuning::tilt);
   c.def_rw("gravity", &Tuning::gravity).def_rw("pivot", &Tuning::pivot);
   c.def_rw("gravity_aid", &Tuning::gravity_aid).def_rw("start_turning", &Tuning::start_turning);

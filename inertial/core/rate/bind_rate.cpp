@@ -61,7 +61,7 @@ class ProductsFilter {
     Row* row = rows_of(out, t_s.shape(0));
     for (std::size_t k = 0; k < t_s.shape(0); ++k, ++row) {
       memory_->frame.advance(c_, t_s.data()[k], f_axis.data() + k * c_.sensor.n);
-      write(memory_->frame, memory_->frame.sensor(c_), *row);
+      write(memory_->frame, c_, *row);
       if (follows_ && memory_->frame.started()) follow(*row);
       put(row->bound_sigma, memory_->bound.sigma());
     }
@@ -77,6 +77,8 @@ class ProductsFilter {
   }
 
   void gap() { memory_->frame.gap(); }
+  void withhold(bool on) { memory_->frame.intake().withhold(on); }
+  long refused() { return memory_->frame.intake().refused(); }
   nb::bytes snapshot() const { return image(*memory_); }
   void restore_from(const nb::bytes& bytes) { restore(*memory_, bytes); }
   const Frame& frame() const { return memory_->frame; }
@@ -117,6 +119,8 @@ class LeastSquaresFilter {
   }
 
   void gap() { memory_->gap(); }
+  void withhold(bool on) { memory_->intake().withhold(on); }
+  long refused() { return memory_->intake().refused(); }
   nb::bytes snapshot() const { return image(*memory_); }
   void restore_from(const nb::bytes& bytes) { restore(*memory_, bytes); }
 
@@ -160,6 +164,8 @@ void bind_running(nb::class_<Filter>& c) {
   c.def("run", &Filter::run, nb::arg("t_s"), nb::arg("f_axis"), nb::arg("rows"),
         "Take samples (n, N), m/s^2, at t_s (n,), s; rows (n, bytes of a row) become what is known after each.");
   c.def("gap", &Filter::gap, "Samples are missing before the next one.");
+  c.def("withhold", &Filter::withhold, nb::arg("on"), "Take samples for none, as when their axes are stale.");
+  c.def_prop_ro("refused_samples", &Filter::refused, "Samples passed over: at the end of a range, frozen, withheld.");
   c.def("snapshot", &Filter::snapshot, "The memory as bytes, for the same build of the core.");
   c.def("restore", &Filter::restore_from, nb::arg("image"), "Back to a snapshot; ValueError for another version's.");
 }

@@ -41,6 +41,7 @@ struct Tuning {
   double products_gate = 0.0;
   double force_gate = 0.0;
   double unseen_alpha = 0.0;   // (rad/s^2)^2
+  double unseen_rate = 0.0;    // (rad/s)^2, of a turn that has begun and is not noticed yet
   double forget = 0.0;         // 1/s; of FORGET only
   double bias = 0.0;           // (m/s^2)^2, of one axis before the first standstill
   double tilt = 0.0;           // (m/s^2)^2

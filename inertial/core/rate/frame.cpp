@@ -31,6 +31,9 @@ void Frame::restart() {
   gap();
   started_ = still_ = moved_ = false;
   agreement_.forget();
+  perhaps_still_ = false;
+  perhaps_for_ = 0;
+  against_s_ = 0.0;
   branches_ = 0;
   first_.filter = Filter();
 }
@@ -57,6 +60,7 @@ const Constants& Frame::believed(const Constants& c) {
 }
 
 void Frame::advance(const Constants& configured, double t_s, const double* a) {
+  if (passed_over(configured, t_s, a)) return;
   tick(t_s);
   watch_.take(configured.sensor, a, dt_);
   const Constants& c = believed(configured);
@@ -66,6 +70,7 @@ void Frame::advance(const Constants& configured, double t_s, const double* a) {
     for (int i = 0; i < 3; ++i) f.P(OMEGA + i, OMEGA + i) = UNKNOWN_RATE * UNKNOWN_RATE;
   const Verdict verdict = watch_.detect(c.sensor, c.limits, f.omega(), f.omega_covariance(), dt_);
   if (!started_) return wait(c, verdict.still);
+  if (settle_start(c)) return;
   if (fitted_ > 0) {
     still_ = verdict.still;
     fit_start(c, verdict.still);
@@ -74,6 +79,7 @@ void Frame::advance(const Constants& configured, double t_s, const double* a) {
   }
   const long now = watch_.newest();
   const long first = begin_of_motion(verdict, now);
+  if (verdict.against && !still_) begin(c);  // the rate was wrong, and so is what it was made of
   still_ = verdict.still;
   const bool fixed = !still_ && on_axis(c);
   if (still_) arrivals_.clear();
@@ -83,6 +89,47 @@ void Frame::advance(const Constants& configured, double t_s, const double* a) {
   if (diverged()) return;
   if (still_ && !moved_) stay();
   count(c);
+  if (contradicted()) restart();
+}
+
+// Samples that say nothing: a few are bridged, after more the rate is unknown.
+bool Frame::passed_over(const Constants& c, double t_s, const double* a) {
+  if (!intake_.refuses(c.sensor, a, dt_, watch_.noise().any())) return false;
+  said_ = Said();
+  still_ = still_ && intake_.missing() <= BRIDGED_SAMPLES;
+  if (intake_.missing() == BRIDGED_SAMPLES + 1) restart();
+  if (intake_.missing() > BRIDGED_SAMPLES) last_s_ = t_s;
+  return true;
+}
+
+// A start while turning that never moved: biases looked like a rate. True when it is taken for a
+// standstill now.
+bool Frame::settle_start(const Constants& c) {
+  constexpr int BELIEVED = 100;  // samples in which nothing denies a standstill, the first second not counted
+  perhaps_still_ = branches_ == 2 && watch_.never_stood() && watch_.could_stand(c.sensor, c.limits, c.tuning.bias);
+  perhaps_for_ = perhaps_still_ ? perhaps_for_ + 1 : 0;
+  if (perhaps_for_ < c.limits.steady_span + c.limits.window + BELIEVED) return false;
+  begin(c);
+  still_ = true;
+  moved_ = perhaps_still_ = false;
+  fitted_ = perhaps_for_ = 0;
+  return true;
+}
+
+// Innovations beyond their size for seconds: what was believed is not worth correcting.
+bool Frame::contradicted() {
+  constexpr double FAR = 2.0;       // of NIS per degree of freedom, over a second
+  constexpr double PATIENCE_S = 3.0;  // s
+  against_s_ = agreement_.fast() > FAR ? against_s_ + dt_ : 0.0;
+  if (against_s_ < PATIENCE_S) return false;
+  ++lost_;
+  return true;
+}
+
+Doubt Frame::doubt() const {
+  if (intake_.missing() > 0) return Doubt::NO_DATA;
+  if (perhaps_still_) return Doubt::STANDING;
+  return against_s_ > 0.0 ? Doubt::CONTRADICTED : Doubt::NONE;
 }
 
 void Frame::wait(const Constants& c, bool still) {
@@ -118,7 +165,7 @@ void Frame::fit_start(const Constants& c, bool still) {
     fitted_ = 0;
   } else if (std::find(std::begin(FITS), std::end(FITS), n) != std::end(FITS)) {
     balance_ = fit(c);
-    branches_ = balance_ > DECIDED ? 1 : 2;
+    branches_ = balance_ > DECIDED && !perhaps_still_ ? 1 : 2;
   } else {
     const long now = watch_.newest();
     for (Start* begun : {&first_, &second_}) carry(begun->filter, watch_.y(now), watch_.dt(now), c.sensor, c.tuning);
@@ -212,7 +259,7 @@ void Frame::two_signs(bool still) {
     swap_signs();
     std::swap(said_, other_said_);
   }
-  if (still || balance_ > DECIDED) branches_ = 1;
+  if (still || (balance_ > DECIDED && !perhaps_still_)) branches_ = 1;
 }
 
 // Start anew when the rate is beyond all bounds or no number at all, or its covariance is none any more.

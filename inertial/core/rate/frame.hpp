@@ -9,6 +9,7 @@
 #pragma once
 
 #include "rate/agreement.hpp"
+#include "rate/intake.hpp"
 #include "rate/start.hpp"
 
 namespace gyrofree::rate {
@@ -51,6 +52,9 @@ class KeptStates {
   long at_[Size];
 };
 
+// Why nothing that is said is valid.
+enum class Doubt : std::uint8_t { NONE, STANDING, CONTRADICTED, NO_DATA, NO_NOISE_MODEL };
+
 // What the frame works by; constant between two changes of the axes in use.
 struct Constants {
   Sensor sensor;
@@ -86,7 +90,10 @@ class Frame {
   const Filter& filter() const { return first_.filter; }
   const Filter& other() const { return second_.filter; }
   const Said& said() const { return said_; }
-  Measurement newest() const { return watch_.y(watch_.newest()); }
+  Measurement newest() const { return watch_.newest() < 0 ? Measurement(Measurement::Zero()) : watch_.y(watch_.newest()); }
+  Doubt doubt() const;
+  Intake& intake() { return intake_; }
+  const Intake& intake() const { return intake_; }
   bool started() const { return started_; }
   bool still() const { return still_; }
   bool two_signs() const { return branches_ == 2; }
@@ -101,6 +108,9 @@ class Frame {
 
  private:
   const Constants& believed(const Constants& c);
+  bool passed_over(const Constants& c, double t_s, const double* a);
+  bool settle_start(const Constants& c);
+  bool contradicted();
   void tick(double t_s);
   void restart();
   void wait(const Constants& c, bool still);
@@ -127,6 +137,10 @@ class Frame {
   KeptStates<DEPTH / EVERY + 1> kept_;
   KeptStates<4> arrivals_;  // of the moving horizon: states before samples of this turn
   Agreement agreement_;
+  Intake intake_;
+  bool perhaps_still_ = false;  // a start while turning that may be a standstill with biases
+  int perhaps_for_ = 0;         // samples of it
+  double against_s_ = 0.0;      // s in which innovations contradict the filter
   Said said_;
   Said other_said_;
   double last_s_ = std::numeric_limits<double>::quiet_NaN();

@@ -79,16 +79,32 @@ void LeastSquares::align() {
   u_ = mean - bias_;
   u_.segment<3>(D_ALPHA).setZero();
   samples_ = watch_.learning_samples();
+  noise_ = watch_.noise().quiet();
 }
 
 // Covariance of omega (E-8): white noise summed, bias error times time.
 Matrix3 LeastSquares::covariance(const Sensor& s) const {
   if (samples_ == 0) return UNKNOWN_RATE * UNKNOWN_RATE * Matrix3::Identity();
-  if (moving_s_ == 0.0) return UNSEEN_RATE * UNSEEN_RATE * Matrix3::Identity();
-  return s.R_alpha * (dt_ * moving_s_ + moving_s_ * moving_s_ / samples_);
+  if (moving_s_ == 0.0) return watch_.noise().quiet() * UNSEEN_RATE * UNSEEN_RATE * Matrix3::Identity();
+  return noise_ * s.R_alpha * (dt_ * moving_s_ + moving_s_ * moving_s_ / samples_);
+}
+
+// The sensor with the noise that was measured (E-58).
+const Sensor& LeastSquares::believed(const Sensor& s) {
+  if (watch_.noise().as_configured()) return s;
+  measured_ = s;
+  apply(watch_.noise(), s, measured_);
+  return measured_;
 }
 
 void LeastSquares::advance(const Sensor& s, const LeastSquaresLimits& c, double t_s, const double* a) {
+  if (intake_.refuses(s, a, dt_, watch_.noise().any())) {
+    if (intake_.missing() > BRIDGED_SAMPLES) {
+      restart();
+      P_ = covariance(s);
+    }
+    return;
+  }
   const double dt = t_s - last_s_;
   last_s_ = t_s;
   if (dt > c.longest_step_s) {
@@ -97,7 +113,8 @@ void LeastSquares::advance(const Sensor& s, const LeastSquaresLimits& c, double 
     dt_ = dt;
   }
   watch_.take(s, a, dt_);
-  const Verdict verdict = watch_.detect(s, c.still, y_.segment<3>(I_OMEGA), P_, dt_);
+  noise_ = std::max(noise_, watch_.noise().quiet());
+  const Verdict verdict = watch_.detect(believed(s), c.still, y_.segment<3>(I_OMEGA), P_, dt_);
   still_ = verdict.still;
   const long now = watch_.newest();
   long first = now;
@@ -119,7 +136,7 @@ void LeastSquares::advance(const Sensor& s, const LeastSquaresLimits& c, double 
 
 void LeastSquares::write(const Sensor& s, Row& row) const {
   const Vector3 omega = y_.segment<3>(I_OMEGA);
-  const DriveVector x = without_rate(driven(watch_.y(watch_.newest())) - bias_, omega, s);
+  const DriveVector x = without_rate(driven(newest()) - bias_, omega, s);
   row = Row{};
   put(row.omega_b, omega);
   put(row.P[0], P_);
@@ -133,7 +150,9 @@ void LeastSquares::write(const Sensor& s, Row& row) const {
   row.still = still_;
   const bool waiting = samples_ == 0, moving = moving_s_ > 0.0;
   row.phase = waiting ? WAITING : moving ? INTEGRATING : STILL_AT_START;
-  const bool blind = waiting || (moving && largest_variance(P_) > BLIND_SIGMA * BLIND_SIGMA);
+  const bool unseen = intake_.missing() > 0;
+  row.doubt = static_cast<std::uint8_t>(unseen ? Doubt::NO_DATA : Doubt::NONE);
+  const bool blind = waiting || unseen || (moving && largest_variance(P_) > BLIND_SIGMA * BLIND_SIGMA);
   std::fill_n(row.sight, 3, blind ? BLIND : VALID);
 }
 

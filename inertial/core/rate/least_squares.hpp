@@ -2,6 +2,7 @@
 // numpy twin: tests/inertial/test_least_squares.py.
 #pragma once
 
+#include "rate/intake.hpp"
 #include "rate/row.hpp"
 #include "rate/still.hpp"
 
@@ -32,18 +33,24 @@ class LeastSquares {
   LeastSquares();
   void advance(const Sensor& s, const LeastSquaresLimits& c, double t_s, const double* a);
   void gap() { watch_.forget(); }
+  Intake& intake() { return intake_; }
   void write(const Sensor& s, Row& row) const;
 
  private:
+  const Sensor& believed(const Sensor& s);
+  Measurement newest() const { return watch_.newest() < 0 ? Measurement(Measurement::Zero()) : watch_.y(watch_.newest()); }
   void restart();
   void align();
   Matrix3 covariance(const Sensor& s) const;
 
   Watch watch_;
+  Intake intake_;
+  Sensor measured_;
   IntegralVector y_ = IntegralVector::Zero();
   DriveVector bias_ = DriveVector::Zero();
   DriveVector u_ = DriveVector::Zero();  // S a - bias of the last sample
   Matrix3 P_ = Matrix3::Zero();          // of omega
+  double noise_ = 1.0;  // of omega', measured over configured: the largest since the standstill
   int samples_ = 0;                      // of the standstill that gave the biases
   bool still_ = false;
   double last_s_ = std::numeric_limits<double>::quiet_NaN();

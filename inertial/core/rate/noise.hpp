@@ -22,6 +22,8 @@ class Noise {
   // Variances over the configured ones, at least 1: of omega' and c, and of p.
   double quiet() const { return std::max(quiet_.believed(QUIET_SLACK), heard_.believed(QUIET_SLACK)); }
   double force() const { return std::max(force_.believed(FORCE_SLACK), heard_.believed(FORCE_SLACK)); }
+  // Do the axes scatter at all? Those of a model without noise do not.
+  bool any() const { return quiet_.value > 0.05; }
   bool as_configured() const { return quiet() == 1.0 && force() == 1.0; }
 
  private:

@@ -3,6 +3,7 @@
 namespace gyrofree::rate {
 namespace {
 
+constexpr double DIRECTION = 5e-4;  // of omega: what scale errors of the axes may turn it by, sigma
 constexpr double SIGN_SURE = 9.0;          // of omega^2 over the variance of its sign
 
 // omega and the angle become the mean over both signs by their probability, P the covariance about it
@@ -15,7 +16,10 @@ struct Mixed {
 
 Mixed mixed(const Frame& frame) {
   const Filter& f = frame.filter();
-  if (!frame.two_signs()) return {f.omega(), f.omega_covariance(), f.x(ANGLE)};
+  if (!frame.two_signs()) {
+    const double turned = square(DIRECTION) * f.speed_squared();
+    return {f.omega(), f.omega_covariance() + turned * Matrix3::Identity(), f.x(ANGLE)};
+  }
   const Filter& g = frame.other();
   const double wrong = 1.0 / (1.0 + elementary::exp(frame.balance()));
   const Vector3 apart = g.omega() - f.omega();
@@ -31,9 +35,18 @@ Phase phase_of(const Frame& frame) {
   return frame.still() ? STILL : TURNING;
 }
 
-void write_sight(const Frame& frame, const Sensor& s, Row& row) {
+void write_sight(const Frame& frame, const Constants& c, Row& row) {
+  const Sensor& s = frame.sensor(c);
   const Filter& f = frame.filter();
+  Doubt doubt = frame.doubt();
+  const bool forgets = static_cast<Method>(c.tuning.method) == Method::FORGET;  // its P is no covariance
+  if (doubt == Doubt::NONE && forgets && frame.started() && !frame.still()) doubt = Doubt::NO_NOISE_MODEL;
+  row.doubt = static_cast<std::uint8_t>(doubt);
   std::fill_n(row.sight, 3, frame.started() ? VALID : BLIND);
+  if (doubt != Doubt::NONE) {
+    std::fill_n(row.sight, 3, doubt == Doubt::STANDING ? AMBIGUOUS : BLIND);
+    return;
+  }
   if (!frame.started() || frame.still()) return;
   const Known known{f.omega(), f.omega_covariance().diagonal(), f.sign_variance, frame.two_signs()};
   judge(known, s, frame.dt(), row.sight);
@@ -64,7 +77,8 @@ void judge(const Known& known, const Sensor& s, double dt, std::uint8_t (&sight)
   }
 }
 
-void write(const Frame& frame, const Sensor& s, Row& row) {
+void write(const Frame& frame, const Constants& c, Row& row) {
+  const Sensor& s = frame.sensor(c);
   const Filter& f = frame.filter();
   const Said& said = frame.said();
   const Measurement y = frame.newest();
@@ -73,6 +87,8 @@ void write(const Frame& frame, const Sensor& s, Row& row) {
   put(row.P[0], mean.P);
   if (!frame.started())
     for (int i = 0; i < 3; ++i) row.P[i][i] = UNKNOWN_RATE * UNKNOWN_RATE;
+  if (phase_of(frame) == STILL)  // it may have begun to turn, the more of it unseen the noisier the axes are
+    for (int i = 0; i < 3; ++i) row.P[i][i] += c.tuning.unseen_rate * frame.noise().quiet();
   put(row.alpha_b, y.segment<3>(ALPHA_M) - f.x.segment<3>(BIAS_ALPHA));
   put(row.f_b, y.segment<3>(FORCE_M) - f.x.segment<3>(BIAS_FORCE));
   put(row.q_nb, f.q_nb);
@@ -89,7 +105,7 @@ void write(const Frame& frame, const Sensor& s, Row& row) {
   row.sign_variance = f.sign_variance;
   row.still = frame.still();
   row.phase = phase_of(frame);
-  write_sight(frame, s, row);
+  write_sight(frame, c, row);
 }
 
 }  // namespace gyrofree::rate

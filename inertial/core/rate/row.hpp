@@ -31,6 +31,7 @@ struct Row {  // units: inertial/rate/batch.py
   std::uint8_t still;
   std::uint8_t phase;
   std::uint8_t sight[3];
+  std::uint8_t doubt;  // of Doubt: why nothing is valid
 };
 
 struct Field {
@@ -61,6 +62,7 @@ constexpr Field ROW_FIELDS[] = {
     GYROFREE_FIELD(still, "?", 0, 0),
     GYROFREE_FIELD(phase, "u1", 0, 0),
     GYROFREE_FIELD(sight, "u1", 3, 0),
+    GYROFREE_FIELD(doubt, "u1", 0, 0),
 };
 #undef GYROFREE_FIELD
 
@@ -89,6 +91,6 @@ struct Known {
 void judge(const Known& known, const Sensor& s, double dt, std::uint8_t (&sight)[3]);
 
 // The filter's state as a row; the bound is left as it is.
-void write(const Frame& frame, const Sensor& s, Row& row);
+void write(const Frame& frame, const Constants& c, Row& row);
 
 }  // namespace gyrofree::rate

@@ -39,6 +39,7 @@ struct Sensor {
   Matrix<MOST_AXES, PRODUCTS> Q;  // z of every axis, m
   Matrix<MOST_AXES, 3> theta_b;
   Vector<MOST_AXES> used;  // 0 for an excluded axis, else 1
+  Vector<MOST_AXES> limit;  // m/s^2, the largest reading; 0 where it is not known
   Matrix<9> basis;         // rows turn [alpha_m, c_m] into uncorrelated numbers
   Vector<9> spread;        // their variances
 

@@ -196,6 +196,7 @@ bool Watch::stands(const Sensor& s, const StillLimits& c, const Vector3& omega, 
     return restless();
   const double told = rate_excludes_zero(omega, P, c.rate_slack);
   const bool slow = told < c.rate_limit;
+  told_otherwise = !slow;
   if (!settled(s, c, omega, P, told)) return restless();
   if (learnt == 0 || (moved(s, c, c.window) <= c.quiet_limit &&
                       moved(s, c, c.short_window) <= c.quiet_limit)) {
@@ -208,13 +209,27 @@ bool Watch::stands(const Sensor& s, const StillLimits& c, const Vector3& omega, 
   return slow_for * dt >= 2.0 * c.patience_s;
 }
 
+// Nothing that its axes say denies it: they scatter by noise, gravity keeps its direction, and biases
+// explain the rest.
+bool Watch::could_stand(const Sensor& s, const StillLimits& c, double bias) {
+  constexpr double BIASES_EXPLAIN = 25.0;  // chi-square, 9 degrees of which biases leave one each
+  if (filled < c.window) return true;
+  if (scatter(s, c.window) > scatter_limit(s, c)) return false;
+  const int span = std::min(c.steady_span, filled - c.window);
+  if (span > 0 && swung(s, c, span) > c.steady_limit) return false;
+  const Measurement all = mean(c.window);
+  double chi2 = 0.0;
+  for (int k = 0; k < PRODUCTS_M + s.m; ++k) chi2 += all(k) * all(k) / ((bias + axis_noise(s) / c.window) * s.drift(k, k));
+  return chi2 < BIASES_EXPLAIN;
+}
+
 Verdict Watch::detect(const Sensor& s, const StillLimits& c, const Vector3& omega, const Matrix3& P, double dt) {
   const bool standing = still_for > 0;
   const bool still = stands(s, c, omega, P, dt);
   int depth = standing ? began(s, c) : 0;
   if (still && depth == 0) {
     learn(s, c);
-    return {true, 0};
+    return {true, 0, told_otherwise};
   }
   if (standing && depth == 0) depth = std::min({std::max(depth, 2 * c.window), still_for, DEPTH - 8});
   still_for = learning = 0;

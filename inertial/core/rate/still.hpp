@@ -21,6 +21,7 @@ constexpr long TOTALS = 2L * DEPTH;  // running sums remembered
 struct Verdict {
   bool still;
   int depth;  // when a standstill ends: how many samples ago the turn began
+  bool against = false;  // it stands, though the caller's rate excludes it
 };
 
 class Watch {
@@ -35,6 +36,9 @@ class Watch {
   // measured noise.
   Verdict detect(const Sensor& s, const StillLimits& c, const Vector3& omega, const Matrix3& P, double dt);
 
+  // May a body that never stood be standing, with axes' biases of that variance, (m/s^2)^2?
+  bool could_stand(const Sensor& s, const StillLimits& c, double bias);
+  bool never_stood() const { return learnt == 0; }
   long newest() const { return count - 1; }
   int filled_samples() const { return filled; }
   int learning_samples() const { return learning; }
@@ -84,6 +88,7 @@ class Watch {
   int slow_for = 0;     // samples that look still but for biases that have moved
   int learnt = 0;       // samples behind the reference
   int learning = 0;     // of this standstill
+  bool told_otherwise = false;  // the caller's rate excluded zero
   int hold = 0;         // samples before there can be a standstill again
 };
 

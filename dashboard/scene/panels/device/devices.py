@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 
+from dashboard.data.device import BEHIND_STALE_S
 from dashboard.data.pose import roll_pitch
 from dashboard.scene.drawing.geometry import MODES
 from dashboard.scene.drawing.page import Markup, alert, bad, joined, note, rows, tag
@@ -24,6 +25,7 @@ from dashboard.scene.panels.base import DEG, Panel, Snapshot
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
 
+BEHIND_SHOWN_S = 0.5  # that an estimator is behind by less is nobody's business
 _COUNTS = re.compile(r"fixes (\w+) (\d+)")
 
 
@@ -161,6 +163,14 @@ class Devices(Panel):
             if latest is not None and latest.message.message
         ]
         texts = [text for text in said if counts(text) is None]
+        behind_s = max(
+            (s.device.behind_s(n) for n in s.device.estimators("estimator")), default=0.0
+        )
+        if behind_s > BEHIND_STALE_S:
+            texts.append(
+                f"estimates are {behind_s:.0f} s behind their samples: its machine is too slow"
+                " for all that it is given; fewer estimators or boards, or a second machine"
+            )
         board = s.device.get("board")
         if board is not None and not s.stale("board"):
             texts += [
@@ -201,6 +211,8 @@ class Devices(Panel):
                 0
             ]  # what a person should do stands after the colon, see _advice
             items.append((estimator_title(name), f"{state} · {number(m.us_per_sample, 0, 'µs')}"))
+            if m.behind_s > BEHIND_SHOWN_S:
+                items.append(("", bad(f"{m.behind_s:.1f} s behind")))
             items += [
                 (f"fixes {what}", number(count, 0))
                 for what, count in (counts(m.message) or {}).items()

@@ -107,9 +107,9 @@ class Errors(Panel):
             if len(error):
                 horizontal = float(np.sqrt(np.nanmean(error[:, 0] ** 2 + error[:, 1] ** 2)))
                 items += [(f"RMS horizontal, {estimator_title(name)}", number(horizontal, 2, "m"))]
-                items += [
-                    ("RMS height", number(float(np.sqrt(np.nanmean(error[:, 2] ** 2))), 2, "m"))
-                ]
+                known = error[np.isfinite(error[:, 2]), 2]
+                height = float(np.sqrt(np.mean(known**2))) if len(known) else None
+                items += [("RMS height", number(height, 2, "m"))]
                 items += [("fixes in the window", str(len(error)))]
         self._table = self.html(rows(items) if items else note("no fixes yet"), self._table)
 

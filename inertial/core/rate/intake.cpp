@@ -1,0 +1,35 @@
+#include "rate/intake.hpp"
+
+namespace gyrofree::rate {
+namespace {
+
+constexpr double AT_THE_END = 0.995;   // of the range
+constexpr double NEAR_THE_END = 0.9;   // of it: an axis that does not change there is at an end as well
+
+}  // namespace
+
+bool Intake::usable(const Sensor& s, const double* a, double dt, bool noisy) {
+  bool changes = false, inside = true;
+  for (int i = 0; i < s.n; ++i) {
+    if (s.used(i) == 0.0) continue;
+    const double size = std::fabs(a[i]), limit = s.limit(i);
+    const bool same = a[i] == last_(i);
+    changes = changes || !same;
+    if (limit > 0.0 && (size >= AT_THE_END * limit || (same && size >= NEAR_THE_END * limit))) inside = false;
+    last_(i) = a[i];
+  }
+  same_s_ = changes ? 0.0 : same_s_ + dt;
+  return inside && !withheld_ && !(noisy && same_s_ >= FROZEN_S);
+}
+
+bool Intake::refuses(const Sensor& s, const double* a, double dt, bool noisy) {
+  if (usable(s, a, dt, noisy)) {
+    missing_ = 0;
+    return false;
+  }
+  ++missing_;
+  ++refused_;
+  return true;
+}
+
+}  // namespace gyrofree::rate

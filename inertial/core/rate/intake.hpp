@@ -1,0 +1,31 @@
+// Does a sample say anything of the body? Not where an axis is at the end of its range, where no axis
+// changes any more, or where somebody withholds them; unknown is then all that can be said.
+#pragma once
+
+#include "rate/sensor.hpp"
+
+namespace gyrofree::rate {
+
+constexpr int BRIDGED_SAMPLES = 3;  // that may be missing without anything being forgotten
+
+class Intake {
+ public:
+  // Must this sample of all axes be passed over? noisy: the axes are known to scatter.
+  bool refuses(const Sensor& s, const double* a, double dt, bool noisy);
+  void withhold(bool on) { withheld_ = on; }
+  // Samples passed over in a row, and all of them.
+  int missing() const { return missing_; }
+  long refused() const { return refused_; }
+
+ private:
+  static constexpr double FROZEN_S = 1.0;  // s in which no axis changes
+  bool usable(const Sensor& s, const double* a, double dt, bool noisy);
+
+  Vector<MOST_AXES> last_ = Vector<MOST_AXES>::Zero();
+  double same_s_ = 0.0;  // in which no axis changed
+  int missing_ = 0;
+  long refused_ = 0;
+  bool withheld_ = false;
+};
+
+}  // namespace gyrofree::rate
