@@ -22,7 +22,8 @@ import gyrofree.commands
 from gyrofree.commands.main import app
 
 ROUNDS = int(os.environ.get("GYROFREE_FUZZ_ROUNDS", "5"))  # of each command and file
-LONGEST_S = 30  # of one call; a command that hangs is a fault
+LONGEST_S = 30  # of one call, of the processor: a command that works for ever is a fault
+WAITS_S = 300  # of the clock: so is one that waits for ever
 OUTPUTS = {"out", "plot", "folder", "layout_out", "link", "csv", "port_link"}
 FILES = {"session", "sessions", "layout", "layouts", "log", "imu", "gnss"}  # named by a text
 VALUES = {"name": "anna", "role": "viewer", "text": "a remark"}  # of what is no file
@@ -117,15 +118,18 @@ def called(line):
     def hung(*_):
         raise Hung
 
-    old = signal.signal(signal.SIGALRM, hung)
-    signal.alarm(LONGEST_S)
+    old = {number: signal.signal(number, hung) for number in (signal.SIGALRM, signal.SIGPROF)}
+    signal.alarm(WAITS_S)
+    signal.setitimer(signal.ITIMER_PROF, LONGEST_S)
     try:
         result = CliRunner().invoke(app, line)
     except Hung:
         return None, "", "did not end"
     finally:
         signal.alarm(0)
-        signal.signal(signal.SIGALRM, old)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        for number, before in old.items():
+            signal.signal(number, before)
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         return None, result.output, "".join(traceback.format_exception(result.exception)[-6:])
     return result.exit_code, result.output, ""
@@ -212,7 +216,7 @@ def test_a_sample_in_processes_of_their_own(seeds, tmp_path):
                 capture_output=True,
                 text=True,
                 errors="replace",
-                timeout=LONGEST_S,
+                timeout=WAITS_S,
             )
             judged(line, done.returncode, done.stdout + done.stderr, "")
     assert Path(tmp_path).is_dir()
