@@ -340,6 +340,9 @@ class Told:
 
     def skip(self, n) -> None: ...
 
+    def withhold(self, on):
+        pass
+
     def exclude(self, mask: int) -> None:
         self.masks.append(mask)
 
