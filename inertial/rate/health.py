@@ -27,6 +27,10 @@ from inertial.rate.samples import BRIDGED
 Array = NDArray[np.float64]
 
 
+# Blocks from one question to the next, and once readings could not be explained time and again.
+ASK, ASK_LESS = 3, 12
+
+
 class HealthMonitor:
     """Health of every axis of one board."""
 
@@ -213,7 +217,7 @@ class HealthMonitor:
             self._learn(True)
         elif self._sum > c.alarm * degrees:
             self._asked += 1
-            if self._asked % 3 == 1:
+            if self._asked % (ASK if self.counts.restarts < 3 else ASK_LESS) == 1:
                 self._ask()
 
     def _ask(self) -> None:
