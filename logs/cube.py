@@ -19,11 +19,11 @@ from inertial.plausible import doubt_of_gravity
 from inertial.rate import resolved
 from inertial.rate.batch import RateColumns
 from inertial.rate.beliefs import make
-from inertial.rate.estimators import ESTIMATORS, ProductsRate
+from inertial.rate.estimators import ESTIMATORS, ProductsRate, leave_out
 from inertial.rate.names import LEADER
 from inertial.rate.sight import BLIND
 from inertial.rate.tachometer import SUFFIX
-from logs.cube_axes import axes_of
+from logs.cube_axes import agreement, axes_of, moving
 from logs.cube_log import CubeLog, read_log
 from logs.cube_parts import Monitored, Part, cut, monitored
 from logs.cube_run import EstimatorRun, reference
@@ -106,15 +106,19 @@ def run_cube(
         if t.blind
     ]
     progress(0.95, "bound")
-    bound = bound_of(data, used.layout(shape) if used is not None else shape, truth)
+    known = used.layout(shape) if used is not None else shape
+    f_axis = data.f_axis * np.array(shape.gain)
+    agree = agreement(known, f_axis if used is None else used.correct(f_axis), moving(data))
+    notes += [agree.text] if agree and agree.text else []
+    bound = bound_of(data, known, truth, agree)
     plain = [name.partition("+")[0] for name in tracks]
-    known = [*tracks, *(name for name in estimators or ESTIMATORS if name not in plain)]
+    asked = [*tracks, *(name for name in estimators or ESTIMATORS if name not in plain)]
     default = next(
         (name for name, of in zip(tracks, plain, strict=True) if of == LEADER),
         None,
     )
     result = {
-        "estimators": {name: score(tracks.get(name), truth, bound) for name in known},
+        "estimators": {name: score(tracks.get(name), truth, bound) for name in asked},
         "default": default or next(iter(tracks), None),
         "gaps": {
             "count": len(data.gaps),
@@ -173,6 +177,7 @@ def run_log(
     watched = monitored(data, shape, f_axis)
     tracks: dict[str, EstimatorRun] = {}
     notes = [f"{text}: not used" for text in watched.named(data.names)]
+    notes += [watched.width] if watched.width else []
     for k, name in enumerate(chosen):
         try:
             with np.errstate(
@@ -193,6 +198,7 @@ def run_log(
                     lean,
                 )
             tracks[track.name] = track
+            notes += [track.kept] if track.kept else []
         except GeometryError as error:
             notes.append(f"{name}: {error}")
         except np.linalg.LinAlgError:
@@ -224,14 +230,15 @@ def run_estimator(
     estimator, n = make(ESTIMATORS[name], shape, card), len(data.t_s)
     reports = _reports(data) if tacho_aid else {}
     said = _Said(n, SCORED if lean else SAID)
-    busy, mask = 0, 0
+    busy, mask, refused = 0, 0, ""
     for part in cut(parts, list(reports)):
         began = time.thread_time_ns()
         if part.missing:
             estimator.skip(part.missing)
         if part.mask != mask:
-            estimator.exclude(part.mask)
             mask = part.mask
+            if (error := leave_out(estimator, mask)) is not None:
+                refused = f"{name} knew nothing while axes were not good: {error}"
         for begin in range(part.begin, part.end, BLOCK):
             rows = slice(begin, min(begin + BLOCK, part.end))
             said.take(rows, estimator.feed(data.t_s[rows], f_axis[rows]))
@@ -239,7 +246,7 @@ def run_estimator(
             estimator.tacho(float(data.t_s[last]), reports[last], TACHO_SIGMA)
         busy += time.thread_time_ns() - began
         progress(part.end / n)
-    run = said.run(name, busy / n / 1000.0)
+    run = replace(said.run(name, busy / n / 1000.0), kept=refused)
     if resolve and issubclass(ESTIMATORS[name], ProductsRate):
         return _resolved(run, make(ESTIMATORS[name], shape, card), data, f_axis)
     return run

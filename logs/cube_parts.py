@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.layouts.layout import Layout
-from inertial.rate.axis_fault import AxisState, Fault
+from inertial.rate.axis_fault import Fault
 from inertial.rate.health import HealthMonitor
 from logs.cube_log import CubeLog
 
@@ -33,13 +33,14 @@ class Monitored:
 
     parts: tuple[Part, ...]
     faults: tuple[Fault, ...]  # of each axis, at the end
+    width: str  # how much less exact than expected all axes are, for people; empty: they are not
 
     def named(self, names: Sequence[str]) -> list[str]:
         """Axes that are not good, in words."""
         return [
-            f"axis {name}: {fault.text or fault.state.name.lower()}"
+            f"axis {name}: {fault.text or fault.word}"
             for name, fault in zip(names, self.faults, strict=True)
-            if fault.state not in (AxisState.GOOD, AxisState.SUSPECT)
+            if fault.word != "good"
         ]
 
 
@@ -56,7 +57,7 @@ def monitored(data: CubeLog, shape: Layout, f_axis: Array) -> Monitored:
         for stop, mask in monitor.feed(data.t_s[begin:end], f_axis[begin:end]):
             parts.append(Part(at, begin + stop, missing if at == begin else 0, mask))
             at = begin + stop
-    return Monitored(tuple(parts), tuple(monitor.faults))
+    return Monitored(tuple(parts), tuple(monitor.faults), monitor.belief.width.text)
 
 
 def cut(parts: Sequence[Part], rows: Sequence[int]) -> list[Part]:

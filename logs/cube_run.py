@@ -25,6 +25,7 @@ class EstimatorRun:
     p_n: Array  # (n, 3) m
     us_per_sample: float
     blind: str = ""  # why omega was not known in more than half of the samples; empty: it was
+    kept: str = ""  # why it knew nothing for a while; empty: it went on
 
 
 @dataclass(frozen=True)

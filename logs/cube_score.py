@@ -1,6 +1,7 @@
 """How well an estimator did over a log of a cube: against truth or tachometer, and the bound."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from inertial.layouts.layout import GeometryError, Layout
 from inertial.rate.bound import IN_USE, rate_bound
 from inertial.rate.tachometer import SUFFIX
 from inertial.rotation import followed, level
+from logs.cube_axes import Agreement
 from logs.cube_log import CubeLog
 from logs.cube_run import EstimatorRun, Reference
 
@@ -63,9 +65,11 @@ def _known(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def bound_of(data: CubeLog, shape: Layout, truth: Reference) -> Array | None:
-    """RMS of the posterior Cramer-Rao bound (3,), rad/s, along the true motion; None where that is
-    not known.
+def bound_of(
+    data: CubeLog, shape: Layout, truth: Reference, agree: Agreement | None = None
+) -> Array | None:
+    """RMS of the posterior Cramer-Rao bound (3,), rad/s, along the true motion, by the noise that
+    the axes have where they can tell; None where the motion is not known.
     """
     if not np.isfinite(truth.omega_b).all():
         return None
@@ -76,7 +80,8 @@ def bound_of(data: CubeLog, shape: Layout, truth: Reference) -> Array | None:
     )
     q_nb = data.q_nb if data.q_nb is not None else _turned(data, shape, omega)
     try:
-        sigma = rate_bound(shape, data.t_s, q_nb, omega, alpha, IN_USE)
+        knows = replace(IN_USE, sigma_axis=agree.sigma_axis) if agree and agree.text else IN_USE
+        sigma = rate_bound(shape, data.t_s, q_nb, omega, alpha, knows)
     except GeometryError:
         return None
     return np.sqrt(np.mean(sigma**2, axis=0))

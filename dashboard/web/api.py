@@ -26,6 +26,7 @@ from dashboard.web.schemas import (
 )
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
+from messages.text import composed
 from sessions.library.catalogue import SessionError, SessionInfo
 
 routes = APIRouter(prefix="/api")
@@ -47,7 +48,7 @@ def list_sessions(front: Front, text: str = "") -> list[SessionOut]:
         ]
     except SessionError as error:
         raise HTTPException(503, str(error)) from None
-    words = text.lower().split()
+    words = composed(text).lower().split()
     return [row for row in rows if all(word in _haystack(row) for word in words)]
 
 

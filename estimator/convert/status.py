@@ -4,15 +4,7 @@ from typing import Any
 
 from estimator.convert.header import as_list
 from estimator.stream import Stream
-from inertial.navigation.solution import Mode
 from messages.contract import gyrofree_pb2 as pb
-
-STATES = {
-    Mode.WAITING: "waiting for samples",
-    Mode.LEVELLING: "levelling",
-    Mode.COURSE: "finding heading",
-    Mode.NAVIGATING: "navigating",
-}
 
 
 def status_message(
@@ -32,9 +24,10 @@ def status_message(
 
 def navigator_state(status: pb.EstimatorStatus, navigator: Any) -> pb.EstimatorStatus:
     """The status with what a navigator does and has counted."""
-    status.state = STATES[navigator.mode]
-    counted = [f"fixes {what} {count}" for what, count in navigator.counts.items() if count]
-    status.message = ", ".join([part for part in (navigator.text, *counted) if part])
+    status.state = "navigating" if navigator.navigating else navigator.text
+    status.message = ", ".join(
+        f"fixes {what} {count}" for what, count in navigator.counts.items() if count
+    )
     return status
 
 

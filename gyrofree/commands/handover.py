@@ -140,7 +140,7 @@ def import_log(
         for note in source.notes:
             say(f"note: {note}", file=sys.stderr)
         rows = importer.rows_of(source, settings.bus.prefix, device)
-        folder = _estimated(
+        folder, axes = _estimated(
             settings,
             rows,
             f"20240101-000000-{slug(name) or 'import'}",
@@ -148,16 +148,19 @@ def import_log(
             settings.recorder.root,
         )
         give_title(folder, name)
+        for text in axes:
+            say(text, file=sys.stderr)
     except (LogError, TopicError, SessionError, OSError) as error:
         raise fail(str(error), EXIT_CONFIG) from None
     say(json.dumps({"session": folder.name}) if as_json else folder.name)
 
 
-def _estimated(settings, rows, session: str, note: str, root: Path) -> Path:
-    """A session of the rows with the estimates on them."""
+def _estimated(settings, rows, session: str, note: str, root: Path) -> tuple[Path, list[str]]:
+    """A session of the rows with the estimates on them; what is said of the axes at its end."""
     import tempfile
 
     from estimator.pipeline import Pipeline
+    from gyrofree.running.axes_said import axes_said, keeping_axes
     from sessions.replay.rerun import estimates_again, write_session
 
     configuration = settings.model_dump(mode="json")
@@ -166,7 +169,9 @@ def _estimated(settings, rows, session: str, note: str, root: Path) -> Path:
         again = estimates_again(
             inputs / "recording.mcap", Pipeline(settings.estimator), "", progress
         )
-        return write_session(Path(root), session, again, note, configuration)
+        last: dict[str, bytes] = {}
+        folder = write_session(Path(root), session, keeping_axes(again, last), note, configuration)
+        return folder, [axes_said(payload) for payload in last.values()]
 
 
 def rerun(

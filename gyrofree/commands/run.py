@@ -209,8 +209,9 @@ def show(result: dict[str, Any], as_json: bool) -> None:
 def axes(found: dict[str, Any]) -> str:
     """How many axes are good, and what is wrong with each of the others."""
     states = {name: one["state"] if isinstance(one, dict) else one for name, one in found.items()}
-    bad = [f"{name} {state}" for name, state in states.items() if state != "good"]
-    return ", ".join([f"{len(states) - len(bad)} of {len(states)} good", *bad])
+    from inertial.rate.axis_verdicts import good_of  # here: not every command needs the core
+
+    return good_of(states)
 
 
 def cell(value: Any) -> str:

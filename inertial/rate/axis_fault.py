@@ -25,6 +25,12 @@ class AxisState(IntEnum):
     SUSPECT = 8
 
 
+def axis_word(state: int, excluded: bool) -> str:
+    """A state as people read it; an axis that is only looked into is good."""
+    good = state == AxisState.GOOD or (state == AxisState.SUSPECT and not excluded)
+    return "good" if good else AxisState(state).name.lower()
+
+
 @dataclass
 class Fault:
     """What is known of one axis; GOOD axes have one too."""
@@ -40,6 +46,11 @@ class Fault:
     fits: int = 0  # blocks in a row
     relapses: int = 0
     ended_s: float = -np.inf
+
+    @property
+    def word(self) -> str:
+        """The state as people read it; an axis that is only looked into is good."""
+        return axis_word(self.state, self.excluded)
 
     def favours_good(
         self, i: int, block: Array, bias: Array, reference: Array, residual: float, sigma: float

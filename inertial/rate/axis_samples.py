@@ -2,7 +2,7 @@
 
 Counters are kept per axis in one integer array (rows below), readings between samples in another;
 core/rate/axis_samples.cpp changes them in place. A knock moves all axes: a spike must stand out six
-times from the median axis.
+times from the median axis, and vibration is usual: six times from what the axis always does.
 """
 
 import numpy as np
@@ -16,11 +16,13 @@ Integers = NDArray[np.int64]
 # the range, samples since that, spikes close to one another, samples since the last.
 SAME, AT_LIMIT, LIMIT_AGE, SPIKES, SPIKE_AGE = range(5)
 ROWS = 5
-# Rows of the readings that are kept: the last but one, the last, the sum of the block without
-# spikes.
-BEFORE, LAST, SUM = range(3)
-# Marks: how many of BEFORE and LAST are known, and samples in the block.
-KNOWN, FILLED = range(2)
+# Rows of what is kept: the last but two, the last but one, the last, the sum of the block without
+# spikes, the usual distance from the middle of the neighbours, the measured parity over the noise.
+EARLIER, BEFORE, LAST, SUM, USUAL, PARITY = range(6)
+KEPT = 6
+# Marks: how many of the first three are known, samples in the block, samples in PARITY.
+KNOWN, FILLED, HEARD = range(3)
+MARKS = 3
 AGE_LONG = 1_000_000
 
 
@@ -34,6 +36,9 @@ def counters(axes: int) -> Integers:
 gather = native.health.gather
 """Take samples f[begin:] (n, N), m/s^2, until a block is full or there are no more; returns the
 next one's row."""
+measured_noise = native.health.measured_noise
+"""Variance of the axes' noise over the configured one, by the median axis; 1 where it is not more
+(H-11)."""
 flags = native.health.flags
 """Rows of out (3, N): axes that are stuck, at the end of their range, spiking, by counts. True for
 any."""

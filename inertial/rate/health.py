@@ -10,18 +10,25 @@ Deterministic: no time of day, no random. docs/equations-layouts.md, H-1 to H-10
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.layouts.layout import RANK_TOLERANCE, Layout
+from inertial.layouts.layout import Layout
 from inertial.rate import axis_samples, parity
-from inertial.rate.axis_fault import AxisState, Fault
+from inertial.rate.axis_belief import Belief
+from inertial.rate.axis_fault import AxisState
+from inertial.rate.axis_verdicts import Verdicts, mute
 from inertial.rate.health_config import STANDSTILL, Config, Counts, Newest
 from inertial.rate.hypotheses import Finding, History, Known, explain, start
 from inertial.rate.samples import BRIDGED
 
 Array = NDArray[np.float64]
+
+
+# Blocks from one question to the next, and once readings could not be explained time and again.
+ASK, ASK_LESS = 3, 12
 
 
 class HealthMonitor:
@@ -34,23 +41,19 @@ class HealthMonitor:
         self.layout, self.config, self.period_s = layout, config, period_s
         n = layout.axes
         self.per_block = max(1, round(config.block_s / period_s))
-        self.faults = [Fault() for _ in range(n)]
         self.counts = Counts()
+        self.verdicts = Verdicts(layout, config, self.counts)
+        self.faults, self.used = self.verdicts.faults, self.verdicts.used
         self.newest = Newest(np.zeros(n), np.ones(n))
         self.message = ""
         self._mask = 0
-        self._limits = np.array([s.limit for s in layout.sensors])
-        self._J, self._Q = np.ascontiguousarray(layout.J), np.ascontiguousarray(layout.Q)
-        self._noise = layout.noise
         self._sees = bool(np.isfinite(layout.gdop))
-        self.white = self._noise**2 / self.per_block
-        self.bias, self.reference = np.zeros(n), np.zeros(n)
-        self.offset = (config.offset_sigmas * np.array([s.bias for s in layout.sensors])) ** 2
-        self.learned = np.zeros(n, dtype=bool)
+        self.belief = Belief(layout, config, self.per_block)
+        self._near = np.zeros((axis_samples.KEPT, n))
+        self._marks = np.zeros(axis_samples.MARKS, dtype=np.int64)
         self._count = axis_samples.counters(n)
         self._whose = np.zeros((3, n), dtype=bool)  # stuck, at the end of its range, spiking
         self._forget_samples()
-        self.used = np.ones(n, dtype=bool)
         self.history = History(n)
         self._x: Array | None = None
         self._P = np.eye(parity.STATES)
@@ -68,16 +71,11 @@ class HealthMonitor:
         """Bit k: axis k is excluded."""
         return self._mask
 
-    def _excluded(self) -> int:
-        return sum([1 << k for k, fault in enumerate(self.faults) if fault.excluded])
-
     def _known(self) -> Known:
-        c = self.config
-        constants = parity.Constants(
-            self._J, self._Q, self.bias, self.reference, self.white, self.offset
+        belief = self.belief
+        return Known(
+            self.layout, self.used, belief.learned, belief.constants(), belief.tuning(), belief
         )
-        tuning = parity.Tuning(c.sigma_alpha, c.sigma_force, c.scale)
-        return Known(self.layout, self.used, self.learned, constants, tuning)
 
     # --- samples
 
@@ -98,7 +96,15 @@ class HealthMonitor:
         near, marks = self._near, self._marks
         while row < len(f):
             row = axis_samples.gather(
-                f, row, self.per_block, near, marks, self._noise, self._limits, self._count
+                f,
+                row,
+                self.per_block,
+                near,
+                marks,
+                self.belief.noise,
+                self.belief.limits,
+                self.belief.free,
+                self._count,
             )
             self._stale |= stale
             filled = int(marks[axis_samples.FILLED])
@@ -129,12 +135,9 @@ class HealthMonitor:
             self._sum = 0.0
 
     def _forget_samples(self) -> None:
-        n = self.layout.axes
-        self._near, self._marks, self._last = (
-            np.zeros((3, n)),
-            np.zeros(2, dtype=np.int64),
-            np.zeros(n),
-        )
+        self._near[: axis_samples.USUAL] = 0.0
+        self._marks[: axis_samples.HEARD] = 0
+        self._last = np.zeros(self.layout.axes)
         self._stale = 0
         self._count[axis_samples.SAME] = 0
 
@@ -142,22 +145,23 @@ class HealthMonitor:
 
     def _block(self, block: Array, dt: float) -> None:
         self.counts.blocks += 1
+        self.belief.hear(axis_samples.measured_noise(self._near, self._marks, self.belief.free))
         self._single_axes()
         if self._sees and np.count_nonzero(self.used) > 6:
             self._check(block, dt)
-        self._mask = self._excluded()
+        self._mask = self.verdicts.mask
         if self._mask:
-            self._returns(block)
-            self._mask = self._excluded()
+            still_mute = mute(self._whose, self._count, self._stale)
+            about = (self._t, block, self.per_block * self.period_s, self.newest, still_mute)
+            if self.verdicts.returns(*about, self.belief):
+                self.history.clear()
+            self._mask = self.verdicts.mask
         if self._mask:
-            bad = [
-                name
-                for name, fault in zip(self.layout.axis_names, self.faults, strict=True)
-                if fault.excluded
-            ]
-            self.message = f"not used: {', '.join(bad)}"
+            self.message = "; ".join(
+                filter(None, (f"axes: {self.verdicts.text}", self.belief.width.text))
+            )
         elif self.counts.blocks - self._clean_blocks > 0:
-            self.message = ""
+            self.message = self.belief.width.text
 
     def _single_axes(self) -> None:
         """Stuck, saturated, spiking, stale: seen without a model."""
@@ -207,11 +211,13 @@ class HealthMonitor:
         self.history.add(block, dt, *before, self._sum == 0.0)
         if self._sum == 0.0:
             self._asked = 0
-            self._clear_suspects()
-            self._learn(block)
+            self.verdicts.clear_suspects(self._t)
+            self._learn(self.history.all_well(STANDSTILL))
+        elif self._at_first_rest():  # offsets larger than expected are learned, not blamed
+            self._learn(True)
         elif self._sum > c.alarm * degrees:
             self._asked += 1
-            if self._asked % 3 == 1:
+            if self._asked % (ASK if self.counts.restarts < 3 else ASK_LESS) == 1:
                 self._ask()
 
     def _ask(self) -> None:
@@ -224,18 +230,18 @@ class HealthMonitor:
                 self._restart()
             return
         if finding.axes and not finding.sure:
-            for i in finding.axes:
-                if not self.faults[i].excluded:
-                    self.faults[i].state, self.faults[i].text = (
-                        AxisState.SUSPECT,
-                        "inconsistent, looked into",
-                    )
+            self.verdicts.suspect(finding.axes)
             return
         self._adopt(finding)
 
     def _adopt(self, finding: Finding) -> None:
         self._x, self._P, self._sum, self._asked = finding.x, finding.P, 0.0, 0
         self.history.clear()
+        if finding.width is not None:
+            self.belief.width = finding.width
+            self.counts.widened += 1
+            self.verdicts.clear_suspects(self._t)
+            return
         if not finding.axes:
             self.counts.explained_by_start += 1
             return
@@ -248,51 +254,9 @@ class HealthMonitor:
             partner = next((k for k in finding.axes if k != i), -1)
             self._name(i, AxisState(state), text, finding.kind, partner, finding.offset)
 
-    def _name(
-        self,
-        i: int,
-        state: AxisState,
-        text: str,
-        kind: int = parity.IGNORE,
-        partner: int = -1,
-        offset: float = 0.0,
-    ) -> None:
-        fault = self.faults[i]
-        if fault.excluded and (
-            state == fault.state or fault.state not in (AxisState.SUSPECT, AxisState.BIASED)
-        ):
-            if state == fault.state:
-                fault.fits, fault.evidence = 0, 0.0
-            return
-        relapse = self._t - fault.ended_s < self.config.relapse_s
-        fault.relapses = (
-            fault.relapses + 1
-            if relapse and not fault.excluded
-            else fault.relapses
-            if relapse
-            else 0
-        )
-        if fault.state in (AxisState.GOOD, AxisState.SUSPECT) and not fault.excluded:
-            self.counts.named += 1
-        fault.state, fault.text, fault.since_s = state, text, self._t
-        fault.kind, fault.partner, fault.offset, fault.evidence, fault.fits = (
-            kind,
-            partner,
-            offset,
-            0.0,
-            0,
-        )
-        fault.excluded = fault.excluded or self._spare(i)
-        if fault.excluded and self.used[i]:
-            self.used[i] = False
+    def _name(self, i: int, state: AxisState, text: str, *about: Any) -> None:
+        if self.verdicts.name(i, self._t, state, text, *about):
             self._forget_fault_in_state()
-
-    def _spare(self, i: int) -> bool:
-        """True when the others still see omega' and p."""
-        rest = self.used.copy()
-        rest[i] = False
-        J = self.layout._scaled(self.layout.J[rest])
-        return len(J) >= 6 and int(np.linalg.matrix_rank(J, rtol=RANK_TOLERANCE)) == 6
 
     def _forget_fault_in_state(self) -> None:
         """The filter believed the axis until now: run the newest blocks again without it."""
@@ -309,73 +273,40 @@ class HealthMonitor:
         self._clean_blocks = self.counts.blocks + 25
         self._x, self._sum, self._asked = None, 0.0, 0
         self.history.clear()
-        self._clear_suspects()
-
-    def _clear_suspects(self) -> None:
-        for fault in self.faults:
-            if fault.state == AxisState.SUSPECT and not fault.excluded:
-                fault.state, fault.text, fault.since_s = AxisState.GOOD, "", self._t
+        self.verdicts.clear_suspects(self._t)
 
     # --- standstill
 
-    def _learn(self, block: Array) -> None:
+    def _learn(self, ready: bool) -> None:
         """Offsets of the axes in use from two seconds of standstill; what is along p stays p's."""
-        self._quiet = self._quiet + 1 if self.history.all_well(STANDSTILL) else 0
+        full = len(self.history.blocks) >= STANDSTILL
+        self._quiet = self._quiet + 1 if full and ready else 0
         if self._quiet % 10 != 1:
             return
         window = np.array(self.history.blocks[-STANDSTILL:])
+        if not self.belief.steady(window, self.used):
+            return
         mean, used = window.mean(axis=0), self.used
-        scatter = np.mean((window - mean)[:, used] ** 2 / self.white[used])
-        trend = np.abs(
-            window[: STANDSTILL // 2].mean(axis=0) - window[STANDSTILL // 2 :].mean(axis=0)
-        )
-        if scatter > 1.5 or np.any(
-            trend[used] > 6.0 * np.sqrt(4.0 * self.white[used] / STANDSTILL)
-        ):
-            return
         off = parity.offsets_at_rest(self.layout.theta_b, mean, used)
-        allowed = self.offset + self.white + (self.config.scale * 9.8) ** 2 * 0.1
-        if np.any((off - self.bias)[used] ** 2 > 20.0 * allowed[used]):
+        if not self.belief.learn(off, mean, used):
             return
-        self.bias = np.where(used, off, self.bias)
-        self.reference = np.where(used, mean, self.reference)
-        self.offset = np.where(used, self.config.offset_left**2, self.offset)
-        self.learned = self.learned | used
         self.history.clear()  # states of before belong to other offsets
+        if self._sum > 0.0:  # it believed in a motion that there is not
+            self._x, self._P = start(self._known(), mean)
+            self._sum, self._asked = 0.0, 0
+            self.verdicts.clear_suspects(self._t)
         self._quiet = 0
         omega = parity.OMEGA
         self._x[omega], self._P[omega, :], self._P[:, omega] = 0.0, 0.0, 0.0
         self._P[omega, omega] = 0.1**2 * np.eye(3)
 
-    # --- the way back
-
-    def _returns(self, block: Array) -> None:
-        c = self.config
-        for i, fault in enumerate(self.faults):
-            if not fault.excluded:
-                continue
-            residual, sigma = float(self.newest.residual[i]), float(self.newest.sigma[i])
-            speaks = not any(flags[i] for flags in self._whose) and not self._stale >> i & 1
-            calm = self._count[axis_samples.SAME, i] < 8
-            fits = speaks and calm and abs(residual) < 4.0 * sigma and self.newest.filled
-            fault.fits = fault.fits + 1 if fits else 0
-            fault.evidence = (
-                fault.evidence
-                + fault.favours_good(i, block, self.bias, self.reference, residual, sigma)
-                if fits
-                else 0.0
-            )
-            seconds = min(c.good_s * 2.0**fault.relapses, c.longest_good_s)
-            enough = (
-                fault.fits * self.per_block * self.period_s >= seconds
-                and fault.evidence > c.evidence
-            )
-            partner = self.faults[fault.partner] if fault.partner >= 0 else None
-            if enough and (
-                partner is None or not partner.excluded or partner.evidence > c.evidence
-            ):
-                self.used[i] = True
-                fault.state, fault.excluded, fault.text = AxisState.GOOD, False, ""
-                fault.since_s = fault.ended_s = self._t
-                self.counts.returned += 1
-                self.history.clear()
+    def _at_first_rest(self) -> bool:
+        """No standstill was learned yet, and so far the readings are those of one."""
+        if self.belief.learned.any():
+            return False
+        window = np.array(self.history.blocks[-STANDSTILL:])
+        if not self.belief.steady(window, self.used):
+            return False
+        mean = window.mean(axis=0)
+        off = parity.offsets_at_rest(self.layout.theta_b, mean, self.used)
+        return self.belief.credible(off, self.used)

@@ -21,6 +21,7 @@ class Config:
     sigma_force: float = 4.0  # m/s^2 per root s, the same for the specific force
     # of 1: scale and cross-axis error of an axis that is still good, 2.4 sigma uncalibrated
     scale: float = 0.012
+    scale_sigmas: float = 2.4  # of the sensor's own scale error, where that is more
     offset_sigmas: float = 1.5  # of the sensor's uncalibrated offset, before the first standstill
     offset_left: float = 0.03  # m/s^2, after it: drift
     gate: float = 1.5  # of the NIS expected of a block: what lies above it adds up
@@ -45,6 +46,7 @@ class Counts:
     returned: int = 0
     restarts: int = 0  # readings did not fit any motion and no axis explains it
     explained_by_start: int = 0
+    widened: int = 0  # all axes were found less exact than expected, and none is at fault
     spikes_removed: int = 0
     blocks: int = 0
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from inertial.layouts.layout import Layout
 from inertial.rate import parity
+from inertial.rate.axis_belief import WIDER, Belief, Width
 from inertial.rate.axis_fault import AxisState
 
 Array = NDArray[np.float64]
@@ -26,9 +27,14 @@ CLEAN = 0.3
 # NIS per degree of freedom of a fault of one axis that is preferred to a swap which leaves more
 # than CLEAN
 ALONE = 1.0
+# -2 log likelihood a block by which a fault must beat "all axes are less exact than expected": one
+# that leaves no more than good readings do, and for what it leaves beyond. A block, not all: an
+# error that lasts speaks once, however many blocks it lasts.
+BLAME, BLAME_UNCLEAN, NOISE = 7.5, 12.0, 0.1
 FIT = 2.5  # NIS per degree of freedom that an explanation may leave
 
-SWAPPED, FLIPPED, BIASED, SUSPECT = (
+GOOD, SWAPPED, FLIPPED, BIASED, SUSPECT = (
+    AxisState.GOOD,
     AxisState.SWAPPED,
     AxisState.FLIPPED,
     AxisState.BIASED,
@@ -44,6 +50,13 @@ class Known(NamedTuple):
     learned: NDArray[np.bool_]  # (N,), offsets are known from a standstill
     constants: parity.Constants
     tuning: parity.Tuning
+    belief: Belief
+
+    def wider(self, width: Width) -> "Known":
+        """The same of axes that are less exact."""
+        return self._replace(
+            constants=self.belief.constants(width), tuning=self.belief.tuning(width)
+        )
 
 
 @dataclass(frozen=True)
@@ -58,6 +71,7 @@ class Finding:
     sure: bool
     x: Array
     P: Array
+    width: Width | None = None  # no axis is at fault: all are less exact than expected
 
 
 class History:
@@ -206,7 +220,15 @@ def explain(history: History, known: Known, late: bool) -> Finding | None:
     nothing = trial.run(parity.NONE)
     tried = sorted([*trial.other_starts(), *trial.of_axes()], key=lambda item: item.score)
     best = tried[0]
-    if not best.left < FIT or nothing.score - best.score < BETTER:
+    fits = best.left < FIT and nothing.score - best.score >= BETTER
+    if not fits or best.axes:
+        width, wide = widened(history, known, len(found[2]) - history.since_onset(), found)
+        explains = wide.left < FIT and nothing.score - wide.score >= BETTER
+        if explains and (not fits or not _blames(best, wide, len(found[2]))):
+            # nobody is blamed for what all axes do a little
+            text = GOOD, "", 0.0, late
+            return Finding((), parity.NONE, *text, wide.x, wide.P, width) if late else None
+    if not fits:
         return None
     # a swap that does not explain all: one of its axes may do as well
     half = len(best.axes) == 2 and best.left > CLEAN
@@ -224,6 +246,25 @@ def explain(history: History, known: Known, late: bool) -> Finding | None:
     if pair:
         finding = replace(finding, text=f"{finding.text}, or {_swapped(known.layout, pair.axes)}")
     return finding
+
+
+def _blames(best: Tried, wide: Tried, blocks: int) -> bool:
+    """Does the fault explain so much more than wider beliefs do that an axis may be blamed?"""
+    return wide.score - best.score > blocks * (BLAME + BLAME_UNCLEAN * max(0.0, best.left - NOISE))
+
+
+def widened(
+    history: History, known: Known, onset: int, found: tuple[Array, Array, Array, Array]
+) -> tuple[Width, Tried]:
+    """No axis is at fault, all are less exact than expected: the likeliest width."""
+    tried = []
+    for width in WIDER:
+        if width.beyond(known.belief.width):
+            trial = Trial(known.wider(width), onset, found)
+            tried += [(width, t) for t in (trial.run(parity.NONE), *trial.other_starts())]
+    if not tried:
+        return known.belief.width, Trial(known, onset, found).run(parity.NONE)
+    return min(tried, key=lambda item: item[1].score)
 
 
 def _finding(trial: Trial, best: Tried, sure: bool) -> Finding:

@@ -55,6 +55,7 @@ class Tuning(NamedTuple):
     sigma_alpha: float  # rad/s^2 per root s
     sigma_force: float  # m/s^2 per root s
     scale: float  # of 1
+    cross: float  # of 1, of the RMS axis
 
 
 step = native.health.step

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.constants import GRAVITY
 from inertial.earth import radii
 from inertial.navigation import results
 from inertial.navigation.alignment import Alignment, AlignmentSettings, Start
@@ -29,10 +28,15 @@ Array = NDArray[np.float64]
 
 SETTLED = 15.0  # s after the start of navigation, from which errors count
 HONEST = ImuNoise(
-    accel=0.05, gyro=math.radians(0.05), shake=0.0
+    turn=0.0, accel=0.05, gyro=math.radians(0.05), shake=0.0
 )  # the simulated sensors' own figures, as they are
 BELIEVED = FixSettings(
-    floor_p=(0.0, 0.0, 0.0), floor_v=(0.0, 0.0, 0.0), timing=0.0
+    wander=0.0,  # the published filters take a receiver at its word
+    lag=0.0,
+    adapt=0.0,
+    floor_p=(0.0, 0.0, 0.0),
+    floor_v=(0.0, 0.0, 0.0),
+    timing=0.0,
 )  # what the fixes say, no more
 CONSTANT = 1e-9  # factor on the biases' variance that makes them constants
 # as the comparison has it: mounting known, IMU over the rear axle, nothing at standstill
@@ -118,7 +122,7 @@ def align(inputs: Inputs) -> Begin:
     """Level at the standstill, take the course: the common start of all methods. Raises ValueError
     without one.
     """
-    alignment = Alignment(AlignmentSettings())
+    alignment = Alignment(AlignmentSettings(in_motion=False))
     k, t = 0, inputs.imu[:, 0]
     for i in range(len(t)):
         alignment.imu(t[i], inputs.imu[i, 1:4], inputs.imu[i, 4:7])
@@ -127,7 +131,7 @@ def align(inputs: Inputs) -> Begin:
             alignment.fix(fix.t, fix.v_n, fix.sigma_v)
             start = alignment.start(alignment.C, fix.v_n)
             if start is not None:
-                still = float(np.linalg.norm(alignment.mean_f)) if alignment.levelled else GRAVITY
+                still = float(np.linalg.norm(alignment.mean_f))
                 return Begin(start, k, i + 1, still)
             k += 1
     raise ValueError(f"this drive never became fit for navigation: {alignment.text}")

@@ -76,7 +76,8 @@ def change_annotations(folder: Path, change: Callable[[Annotations], Annotations
                 raise SessionError(
                     f"tag {tag[:40]!r}: want a-z, 0-9, dot, dash, underscore, at most 32 characters"
                 )
-        changed = changed.model_copy(update={"tags": sorted(set(changed.tags))})
+        one_form = {"tags": sorted(set(changed.tags)), "title": text.composed(changed.title)}
+        changed = changed.model_copy(update=one_form)
         new = folder / (FILE + ".new")
         with new.open("w", encoding="utf-8") as stream:
             stream.write(changed.model_dump_json(indent=1) + "\n")

@@ -80,9 +80,9 @@ def test_the_page_names_the_fault_and_since_when():
             text="reads the same <again>",
         )
     )
-    assert "11 of 12 axes in use" in text and "stuck, not used" in text and "7.0 s" in text
+    assert "11 of 12 good, a21 stuck" in text and "stuck, not used" in text and "7.0 s" in text
     assert "&lt;again&gt;" in text and text.count("<tr>") == 12 + 2
-    assert "12 of 12 axes in use" in page(health())
+    assert "12 of 12 good" in page(health())
 
 
 @pytest.fixture

@@ -130,6 +130,8 @@ def test_words_of_every_language_are_kept_in_one_form(door):
         for title in ("Prüfstand 2 (Ä)", "Pru\u0308fstand 2 (A\u0308)"):
             kept = client.post(f"/api/sessions/{SESSION}/labels", json={"title": title}).json()
             assert kept["title"] == "Prüfstand 2 (Ä)"
+            found = client.get("/api/sessions", params={"q": title.split()[0]}).json()
+            assert [row["id"] for row in found] == [SESSION]
         for text in ("测试 עברית عربي Tiếng Việt 👩\u200d🔬", "two\nlines\tand a tab"):
             notes = client.post(f"/api/sessions/{SESSION}/notes", json={"text": text}).json()[
                 "notes"

@@ -17,6 +17,7 @@ from inertial.core import native
 from inertial.layouts.catalogue import CUBE, LAYOUTS, find
 from inertial.layouts.layout import products
 from inertial.rate import axis_samples, parity
+from inertial.rate.axis_belief import projection
 from inertial.rate.estimators import VARIANTS
 from inertial.rate.health import AxisState, HealthMonitor
 from inertial.simulation.faults import FaultError, Faults, parse
@@ -112,7 +113,7 @@ def test_the_core_equals_its_twin(name):
     n, c = layout.axes, constants(layout, draw)
     used, learned = np.ones(n, bool), draw.random(n) > 0.4
     used[n - 1] = n <= 6
-    tuning = parity.Tuning(200.0, 4.0, 0.012)
+    tuning = parity.Tuning(200.0, 4.0, 0.012, 0.03)
     x, P = believe(draw)
     for mine, theirs in zip(
         native.health.observe(x, P, c, 2), twin.observe(x, P, c.J, c.Q, 2), strict=True
@@ -136,20 +137,22 @@ def test_counters_equal_their_twin():
     draw, n = np.random.default_rng(3), 12
     f = np.round(draw.normal(size=(400, n)) * 0.1, 3)
     f[50, 3], f[90, 3], f[120:180, 5], f[200:230, 7] = 4.0, -4.0, 0.125, 16.0
-    noise, limit = np.full(n, 0.1), np.full(n, 16.0)
+    noise, limit, free = np.full(n, 0.1), np.full(n, 16.0), projection(CUBE(0.05).J)
     found = []
-    for gather in (axis_samples.gather, twin.gather):
-        near, marks = np.zeros((3, n)), np.zeros(2, np.int64)
+    for maker in (axis_samples, twin):
+        near, marks = np.zeros((axis_samples.KEPT, n)), np.zeros(axis_samples.MARKS, np.int64)
         count, row, seen = axis_samples.counters(n), 0, []
         while row < len(f):
-            row = gather(f, row, 4, near, marks, noise, limit, count)
+            row = maker.gather(f, row, 4, near, marks, noise, limit, free, count)
             marks[axis_samples.FILLED] = 0
-            seen.append((row, near.copy(), marks.copy(), count.copy()))
+            ratio = maker.measured_noise(near, marks, free)
+            seen.append((row, near.copy(), marks.copy(), count.copy(), ratio))
             near[axis_samples.SUM] = 0.0
         found.append(seen)
     for mine, theirs in zip(*found, strict=True):
         for a, b in zip(mine, theirs, strict=True):
-            np.testing.assert_array_equal(a, b)
+            np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-12)
+    assert found[0][-1][4] == 1.0 or found[0][-1][4] > 1.25
     assert found[0][-1][3][axis_samples.SPIKES].max() >= 0 and len(found[0]) == 100
 
 
@@ -172,7 +175,7 @@ def test_both_builds_of_the_monitor_give_the_same_bits():
     blocks = draw.normal(size=(7, 12)) * 5.0
     said = [
         build.health.replay(
-            x, P, blocks, np.full(7, 0.04), used, (5, 1, 3, 2), c, (200.0, 4.0, 0.012)
+            x, P, blocks, np.full(7, 0.04), used, (5, 1, 3, 2), c, (200.0, 4.0, 0.012, 0.03)
         )
         for build in builds
     ]
@@ -199,7 +202,7 @@ def test_a_residual_is_the_reading_minus_what_the_others_say():
     x, P = np.zeros(10), np.diag([0.1] * 3 + [50.0] * 3 + [9.0] * 3 + [0.0])
     f, c = draw.normal(size=12), constants(cube)._replace(white=np.full(12, 1e-3))
     used = np.ones(12, bool)
-    tuning = parity.Tuning(0.0, 0.0, 0.0)
+    tuning = parity.Tuning(0.0, 0.0, 0.0, 0.0)
     _, _, nis, _, residual, sigma = parity.step(x, P, f, 0.0, used, ~used, c, tuning)
     assert nis > 0.0
     without = np.arange(12) != 7
@@ -336,6 +339,9 @@ class Told:
         return self._real.feed(t_s, f_axis)
 
     def skip(self, n) -> None: ...
+
+    def withhold(self, on):
+        pass
 
     def exclude(self, mask: int) -> None:
         self.masks.append(mask)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from inertial.rate.axis_samples import (
     AT_LIMIT,
     FILLED,
+    HEARD,
     KNOWN,
     LIMIT_AGE,
     SAME,
@@ -167,11 +168,14 @@ def correct(
     return x, P, nis, logdet, residual, sigma
 
 
-def variances(f: Array, white: Array, offset: Array, scale: float, reference: Array) -> Array:
+def variances(
+    f: Array, white: Array, offset: Array, scale: float, cross: float, reference: Array
+) -> Array:
     """Variance (N,) of one block's readings (H-5): noise, offset not known, scale error times what
-    has changed.
+    has changed, and what of other axes' changes comes in by its direction.
     """
-    return white + offset + (scale * (f - reference)) ** 2
+    others = cross**2 * np.mean((f - reference) ** 2)
+    return white + offset + (scale * (f - reference)) ** 2 + others
 
 
 def altered(f: Array, bias: Array, reference: Array, kind: int, i: int, j: int) -> Array:
@@ -203,7 +207,8 @@ def step(
     no scale error.
     """
     J, Q, bias, reference, white, offset = constants
-    R = variances(block, white, offset, tuning[2], np.where(learned, reference, block))
+    reference = np.where(learned, reference, block)
+    R = variances(block, white, offset, tuning[2], tuning[3], reference)
     x, P = predict(x, P, dt, tuning[0], tuning[1])
     return correct(x, P, block - bias, R, used, J, Q, -1)
 
@@ -227,7 +232,7 @@ def replay(
     The hypothesis holds after block `since`; in that block, which may be mixed, its axes are not
     used. -1: always.
     constants: J, Q, bias, reference, white variance, offset variance; tuning: sigma_alpha,
-    sigma_force, scale.
+    sigma_force, scale, cross.
     """
     J, Q, bias, reference, white, offset = constants
     used = used.copy()
@@ -247,7 +252,7 @@ def replay(
         used = before if k < since else without if k == since or kind == IGNORE else before
         offset_axis = i if now == OFFSET_OF else -1
         f = altered(blocks[k], bias, reference, now, i, j)
-        R = variances(f + bias, white, offset, tuning[2], reference)
+        R = variances(f + bias, white, offset, tuning[2], tuning[3], reference)
         x, P = predict(x, P, dt[k], tuning[0], tuning[1])
         x, P, nis, logdet, _, _ = correct(x, P, f, R, used, J, Q, offset_axis)
         score += nis + logdet + (len(used) - used.sum()) * 2.0 * np.log(UNUSED_SIGMA)
@@ -264,25 +269,49 @@ def gather(
     marks: Integers,
     noise: Array,
     limit: Array,
+    free: Array,
     count: Integers,
 ) -> int:
     """Take samples f[begin:] (n, N), m/s^2, until a block is full or there are no more; returns the
     next one's row.
 
-    near (3, N): the sample before the last, the last, and the sum of the block, spikes removed;
-    marks: how many of the two are known, and samples in the block.
+    near (6, N): the samples before the last but one, before the last, the last, and the sum of the
+    block, spikes removed; the usual distance from the middle of the neighbours; the running mean of
+    squared third differences that no motion explains, over the noise's. marks: how many of the
+    first three are known, samples in the block, in that mean. free (N, N): the projection.
     """
     for k in range(begin, len(f)):
-        clean = look(f[k], near[1], near[0], marks[KNOWN], noise, limit, count)
+        clean = look(f[k], near[2], near[1], marks[KNOWN], noise, limit, count, near[4])
+        if marks[KNOWN] == 3:
+            hear(f[k] - 3.0 * clean + 3.0 * near[1] - near[0], near[5], marks, noise, free)
         if marks[KNOWN] > 0:
-            near[2] += clean
+            near[3] += clean
             marks[FILLED] += 1
-        near[0] = clean if marks[KNOWN] == 2 else near[1]
-        near[1] = f[k]
-        marks[KNOWN] = min(marks[KNOWN] + 1, 2)
+        near[0] = near[1]
+        near[1] = clean if marks[KNOWN] >= 2 else near[2]
+        near[2] = f[k]
+        marks[KNOWN] = min(marks[KNOWN] + 1, 3)
         if marks[FILLED] >= per_block:
             return k + 1
     return len(f)
+
+
+def hear(third: Array, mean: Array, marks: Integers, noise: Array, free: Array) -> None:
+    """One third difference (N,) into the running means (N,) of its ratio to the noise (H-11)."""
+    marks[HEARD] = min(marks[HEARD] + 1, 256)
+    left, share = free @ third, np.diag(free)
+    for i in np.nonzero(share >= 0.05)[0]:
+        ratio = left[i] ** 2 / (20.0 * share[i] * noise[i] ** 2)
+        mean[i] += (min(ratio, 6.0 * max(mean[i], 1.0)) - mean[i]) / marks[HEARD]
+
+
+def measured_noise(near: Array, marks: Integers, free: Array) -> float:
+    """Variance of the axes' noise over the configured one; 1 where chance may make it so."""
+    share = np.diag(free)
+    if not (share >= 0.05).any() or marks[HEARD] == 0:
+        return 1.0
+    ratio = float(np.median(near[5][share >= 0.05])) / 0.9
+    return 1.0 if ratio < 1.0 + 0.25 * np.sqrt(256.0 / marks[HEARD]) else ratio
 
 
 def flags(count: Integers, stuck: int, at_limit: int, spikes: int, out: NDArray[np.bool_]) -> bool:
@@ -302,7 +331,14 @@ def flags(count: Integers, stuck: int, at_limit: int, spikes: int, out: NDArray[
 
 
 def look(
-    f: Array, last: Array, before: Array, known: int, noise: Array, limit: Array, count: Integers
+    f: Array,
+    last: Array,
+    before: Array,
+    known: int,
+    noise: Array,
+    limit: Array,
+    count: Integers,
+    usual_of: Array,
 ) -> Array:
     """Take sample f (N,), m/s^2, after `last` and `before` (known: how many of the two are there).
     Counts per axis:
@@ -310,7 +346,8 @@ def look(
     SAME samples in a row that equal their neighbour exactly, AT_LIMIT in a row at the end of the
     range, samples since that and since a spike, and SPIKES close to one another. Returns `last`
     with spikes replaced by the middle of their neighbours. A knock moves all axes: a spike must
-    stand out six times from the median axis.
+    stand out six times from the median axis; vibration is usual: six times from what the axis
+    always does (usual_of, changed in place); and more than two at once are a motion.
     """
     n = len(f)
     clean = last.copy()
@@ -328,11 +365,15 @@ def look(
     if known < 2:
         return clean
     off = np.abs(last - 0.5 * (f + before))
-    usual = np.median(off)
-    for i in range(n):
-        limit_off = max(SPIKE_SIGMAS * noise[i], 6.0 * usual)
-        if off[i] > limit_off and abs(f[i] - before[i]) < 0.6 * off[i]:
-            count[SPIKES, i] += 1
-            count[SPIKE_AGE, i] = 0
-            clean[i] = 0.5 * (f[i] + before[i])
+    usual, floor = np.median(off), SPIKE_SIGMAS * noise
+    spike = (off > np.maximum(np.maximum(floor, 6.0 * usual_of), 6.0 * usual)) & (
+        np.abs(f - before) < 0.6 * off
+    )
+    usual_of += (np.minimum(off, np.maximum(3.0 * usual_of, floor)) - usual_of) / 32.0
+    if spike.sum() > 2:
+        return clean
+    for i in np.nonzero(spike)[0]:
+        count[SPIKES, i] += 1
+        count[SPIKE_AGE, i] = 0
+        clean[i] = 0.5 * (f[i] + before[i])
     return clean

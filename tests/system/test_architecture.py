@@ -31,7 +31,6 @@ LONG = {
     "inertial/attitude/wiring.py",
     "inertial/navigation/navigation.py",
     "inertial/rate/estimators.py",
-    "inertial/rate/health.py",
     "inertial/rate/products_kernel.py",
     "inertial/rate/products_run.py",
     "inertial/rate/still.py",

@@ -23,8 +23,8 @@ using FlagsOut = nb::ndarray<bool, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 // J (N, 6), Q (N, 6), bias, reference, white variance, offset variance (N)
 using ConstantsIn = std::tuple<MatrixIn, MatrixIn, VectorIn, VectorIn, VectorIn, VectorIn>;
-// sigma_alpha, rad/s^2 per root s; sigma_force, m/s^2 per root s; scale, of 1
-using TuningIn = std::tuple<double, double, double>;
+// sigma_alpha, rad/s^2 per root s; sigma_force, m/s^2 per root s; scale and cross, of 1
+using TuningIn = std::tuple<double, double, double, double>;
 // kind, i, j, since
 using HypothesisIn = std::tuple<int, int, int, int>;
 
@@ -60,7 +60,7 @@ Constants constants_of(const ConstantsIn& in) {
           of_axes(offset, n, "offset")};
 }
 
-Tuning tuning_of(const TuningIn& in) { return {std::get<0>(in), std::get<1>(in), std::get<2>(in)}; }
+Tuning tuning_of(const TuningIn& in) { return {std::get<0>(in), std::get<1>(in), std::get<2>(in), std::get<3>(in)}; }
 
 Belief belief_of(const VectorIn& x, const MatrixIn& covariance) {
   want(x.size() == STATES, "x", "(10,)");
@@ -81,7 +81,7 @@ BeliefOut told(const Belief& belief) { return {to_numpy_vector(belief.x), to_num
 
 BeliefOut predicted(const VectorIn& x, const MatrixIn& covariance, double dt, double sigma_alpha, double sigma_force) {
   Belief belief = belief_of(x, covariance);
-  predict(belief, dt, {sigma_alpha, sigma_force, 0.0});
+  predict(belief, dt, {sigma_alpha, sigma_force, 0.0, 0.0});
   return told(belief);
 }
 
@@ -147,16 +147,28 @@ samples::Counts counts_of(const CountsInOut& a, std::size_t n) {
 }
 
 std::int64_t gathered(const MatrixIn& f, std::int64_t begin, int per_block, const NumbersInOut& near,
-                      const MarksInOut& marks, const VectorIn& noise, const VectorIn& limit, const CountsInOut& count) {
+                      const MarksInOut& marks, const VectorIn& noise, const VectorIn& limit, const MatrixIn& parity,
+                      const CountsInOut& count) {
   const std::size_t n = f.shape(1);
   want(n >= 1 && n <= MOST_AXES && begin >= 0, "f", "(n, N), N from 1 to 32");
-  want(has_shape(near, samples::KEPT, n), "near", "(3, N)");
-  want(marks.size() == samples::MARKS, "marks", "(2,)");
+  want(has_shape(near, samples::KEPT, n), "near", "(6, N)");
+  want(marks.size() == samples::MARKS, "marks", "(3,)");
   want(noise.size() == n && limit.size() == n, "noise and limit", "(N,)");
-  return samples::gather({f.data(), static_cast<Eigen::Index>(f.shape(0)), static_cast<Eigen::Index>(n)}, begin,
-                         per_block, {near.data(), samples::KEPT, static_cast<Eigen::Index>(n)},
-                         samples::Marks(marks.data()), {noise.data(), static_cast<Eigen::Index>(n)},
-                         {limit.data(), static_cast<Eigen::Index>(n)}, counts_of(count, n));
+  want(has_shape(parity, n, n), "parity", "(N, N)");
+  const auto axes = static_cast<Eigen::Index>(n);
+  const samples::Known of{{noise.data(), axes}, {limit.data(), axes}, {parity.data(), axes, axes}};
+  return samples::gather({f.data(), static_cast<Eigen::Index>(f.shape(0)), axes}, begin, per_block,
+                         {near.data(), samples::KEPT, axes}, samples::Marks(marks.data()), of,
+                         counts_of(count, n));
+}
+
+double measured(const NumbersInOut& near, const MarksInOut& marks, const MatrixIn& parity) {
+  const std::size_t n = near.shape(1);
+  want(has_shape(near, samples::KEPT, n) && n <= MOST_AXES, "near", "(6, N)");
+  want(marks.size() == samples::MARKS && has_shape(parity, n, n), "marks and parity", "(3,) and (N, N)");
+  const auto axes = static_cast<Eigen::Index>(n);
+  return samples::measured_noise({near.data(), samples::KEPT, axes}, samples::Marks(marks.data()),
+                                 {parity.data(), axes, axes});
 }
 
 bool flagged(const CountsInOut& count, int stuck, int at_limit, int spikes, const FlagsOut& out) {
@@ -187,8 +199,11 @@ void bind_health(nb::module_& module) {
   m.def("offsets_at_rest", &offsets_of, nb::arg("theta_b"), nb::arg("mean"), nb::arg("used"),
         "Mean readings (N,) without the specific force that the used axes see");
   m.def("gather", &gathered, nb::arg("f"), nb::arg("begin"), nb::arg("per_block"), nb::arg("near").noconvert(),
-        nb::arg("marks").noconvert(), nb::arg("noise"), nb::arg("limit"), nb::arg("count").noconvert(),
+        nb::arg("marks").noconvert(), nb::arg("noise"), nb::arg("limit"), nb::arg("parity"),
+        nb::arg("count").noconvert(),
         "Takes samples until a block is full; the next one's row");
+  m.def("measured_noise", &measured, nb::arg("near").noconvert(), nb::arg("marks").noconvert(), nb::arg("parity"),
+        "Variance of the axes' noise over the configured one (H-11)");
   m.def("flags", &flagged, nb::arg("count").noconvert(), nb::arg("stuck"), nb::arg("at_limit"), nb::arg("spikes"),
         nb::arg("out").noconvert(), "Which axes are stuck, at the end of their range, spiking; true for any");
 }

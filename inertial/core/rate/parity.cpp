@@ -234,12 +234,14 @@ Fit correct(Belief& belief, const Axes& f, const Axes& R, const Mask& used, cons
   return fit;
 }
 
-// Variance of one block's readings (H-5): noise, offset not known, scale error times what has changed.
+// Variance of one block's readings (H-5): noise, offset not known, scale error times what has changed,
+// and what of other axes' changes comes in by its direction.
 Axes variances(const Axes& f, const Axes& reference, const Constants& c, const Tuning& tuning) {
   Axes R = c.white + c.offset;
+  const double others = square(tuning.cross) * square_of(f - reference) / static_cast<double>(f.size());
   for (Index i = 0; i < f.size(); ++i) {
     const double error = tuning.scale * (f(i) - reference(i));
-    R(i) += error * error;
+    R(i) += error * error + others;
   }
   return R;
 }

@@ -45,6 +45,7 @@ struct Tuning {
   double sigma_alpha;  // rad/s^2 per root s
   double sigma_force;  // m/s^2 per root s
   double scale;        // of 1
+  double cross;        // of 1, of the RMS axis
 };
 
 struct Observation {

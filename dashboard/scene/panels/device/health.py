@@ -39,9 +39,12 @@ class Health(Panel):
             self._table = self.html(note(text), self._table)
             return
         m = latest.message
-        used = sum(not axis.excluded for axis in m.axes)
+        bad_ones = [
+            f"{axis.name} {WORDS.get(axis.state, 'unknown')}" for axis in m.axes if not _good(axis)
+        ]
+        good = ", ".join([f"{len(m.axes) - len(bad_ones)} of {len(m.axes)} good", *bad_ones])
         ratio = number(m.chi2, 1) if m.dof else "–"
-        words = f"{m.layout}: {used} of {len(m.axes)} axes in use · χ² {ratio}, {m.dof} conditions"
+        words = f"{m.layout}: {good} · χ² {ratio}, {m.dof} conditions"
         body = (_row(axis, m.header.utc_ns) for axis in m.axes[:MOST])
         kind = "gf-rows gf-stale" if s.stale("axes") else "gf-rows"
         table = tag("table", _HEAD, *body, class_=kind)
@@ -49,6 +52,12 @@ class Health(Panel):
         bar = note("Bar: residual against the other axes over its σ, full at 8 σ; gate at 4 σ.")
         parts = [alert(m.message), tag("p", words, class_="gf-title"), table, more, bar]
         self._table = self.html(joined(parts), self._table)
+
+
+def _good(axis: pb.AxisHealth.Axis) -> bool:
+    """An axis that is only looked into is good."""
+    looked_into = axis.state == pb.AxisHealth.STATE_SUSPECT and not axis.excluded
+    return looked_into or axis.state == pb.AxisHealth.STATE_GOOD
 
 
 _HEAD = Markup(

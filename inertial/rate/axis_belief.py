@@ -1,0 +1,124 @@
+"""What the axis monitor believes of axes that are good: their noise, as it is measured, and how
+far their calibration may be off, widened where readings show that it is (H-5, H-11, H-12).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.core import native
+from inertial.layouts.layout import Layout
+from inertial.rate import parity
+from inertial.rate.health_config import Config
+
+Array = NDArray[np.float64]
+
+
+class Width(NamedTuple):
+    """How far the calibration of good axes may be off; the usual one adds nothing."""
+
+    offset: float = 1.0  # times what is expected
+    scale: float = 0.0  # of 1: scale errors and directions of all axes
+
+    def beyond(self, other: "Width") -> bool:
+        """Wider in one way, and in none narrower."""
+        return self != other and self.offset >= other.offset and self.scale >= other.scale
+
+    @property
+    def text(self) -> str:
+        """For people; empty for the usual width."""
+        found = []
+        if self.scale:
+            found.append(f"scales or directions off by about {100.0 * self.scale / 1.5:.0f} %")
+        if self.offset > 1.0:
+            found.append(f"offsets {self.offset:g} times the expected ones")
+        return "all axes fit one motion only with " + " and ".join(found) if found else ""
+
+
+FIRST_OFFSET = 2.5  # m/s^2, beyond which an axis at its first standstill is not believed
+USUAL = Width()
+WIDER = tuple(Width(o, s) for o in (1.0, 3.0) for s in (0.0, 0.03, 0.06, 0.12))[1:]
+
+
+class Belief:
+    """Variances of the axes of one layout, as the parity filter wants them."""
+
+    def __init__(self, layout: Layout, config: Config, per_block: int) -> None:
+        """per_block: samples whose mean is one block."""
+        self.config = config
+        self.noise = layout.noise
+        self.limits = np.array([sensor.limit for sensor in layout.sensors])
+        self.free = projection(layout.J)
+        self.width = USUAL
+        self._per_block = per_block
+        self._J, self._Q = np.ascontiguousarray(layout.J), np.ascontiguousarray(layout.Q)
+        errors = np.array([sensor.scale_error for sensor in layout.sensors])
+        self._scale = max(config.scale, config.scale_sigmas * float(errors.max()))
+        sigma = config.offset_sigmas * np.array([sensor.bias for sensor in layout.sensors])
+        n = layout.axes
+        self.ratio = 1.0  # of the measured variance of the noise to the configured
+        self.white = self.noise**2 / per_block
+        self.offset = sigma**2
+        self.bias, self.reference = np.zeros(n), np.zeros(n)
+        self.learned = np.zeros(n, dtype=bool)
+
+    def hear(self, ratio: float) -> None:
+        """The measured variance of the noise, over the configured one."""
+        if ratio != self.ratio:
+            self.ratio, self.white = ratio, self.noise**2 * (ratio / self._per_block)
+
+    def constants(self, width: Width | None = None) -> parity.Constants:
+        """What is known of the axes, at this width or the present one."""
+        offset = self.offset * (width or self.width).offset ** 2
+        return parity.Constants(self._J, self._Q, self.bias, self.reference, self.white, offset)
+
+    def tuning(self, width: Width | None = None) -> parity.Tuning:
+        """How freely the body moves and how far scales may be off."""
+        c, scale = self.config, (width or self.width).scale
+        return parity.Tuning(c.sigma_alpha, c.sigma_force, max(self._scale, scale), scale)
+
+    def credible(self, off: Array, used: NDArray[np.bool_]) -> bool:
+        """May good axes have these offsets (N,) at a standstill? More is believed of axes that
+        were never seen at rest.
+        """
+        allowed = self.constants().offset + self.white + (self.tuning().scale * 9.8) ** 2 * 0.1
+        most = 20.0 * allowed
+        if not self.learned.any():
+            most = np.maximum(most, np.minimum(9.0 * most, FIRST_OFFSET**2))
+        return not np.any((off - self.bias)[used] ** 2 > most[used])
+
+    def steady(self, window: Array, used: NDArray[np.bool_]) -> bool:
+        """Does nothing but noise change over blocks (n, N)? Vibration shakes all axes alike and is
+        taken for noise; the mean may not wander beyond it.
+        """
+        if len(window) < 4:
+            return True
+        mean = window.mean(axis=0)
+        apart = window - mean
+        alone = native.product(np.ascontiguousarray(apart), self.free)[:, used]
+        if np.mean(alone**2 / self.white[used]) > 1.5 * np.mean(np.diag(self.free)[used]):
+            return False
+        half = len(window) // 2
+        trend = np.abs(window[:half].mean(axis=0) - window[half:].mean(axis=0))[used]
+        noise = np.maximum(self.white, np.mean(np.diff(window, axis=0) ** 2, axis=0) / 2.0)
+        return not np.any(trend > 6.0 * np.sqrt(4.0 * noise[used] / len(window)))
+
+    def learn(self, off: Array, mean: Array, used: NDArray[np.bool_]) -> bool:
+        """Offsets `off` (N,) of the used axes at a standstill of these mean readings; False where
+        they are beyond belief.
+        """
+        if not self.credible(off, used):
+            return False
+        self.bias = np.where(used, off, self.bias)
+        self.reference = np.where(used, mean, self.reference)
+        self.offset = np.where(used, self.config.offset_left**2, self.offset)
+        self.learned = self.learned | used
+        return True
+
+
+def projection(J: Array) -> Array:
+    """(N, N) onto readings that no angular acceleration and specific force make; J (N, 6)."""
+    left, sigma, _ = native.svd(np.ascontiguousarray(J / np.linalg.norm(J, axis=0).clip(1e-12)))
+    seen = np.ascontiguousarray(left[:, sigma > 1e-6 * sigma.max(initial=1e-12)])
+    return np.eye(len(J)) - native.product(seen, np.ascontiguousarray(seen.T))
