@@ -22,6 +22,7 @@ import gyrofree.commands
 from gyrofree.commands.main import app
 
 ROUNDS = int(os.environ.get("GYROFREE_FUZZ_ROUNDS", "5"))  # of each command and file
+SEED = os.environ.get("GYROFREE_FUZZ_SEED", "3")
 LONGEST_S = 30  # of one call, of the processor: a command that works for ever is a fault
 WAITS_S = 300  # of the clock: so is one that waits for ever
 OUTPUTS = {"out", "plot", "folder", "layout_out", "link", "csv", "port_link"}
@@ -146,7 +147,7 @@ def judged(line, code, said, fault):
 @pytest.mark.parametrize(("name", "parameter"), list(pairs()))
 def test_a_broken_file_is_answered(name, parameter, seeds, tmp_path, no_services, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    rng = random.Random(f"{name} {parameter} 3")
+    rng = random.Random(f"{name} {parameter} {SEED}")
     rounds = 2 if name in LONG else ROUNDS
     for k in range(rounds):
         place = tmp_path / str(k)
@@ -166,7 +167,7 @@ STATE = ("session.json", "recording.mcap", "curves.npz", "annotations.json", "us
 def test_what_is_kept_may_be_broken_too(name, seeds, tmp_path, no_services, monkeypatch):
     """Sessions and users as a crash, a bad disk or an editor left them."""
     monkeypatch.chdir(tmp_path)
-    rng = random.Random(f"{name} 5")
+    rng = random.Random(f"{name} {int(SEED) + 2}")
     session = "20240101-000000-table"
     for k in range(2 if name in LONG else ROUNDS):
         root = tmp_path / str(k)
