@@ -152,7 +152,7 @@ def test_a_drive_becomes_solutions_and_innovations() -> None:
     assert all(len(m.name) == len(m.value) == len(m.sigma) == 6 for m in used)
     assert used[-1].header.device_us % 1_000_000 == 30_000  # the fix's own time
     state = [o.message.state for o in outputs if o.topic is ESTIMATOR]
-    assert state[0].startswith("levelling") and state[-1] == "navigating"
+    assert state[0] == "stand still for 10 s" and state[-1] == "navigating"
 
 
 def test_gaps_are_counted_and_reboots_start_anew(caplog: pytest.LogCaptureFixture) -> None:

@@ -229,7 +229,7 @@ class Devices(Panel):
         states = [
             s.device.get("estimator", n).message.state for n in s.device.estimators("estimator")
         ]
-        return joined(note(text) for text in dict.fromkeys(states) if ":" in text)
+        return joined(note(text) for text in dict.fromkeys(states) if ":" in text or "stand still" in text)
 
     @staticmethod
     def _logs(s: Snapshot) -> Markup:
