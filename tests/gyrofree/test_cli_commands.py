@@ -102,10 +102,12 @@ def test_what_is_wrong_is_said_in_few_words(line, tmp_path, monkeypatch):
     assert result.stdout == ""
 
 
-def test_comparing_takes_an_offset_with_its_session():
+def test_comparing_takes_an_offset_with_its_session(tmp_path):
     result = gyrofree("sessions", "compare", "a.mcap", "b.mcap", "--offset", "3")
     assert result.exit_code != 0 and "a.mcap" in result.stderr
-    listed = gyrofree("sessions", "retain", "--json", "--config", "/dev/null")
+    empty = tmp_path / "empty.toml"
+    empty.write_text("")
+    listed = gyrofree("sessions", "retain", "--json", "--config", str(empty))
     assert listed.exit_code == 0 and isinstance(json.loads(listed.stdout), list)
 
 

@@ -229,7 +229,8 @@ class Devices(Panel):
         states = [
             s.device.get("estimator", n).message.state for n in s.device.estimators("estimator")
         ]
-        return joined(note(text) for text in dict.fromkeys(states) if ":" in text or "stand still" in text)
+        asking = (s for s in dict.fromkeys(states) if ":" in s or "stand still" in s)
+        return joined(note(text) for text in asking)
 
     @staticmethod
     def _logs(s: Snapshot) -> Markup:
