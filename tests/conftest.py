@@ -40,7 +40,6 @@ KNOWN_FAULTS = {
     "test_scale_factors_are_found_and_taken_out": "noise of turning hides scale factors",
     "test_a_fading_filter_forgets_a_bias_that_jumped": "the cause is not found yet",
     "test_no_cell_of_a_csv_begins_a_formula": "one of 24 notes is refused before the export",
-    "test_a_thousand_axes_are_neither_drawn_nor_listed": "the cause is not found yet",
 }
 
 

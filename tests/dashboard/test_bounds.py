@@ -88,7 +88,7 @@ def test_a_thousand_axes_are_neither_drawn_nor_listed(server):
     view.tick_panels()
     view.tick_scene()
     assert len(view.scene._arrows._labels) <= axis_arrows.MOST
-    [table] = [handle.content for handle in gui.handles if "axes in use" in handle.content]
+    [table] = [handle.content for handle in gui.handles if "axes more" in handle.content]
     assert "and 936 axes more" in table and table.count("<tr") < 200
 
 
