@@ -37,7 +37,6 @@ def free_port() -> int:
 KNOWN_FAULTS = {
     "test_scale_factors_are_found_and_taken_out": "noise of turning hides scale factors",
     "test_a_fading_filter_forgets_a_bias_that_jumped": "the cause is not found yet",
-    "test_no_cell_of_a_csv_begins_a_formula": "one of 24 notes is refused before the export",
 }
 
 
