@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from gateway.samples.analogue import AnalogueSettings
-from messages.contract.topics import NAME
+from messages.contract.names import Name
 
 
 class DeviceSettings(BaseModel):
@@ -13,7 +13,7 @@ class DeviceSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    name: str  # second part of every key of this board
+    name: Name  # second part of every key of this board
     # /dev/serial/by-id/..., a pty's path, tcp://host:port, rfc2217://host:port, file:///path
     port: str
     baud: int = Field(
@@ -34,15 +34,6 @@ class DeviceSettings(BaseModel):
     time_scale: float = Field(
         default=1.0, gt=0.0, le=1000.0
     )  # device s per host s; N for a log played at N x
-
-    @field_validator("name")
-    @classmethod
-    def _name_can_stand_in_a_key(cls, value: str) -> str:
-        if not NAME.fullmatch(value):
-            raise ValueError(
-                f"{value!r}: want a-z, 0-9, _ and - after a first letter, at most 32 characters"
-            )
-        return value
 
 
 class GatewaySettings(BaseModel):

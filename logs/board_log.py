@@ -25,7 +25,7 @@ from inertial.layouts.catalogue import CUBE
 from inertial.navigation.fix import Fix
 from inertial.plausible import doubt_of_gravity, doubt_of_rate
 from inertial.timing import Timing
-from logs.cube_log import LSB_MG, read_log
+from logs.cube_log import LSB_MG, centre_force, read_log
 from logs.drive_log import IMU, read_fixes
 from logs.quantities import read_si, refuse, said_of, timing_of
 from logs.sheet import LogError, Sheet, open_sheet
@@ -130,7 +130,7 @@ def _cube(path: Path, as_named: bool, lsb_mg: float) -> BoardLog:
             f"{path}: column '{CUBE_AXES[column]}_counts' at {log.t_s[row]:.3f} s:"
             f" {counts[row, column]}; want a whole number of 16 bits"
         )
-    doubt = doubt_of_gravity(centre_force(log.f_axis), lsb_mg)
+    doubt = doubt_of_gravity(centre_force(log.f_axis, CUBE(HALF_SIDE)), lsb_mg)
     notes = refuse(path, [doubt], as_named) + said_of(path, log.timing, log.cut_off)
     return BoardLog(
         path,
@@ -145,9 +145,3 @@ def _cube(path: Path, as_named: bool, lsb_mg: float) -> BoardLog:
         log.timing,
         tuple(notes),
     )
-
-
-def centre_force(f_axis: Array) -> Array:
-    """Specific force (n, 3) of a cube's centre, m/s^2, from its twelve axes (n, 12) (E-5)."""
-    layout = CUBE(HALF_SIDE)
-    return f_axis @ layout.theta_b / (len(layout.theta_b) / 3.0)

@@ -24,7 +24,7 @@ from inertial.rate.names import LEADER
 from inertial.rate.sight import BLIND
 from inertial.rate.tachometer import SUFFIX
 from logs.cube_axes import agreement, axes_of, moving
-from logs.cube_log import CubeLog, read_log
+from logs.cube_log import CubeLog, centre_force, read_log
 from logs.cube_parts import Monitored, Part, cut, monitored
 from logs.cube_run import EstimatorRun, reference
 from logs.cube_score import bound_of, notes_of, score
@@ -78,7 +78,7 @@ def run_cube(
     data = read_log(log, shape.axis_names, lsb_mg)
     used = read_card(card) if card is not None else None
     doubtful = refuse(
-        log, [doubt_of_gravity(_centre_force(data, shape), _lsb(data))], units_as_named
+        log, [doubt_of_gravity(centre_force(data.f_axis, shape), _lsb(data))], units_as_named
     )
     if tacho_aid and data.tacho is None:
         raise LogError(f"--tacho-aid: {log} has no column tacho_rad_s")
@@ -134,18 +134,12 @@ def run_cube(
         ],
     }
     if plot is not None:
-        from logs.cube_plot import draw  # here: matplotlib only where something is drawn
+        from logs.figures.cube import draw  # here: matplotlib only where something is drawn
 
         progress(0.95, "drawing")
         draw(plot, data, tracks, truth, result)
     progress(1.0, "done")
     return result
-
-
-def _centre_force(data: CubeLog, shape: Layout) -> Array:
-    """Specific force (n, 3) of the centre, m/s^2, by least squares where nothing turns (E-5)."""
-    J = np.column_stack([np.cross(shape.r_b, shape.theta_b), shape.theta_b])
-    return (data.f_axis * np.array(shape.gain)) @ np.linalg.pinv(J).T[:, 3:]
 
 
 def _lsb(data: CubeLog) -> float | None:

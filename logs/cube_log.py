@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.constants import GRAVITY
+from inertial.layouts.layout import Layout
 from inertial.timing import Timing
 from logs.quantities import UNITS, column_of, in_range, timing_of
 from logs.sheet import LogError, Sheet, Table, open_sheet
@@ -122,6 +123,14 @@ def read_log(path: Path, names: Sequence[str], lsb_mg: float | None = None) -> C
         q_nb=_attitude(path, table, _columns(table, TRUE_ATTITUDE)),
         cut_off=table.cut_off,
     )
+
+
+def centre_force(f_axis: Array, shape: Layout) -> Array:
+    """Specific force (n, 3) of the centre, m/s^2, of axes (n, m): least squares where nothing
+    turns (E-5).
+    """
+    J = np.column_stack([np.cross(shape.r_b, shape.theta_b), shape.theta_b])
+    return (f_axis * np.array(shape.gain)) @ np.linalg.pinv(J).T[:, 3:]
 
 
 def _digest(path: Path) -> str:

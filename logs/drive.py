@@ -101,7 +101,7 @@ def run_drive(
     missing = [name for name in names if results[name] is None]
     scores |= {name: dict.fromkeys(_EMPTY) | {"outage_end_m": []} for name in missing}
     if plot is not None:
-        from logs.drive_plot import draw  # matplotlib is slow to load
+        from logs.figures.drive import draw  # matplotlib is slow to load
 
         tell(0.97, "drawing")
         draw(plot, log, {name: r for name, r in results.items() if r is not None}, scores)

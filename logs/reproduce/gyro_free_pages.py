@@ -12,7 +12,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from inertial.constants import MILLI_G
-from logs.cube_plot import COLOURS, REFERENCE, STYLE
+from logs.figures.colours import COLOURS
+from logs.figures.cube import REFERENCE, STYLE
 from logs.reproduce import gyro_free_study as study
 from logs.reproduce.gyro_free_study import Study
 from messages.text import html

@@ -15,11 +15,12 @@ from typing import TypeVar
 
 import zenoh
 from google.protobuf.message import Message
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field
 
 from messages.bus.fencing import packed
 from messages.contract.door import read
-from messages.contract.topics import NAME, REPLAY_SUFFIX, Topic
+from messages.contract.names import Name
+from messages.contract.topics import REPLAY_SUFFIX, Topic
 from messages.history.spool import Spool
 
 CLOSING_S = 5.0
@@ -34,7 +35,7 @@ class BusSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    prefix: str = (
+    prefix: Name = (
         "gyrofree"  # first part of every key; two installations on one router differ in it
     )
     router: str = "tcp/127.0.0.1:7447"  # endpoint of the router that clients connect to
@@ -45,15 +46,6 @@ class BusSettings(BaseModel):
     # a machine busy with drawing in software it also cut off live ones, and lost 3 % of all
     # messages.
     lease_ms: int = Field(default=10_000, ge=200, le=60_000)
-
-    @field_validator("prefix")
-    @classmethod
-    def _prefix_is_a_name(cls, value: str) -> str:
-        if not NAME.fullmatch(value):
-            raise ValueError(
-                f"{value!r}: want a-z, 0-9, _ and - after a first letter, at most 32 characters"
-            )
-        return value
 
 
 def _config(settings: BusSettings, mode: str) -> zenoh.Config:

@@ -9,9 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from logs.figures.colours import COLOURS
 from sessions.library.compare import Comparison, Overlaid, moved
 from sessions.library.curves import TACHO, Line
-from sessions.report.figures import COLOURS, STYLE
+from sessions.report.figures import STYLE
 
 POINTS = 4000  # per line
 DASHES = (

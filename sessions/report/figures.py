@@ -10,18 +10,11 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from logs.figures.colours import COLOURS
 from sessions.report.analysis import Analysis
 from sessions.report.data import Run
 from sessions.report.segments import grid, reference
 
-COLOURS = (
-    "#0072B2",
-    "#D55E00",
-    "#009E73",
-    "#CC79A7",
-    "#E69F00",
-    "#56B4E9",
-)  # Okabe and Ito: for all eyes
 REFERENCE = "#000000"
 STYLE = {
     "font.family": "DejaVu Sans",

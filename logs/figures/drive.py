@@ -13,21 +13,12 @@ from inertial.navigation.filters import DEFAULT
 from inertial.navigation.results import place_of
 from logs.drive_log import DriveLog
 from logs.drive_result import Result
+from logs.figures.colours import COLOURS
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt  # noqa: E402
 
-COLOURS = (
-    "#0072B2",
-    "#D55E00",
-    "#009E73",
-    "#CC79A7",
-    "#E69F00",
-    "#56B4E9",
-    "#8C8C8C",
-    "#000000",
-    "#F0E442",
-)
+NINE = (*COLOURS, "#8C8C8C", "#000000", "#F0E442")  # one for each filter
 
 
 def draw(
@@ -98,7 +89,7 @@ def _outages(ax: Any, scores: dict[str, dict[str, Any]]) -> None:
             values,
             width,
             label=name,
-            color=COLOURS[i % len(COLOURS)],
+            color=NINE[i % len(NINE)],
         )
     ax.set(
         yscale="log",

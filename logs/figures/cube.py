@@ -16,17 +16,10 @@ from matplotlib.axes import Axes
 
 from logs.cube_log import CubeLog
 from logs.cube_run import EstimatorRun, Reference
+from logs.figures.colours import COLOURS
 from messages.text import drawn
 
 DEG = 180.0 / np.pi
-COLOURS = (
-    "#0072B2",
-    "#D55E00",
-    "#009E73",
-    "#CC79A7",
-    "#E69F00",
-    "#56B4E9",
-)  # Okabe and Ito: told apart by everybody
 REFERENCE = "#222222"
 STYLE = {
     "font.size": 9,
