@@ -19,7 +19,8 @@ void follow(double& noise, double nis_per_row, double adapt) {
 // Where white innovations average out and a wrong filter's do not (E-141). `y` over sigma.
 void doubt(Receiver& receiver, const Vector3& y, int said) {
   constexpr double SHARE = 0.2, OF_WHITE = SHARE / (2.0 - SHARE), MOST = 25.0;
-  receiver.lasting += SHARE * (y - receiver.lasting);
+  constexpr double GROSS = 3.0;  // sigmas of one that count: an outlier does not last
+  receiver.lasting += SHARE * (y.cwiseMin(GROSS).cwiseMax(-GROSS) - receiver.lasting);
   const double now = std::min(square_of(receiver.lasting) / (said * OF_WHITE), MOST);
   receiver.disagreement += SHARE * (now - receiver.disagreement);
 }
@@ -40,7 +41,9 @@ void learn(Receiver& receiver, const Measurement& z, const RowMatrix& S, double 
     if (said == 0 || group == HEADING) continue;
     const Vector3 y = z.y.segment<3>(first);
     Vector3& last = group == POSITION ? receiver.last_position : receiver.last_velocity;
-    const double nis = 0.5 * whiten(S.block(first, first, size, size), y - last).nis;
+    const RowMatrix block = S.block(first, first, size, size);
+    double nis = 0.5 * whiten(block, y - last).nis;
+    if (nis > MOST_NEWS * said) nis = std::min(nis, whiten(block, y).nis);  // a gross one counts once
     if (nis >= 0.0) follow(group == POSITION ? receiver.position : receiver.velocity, nis / said, adapt);
     last = y;
     if (group != VELOCITY) continue;
