@@ -26,42 +26,44 @@ demo: setup $(if $(filter emulated,$(BOARD)),.make/board firmware)
 
 # Packages come while the core compiles; neither needs the other.
 setup: .make/tools
-	@$(MAKE) --no-print-directory --output-sync -j2 .make/runtime .make/core
+	@$(MAKE) --no-print-directory --silent --output-sync=line -j2 .make/runtime .make/core
 
 .make/venv:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed; this is $$($(PYTHON) --version). Name another: make PYTHON=python3.12"; exit 1; }
 	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || if [ "$$(id -u)" = 0 ]; then apt-get update -q && apt-get install -y -q python3-venv; else echo "This Python cannot make environments; run: sudo apt-get install python3-venv"; exit 1; fi
-	$(PYTHON) -m venv .venv
+	@echo "Making the environment .venv ..."
+	@$(PYTHON) -m venv .venv
 	@mkdir -p .make && touch $@
 
 .make/tools: requirements/build.txt requirements/compiler.txt requirements/native.sh | .make/venv
-	$(INSTALL) -r requirements/build.txt
+	@echo "Installing what the core is built with ..."
+	@$(INSTALL) -r requirements/build.txt
 	@sh requirements/native.sh
 	@touch $@
 
 .make/runtime: requirements/runtime.txt .make/tools
 	@echo "Installing packages, each checked against its hash ..."
-	$(INSTALL) -r requirements/runtime.txt
+	@$(INSTALL) -r requirements/runtime.txt
 	@touch $@
 
 # The package itself, editable, with the build of its core that this machine runs.
 CORE := $(wildcard inertial/core/*.c* inertial/core/CMakeLists.txt inertial/core/*/*.?pp)
 .make/core: pyproject.toml $(CORE) .make/tools
 	@echo "Compiling the core ..."
-	CXX="$$(cat .make/compiler)" $(PIP) install --quiet --no-deps --no-build-isolation \
+	@CXX="$$(cat .make/compiler)" $(PIP) install --quiet --no-deps --no-build-isolation \
 		--config-settings=cmake.define.Python_INCLUDE_DIR="$$(cat .make/headers)" --config-settings=cmake.define.BUILDS=here --editable .
 	@touch $@
 
 # Both builds of the core: what the tests compare.
 .make/both-cores: .make/core
 	@echo "Compiling the core a second time, for any processor ..."
-	CXX="$$(cat .make/compiler)" $(PIP) install --quiet --no-deps --no-build-isolation \
+	@CXX="$$(cat .make/compiler)" $(PIP) install --quiet --no-deps --no-build-isolation \
 		--config-settings=cmake.define.Python_INCLUDE_DIR="$$(cat .make/headers)" --config-settings=cmake.define.BUILDS=both --editable .
 	@touch $@
 
 # A wheel in dist/ that needs no compiler where it is installed.
 wheel: .make/tools
-	CXX="$$(cat .make/compiler)" $(PIP) wheel --quiet --no-deps --no-build-isolation \
+	@CXX="$$(cat .make/compiler)" $(PIP) wheel --quiet --no-deps --no-build-isolation \
 		--config-settings=cmake.define.Python_INCLUDE_DIR="$$(cat .make/headers)" --config-settings=cmake.define.BUILDS=both --wheel-dir dist .
 	@ls dist/*.whl
 

@@ -6,6 +6,7 @@ One helper for each medium:
     plain(text)   for terminals, logs and pictures: nothing that acts, nothing that is invisible
     html(text)    inside HTML and SVG, between tags and in quoted attributes; templates do it
     drawn(text)   on figures
+    reason(error) of an exception, for any of these
     cell(value)   of a table that a spreadsheet may open
 
 What acts or hides: control characters (a terminal obeys them), the bidirectional controls of
@@ -83,6 +84,16 @@ def printed(text: object) -> str:
     """Several lines for a terminal, uncut: line breaks and tabs stay, all else as `plain`."""
     whole = str(text).split("\n")
     return "\n".join("\t".join(plain(part, 1 << 20) for part in line.split("\t")) for line in whole)
+
+
+def reason(error: object) -> str:
+    """What an error says to people: of a file that cannot be had, its name and why, without the
+    number that the system has for it.
+    """
+    if isinstance(error, OSError) and error.strerror:
+        where = "" if error.filename is None else f"{error.filename}: "
+        return f"{where}{error.strerror[:1].lower()}{error.strerror[1:]}"
+    return str(error)
 
 
 def html(text: object, longest: int = LONGEST) -> Markup:

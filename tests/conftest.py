@@ -35,11 +35,8 @@ def free_port() -> int:
 
 # Faults that are known and not mended: each test stands as it should hold; here is why it fails.
 KNOWN_FAULTS = {
-    "test_swapped_axes_are_named_and_left_out": "the rate is spoilt after axes are left out",
-    "d1-axes-swapped": "the rate is spoilt after axes are left out",
     "test_scale_factors_are_found_and_taken_out": "noise of turning hides scale factors",
     "test_a_fading_filter_forgets_a_bias_that_jumped": "the cause is not found yet",
-    "test_no_cell_of_a_csv_begins_a_formula": "one of 24 notes is refused before the export",
 }
 
 

@@ -33,6 +33,11 @@ BEHIND_STALE_S = 2.0
 ESTIMATED = ("rate", "nav", "attitude")
 
 
+def _rank(estimator: str) -> tuple[bool, str]:
+    """Order of estimators; the leading ones first."""
+    return estimator not in LEADERS, estimator
+
+
 @dataclass
 class Latest:
     """The newest message of one topic (and estimator) and when it came."""
@@ -105,7 +110,13 @@ class Device:
     def estimators(self, topic: str) -> list[str]:
         """Names of the estimators heard on a topic; the leading one first."""
         names = [estimator for name, estimator in self.latest if name == topic]
-        return sorted(names, key=lambda name: (name not in LEADERS, name))
+        return sorted(names, key=_rank)
+
+    def leads(self, topic: str, estimator: str) -> bool:
+        """Does none of those heard come before it? What is filled in from before may be the first
+        that is heard.
+        """
+        return all(_rank(estimator) <= _rank(name) for name in self.estimators(topic))
 
     def get(self, topic: str, estimator: str = "") -> Latest | None:
         """Newest message of a topic."""

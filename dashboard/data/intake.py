@@ -172,7 +172,7 @@ def _innovation(device: Device, estimator: str, t: float, m: pb.Innovation) -> N
     )
     # A fix withheld on purpose is not accepted either, but it comes with its error.
     withheld = bool(m.error_to_reference)
-    if not m.accepted and not withheld and estimator == device.estimators("innovation")[0]:
+    if not m.accepted and not withheld and device.leads("innovation", estimator):
         p_n = device.fixes.get(m.for_sequence)
         if p_n is not None:
             device.tracks.setdefault("rejected", Track(spacing=FIX_SPACING_M)).add(p_n)

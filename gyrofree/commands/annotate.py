@@ -15,6 +15,7 @@ from gyrofree.commands.options import (
     settings_of,
 )
 from gyrofree.running.process import EXIT_CONFIG, fail
+from messages.text import reason
 from sessions.library.annotations import SessionNote, add_note, change_annotations
 from sessions.recording.manifest import check_id
 
@@ -36,7 +37,7 @@ def note(
             folder, SessionNote(text=text, author=author, at_s=at, written_utc_ns=time.time_ns())
         ).notes
     except (ValueError, OSError) as error:
-        raise fail(str(error)) from None
+        raise fail(error) from None
     if as_json:
         say(json.dumps([one.model_dump(mode="json") for one in notes], indent=2))
     else:
@@ -67,11 +68,12 @@ def tag(
         folder = catalogue_of(settings_of(config)).root / check_id(session)
         changed = change_annotations(folder, change)
     except (ValueError, OSError) as error:
-        raise fail(str(error).splitlines()[0], EXIT_CONFIG) from None
+        raise fail(reason(error).splitlines()[0], EXIT_CONFIG) from None
     if as_json:
         say(json.dumps(changed.model_dump(mode="json"), indent=2))
         return
+    outcome = f"; {changed.outcome}" if changed.outcome else ""
     say(
-        f"{session}: {changed.title or 'no title'}; tags {', '.join(changed.tags) or 'none'};"
-        f" {changed.outcome}"
+        f"{session}: {changed.title or 'no title'};"
+        f" tags {', '.join(changed.tags) or 'none'}{outcome}"
     )

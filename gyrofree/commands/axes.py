@@ -63,7 +63,7 @@ def axes(
         if out is not None:
             write_map(named, out)
     except (LogError, OSError) as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     if as_json:
         say(json.dumps(_result(named, found, out), indent=2))
         return

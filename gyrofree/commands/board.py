@@ -82,7 +82,7 @@ def board(
         try:
             emulated.run(options, settings.bus, stop)
         except (EmulatorMissing, EmulationError) as error:
-            raise fail(str(error)) from None
+            raise fail(error) from None
 
     run_service(body, verbose)
 
@@ -106,7 +106,7 @@ def _options(image, link, tcp, profile, seed, speed, clock_ppm, faults, device):
     try:
         parsed = [parse_fault(text) for text in faults]
     except FaultError as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     return Options(path, link, tcp, profile, seed, speed, clock_ppm, parsed, device)
 
 
@@ -120,7 +120,7 @@ def check() -> None:
     try:
         Engine()
     except EmulatorMissing as error:
-        raise fail(str(error)) from None
+        raise fail(error) from None
 
 
 def _say_load(image: Path, as_json: bool) -> None:
@@ -132,7 +132,7 @@ def _say_load(image: Path, as_json: bool) -> None:
     try:
         found = asdict(load(image))
     except (EmulatorMissing, EmulationError) as error:
-        raise fail(str(error)) from None
+        raise fail(error) from None
     if as_json:
         say(json.dumps(found))
         return

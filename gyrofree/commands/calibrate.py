@@ -59,7 +59,7 @@ def plan(
         up = p.plan(poses)
         fit = p.predicted(shape, up, max(1, round(seconds * rate)), float(np.max(shape.noise)))
     except (ValueError, OSError) as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     promised = {
         "bias_sigma_mps2": float(fit.bias_sigma.max()),
         "scale_sigma": float(fit.scale_sigma.max()),
@@ -115,7 +115,7 @@ def fit(
             )
         write_card(made.card, out)
     except (ValueError, OSError) as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     said = advice(made)
     if as_json:
         say(json.dumps({**as_dict(made.card), "card": str(out), "advice": said}, indent=2))
@@ -136,7 +136,7 @@ def show(
     try:
         found = read_card(card)
     except (ValueError, OSError) as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     if as_json:
         say(json.dumps(as_dict(found), indent=2))
     else:
@@ -206,7 +206,7 @@ def apply_card(
         if layout_out is not None:
             layout_out.write_text(as_toml(calibrated), encoding="utf-8")
     except (ValueError, OSError) as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     result = {
         "card": found.id,
         "out": str(out),
@@ -261,6 +261,6 @@ def simulate(
         with progress_bar() as progress:
             files = write(out, _layout(layout, half_side), seed, poses, progress)
     except (ValueError, OSError) as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     for path in files:
         say(path)

@@ -91,7 +91,7 @@ def compare(
 
             draw(result, plot)
     except (ValueError, OSError) as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     if as_json:
         say(json.dumps(as_dict(result), indent=2))
     else:

@@ -85,7 +85,7 @@ def _check_log(path: Path, gnss: Path | None = None, as_named: bool = False) -> 
     try:
         return kind_of(path, gnss, as_named)
     except (LogError, OSError) as error:
-        raise fail(str(error), CONFIG) from None
+        raise fail(error, CONFIG) from None
 
 
 def play(

@@ -61,9 +61,9 @@ def export(
         with progress_bar() as progress:
             files = write(path, form, out, Selection(wanted, start, end), progress)
     except ExportError as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     except OSError as error:
-        raise fail(str(error)) from None
+        raise fail(error) from None
     say(
         json.dumps([str(file) for file in files], indent=2)
         if as_json
@@ -106,7 +106,7 @@ def report(
                 say(file)
             say(f"verdict: {made.verdict}")
     except (ValueError, OSError) as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     if made.verdict == "fail":
         raise typer.Exit(EXIT_FAILED)
 
@@ -151,7 +151,7 @@ def import_log(
         for text in axes:
             say(text, file=sys.stderr)
     except (LogError, TopicError, SessionError, OSError) as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     say(json.dumps({"session": folder.name}) if as_json else folder.name)
 
 
@@ -239,7 +239,7 @@ def rerun(
             )
         give_title(folder, name)
     except (UnknownEstimator, SessionError, ValueError, OSError) as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     say(json.dumps({"session": folder.name}) if as_json else folder.name)
 
 
@@ -290,7 +290,7 @@ def reprocess(
                 progress(count / len(paths), f"{count} of {len(paths)} sessions")
         write_table(out, rows)
     except (SchedulerError, SessionError, OSError) as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     bad = sum(bool(row.get("problem")) for row in rows)
     if as_json:
         say(json.dumps(rows, indent=2))

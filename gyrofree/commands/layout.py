@@ -61,7 +61,7 @@ def _quality(name: str, half_side: float | None, turn: float, hertz: float) -> A
     try:
         layout = catalogue.find(name, half_side)
     except GeometryError as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     return quality.analyse(layout, np.array([0.0, 0.0, math.radians(turn)]), 1.0 / hertz)
 
 
@@ -180,7 +180,7 @@ def optimise(
                 wish, lambda done, what: bar.update(task, completed=done, description=what)
             )
     except GeometryError as error:
-        raise fail(str(error)) from None
+        raise fail(error) from None
     rate = np.array([0.0, 0.0, math.radians(turn)])
     q = quality.analyse(found.layout, rate, 1.0 / hertz)
     cube = quality.analyse(CUBE(region.scale_m), rate, 1.0 / hertz)

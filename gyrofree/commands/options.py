@@ -44,7 +44,7 @@ def settings_of(path: Path | None) -> Settings:
     try:
         return load_or_default(path)
     except ConfigError as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
 
 
 def catalogue_of(settings: Settings) -> "Catalogue":
@@ -54,6 +54,12 @@ def catalogue_of(settings: Settings) -> "Catalogue":
     return Catalogue(Path(settings.recorder.root))
 
 
+def nothing_in(root: Path, search: str = "") -> str:
+    """What is said instead of an empty table of sessions."""
+    kept = "" if search else "; make demo keeps its own: --config var/demo/gyrofree.toml"
+    return f"no session in {root}{f' has {search!r}' if search else ''}{kept}"
+
+
 def file_of(settings: Settings, session: str) -> Path:
     """MCAP file of an id or path; ends the command where there is none."""
     from gyrofree.running import replay
@@ -61,7 +67,7 @@ def file_of(settings: Settings, session: str) -> Path:
     try:
         return replay.find(settings, session)
     except LookupError as error:
-        raise fail(str(error)) from None
+        raise fail(error) from None
 
 
 def session_name(name: str) -> str:
@@ -115,4 +121,4 @@ def faults_of(texts: list[str] | None) -> tuple:
     try:
         return tuple(parse(text, CUBE(0.05).axis_names) for text in texts)
     except FaultError as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None

@@ -16,6 +16,7 @@ from gyrofree.commands.options import (
     Speed,
     Verbose,
     catalogue_of,
+    nothing_in,
     say,
     settings_of,
     show_table,
@@ -63,7 +64,7 @@ def replay(
     try:
         path = player.find(settings, session)
     except LookupError as error:
-        raise fail(str(error)) from None
+        raise fail(error) from None
     if check:
         raise typer.Exit(compare_estimates(settings, path, as_json))
     from estimator.choice import UnknownEstimator
@@ -72,9 +73,9 @@ def replay(
     try:
         run_service(lambda stop: player.run(settings, path, options, stop), verbose)
     except UnknownEstimator as error:
-        raise fail(str(error), CONFIG) from None
+        raise fail(error, CONFIG) from None
     except ValueError as error:
-        raise fail(str(error)) from None
+        raise fail(error) from None
 
 
 def show_list(settings: Settings, as_json: bool) -> None:
@@ -82,6 +83,9 @@ def show_list(settings: Settings, as_json: bool) -> None:
     infos = catalogue_of(settings).list()
     if as_json:
         say(json.dumps([asdict(info) for info in infos], indent=2, default=str))
+        return
+    if not infos:
+        say(nothing_in(catalogue_of(settings).root))
         return
     table = Table("id", "devices", "start (UTC)", "length", "state", "messages", "lost", "size")
     for info in infos:

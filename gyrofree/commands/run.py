@@ -146,7 +146,7 @@ def run(
                     progress=progress,
                 )
     except (ValueError, OSError) as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     show(result, as_json)
     if not any(known(row) for row in result[kind_of(result)].values()):
         raise fail("no result: the notes above say why", EXIT_FAILED)
@@ -271,7 +271,7 @@ def _reproduce(work: Callable[[Report], dict[str, Any]], out: Path, as_json: boo
         with progress_bar() as progress:
             result = work(progress)
     except (ValueError, OSError) as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     if as_json:
         say(json.dumps(result, indent=2))
     else:

@@ -18,6 +18,7 @@ from gyrofree.commands.options import (
     Config,
     SessionId,
     catalogue_of,
+    nothing_in,
     say,
     settings_of,
     show_table,
@@ -50,9 +51,12 @@ def list_sessions(
             row for row in summaries(catalogue_of(settings_of(config))) if _matches(row, search)
         ]
     except SessionError as error:
-        raise fail(str(error)) from None
+        raise fail(error) from None
     if as_json:
         say(json.dumps(rows, indent=2))
+        return
+    if not rows:
+        say(nothing_in(catalogue_of(settings_of(config)).root, search))
         return
     head = ("device", "start (UTC)", "length", "state", "complete", "size", "tags", "title")
     table = Table(Column("id", no_wrap=True), *head)
@@ -121,7 +125,7 @@ def show(session: SessionId, as_json: AsJson = False, config: Config = None) -> 
         catalogue.get(session)
         manifest, notes = catalogue.manifest(session), read_annotations(catalogue.root / session)
     except SessionError as error:
-        raise fail(str(error)) from None
+        raise fail(error) from None
     if as_json:
         say(
             json.dumps(
@@ -173,7 +177,7 @@ def verify(session: SessionId, as_json: AsJson = False, config: Config = None) -
         with progress_bar() as progress:
             found = examine(catalogue.root / session, progress)
     except (SessionError, OSError) as error:
-        raise fail(str(error)) from None
+        raise fail(error) from None
     if as_json:
         say(json.dumps(asdict(found) | {"ok": found.ok}, indent=2))
     else:
@@ -212,7 +216,7 @@ def delete(
             raise fail("nothing was deleted")
         freed = remove(catalogue, session)
     except (SessionError, OSError) as error:
-        raise fail(str(error)) from None
+        raise fail(error) from None
     text = f"{session} deleted, {freed / 1e6:.2f} MB freed"
     say(json.dumps({"deleted": session, "freed_bytes": freed}) if as_json else text)
 
@@ -262,7 +266,7 @@ def retain(
             if yes:
                 remove(catalogue, info.id)
     except (SessionError, OSError) as error:
-        raise fail(str(error)) from None
+        raise fail(error) from None
     say(
         f"{len(going)} sessions {'deleted' if yes else 'would go; --yes deletes them'}",
         file=sys.stderr,

@@ -82,7 +82,7 @@ def simulate(
             say(f"{csv}: {simulate_csv.write(csv, profile, seed, layout, half_side)} samples")
             return
     except (ValueError, OSError) as error:
-        raise fail(str(error), CONFIG) from None
+        raise fail(error, CONFIG) from None
 
     def body(stop: threading.Event) -> None:
         from gyrofree.running import simulate as simulator

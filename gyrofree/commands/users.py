@@ -37,7 +37,7 @@ def users_add(
     try:
         add_user(settings.dashboard.users, name, password, role)
     except UsersError as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     say(f"{name} may sign in as {role}")
 
 
@@ -47,7 +47,7 @@ def users_list(as_json: AsJson = False, config: Config = None) -> None:
     try:
         found = load_users(settings_of(config).dashboard.users)
     except UsersError as error:
-        raise fail(str(error)) from None
+        raise fail(error) from None
     if as_json:
         say(
             json.dumps(
@@ -55,6 +55,8 @@ def users_list(as_json: AsJson = False, config: Config = None) -> None:
             )
         )
         return
+    if not found:
+        say("nobody may sign in yet; add somebody: gyrofree users add NAME --role operator")
     for user in found.values():
         say(f"{user.name}\t{user.role.name}")
 
@@ -67,4 +69,4 @@ def users_remove(
     try:
         remove_user(settings_of(config).dashboard.users, name)
     except UsersError as error:
-        raise fail(str(error)) from None
+        raise fail(error) from None

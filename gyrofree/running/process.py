@@ -19,7 +19,7 @@ import zenoh
 
 from gyrofree.config import ConfigError
 from messages.bus.session import BusUnavailable
-from messages.text import plain, printed
+from messages.text import plain, printed, reason
 
 EXIT_FAILED = 1
 EXIT_CONFIG = 2
@@ -98,9 +98,9 @@ def _end_in_peace() -> None:
         signal.signal(number, signal.SIG_IGN)
 
 
-def fail(text: str, code: int = EXIT_FAILED) -> typer.Exit:
+def fail(why: str | Exception, code: int = EXIT_FAILED) -> typer.Exit:
     """Say why on stderr; raise what this returns."""
-    for line in printed(text).splitlines():
+    for line in printed(reason(why)).splitlines():
         print(f"gyrofree: {line}", file=sys.stderr)
     return typer.Exit(code)
 
@@ -115,18 +115,19 @@ def run_service(body: Callable[[threading.Event], None], verbose: bool = False) 
     try:
         body(stop)
     except ConfigError as error:
-        raise fail(str(error), EXIT_CONFIG) from None
+        raise fail(error, EXIT_CONFIG) from None
     except BusUnavailable as error:
         if not stop.is_set():
-            raise fail(str(error)) from None
+            raise fail(error) from None
     except zenoh.ZError as error:
         raise fail(
             _first_line(error), EXIT_TAKEN if "in use" in str(error) else EXIT_FAILED
         ) from None
     except OSError as error:
-        raise fail(
-            str(error), EXIT_TAKEN if error.errno == errno.EADDRINUSE else EXIT_FAILED
-        ) from None
+        raise fail(error, EXIT_TAKEN if error.errno == errno.EADDRINUSE else EXIT_FAILED) from None
+    finally:
+        settled.cancel()
+        gc.unfreeze()  # or the core reports every filter that still lives as a leak
 
 
 def _spare_the_collector() -> None:

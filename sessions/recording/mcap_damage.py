@@ -18,6 +18,7 @@ class Damage:
     tail: str = ""  # why reading ended before the file's end; empty when it did not
     messages: int = 0  # that were read, of others too
     unchecked: int = 0  # of these, not covered by any checksum
+    growing: bool = False  # somebody is writing it: that it has no end is no damage
     foreign: dict[str, int] = field(default_factory=dict)  # what others wrote -> messages left out
 
     @property
@@ -55,6 +56,8 @@ class Damage:
     def said(self) -> list[str]:
         """Sentences for people; none for a file that is whole and ours alone."""
         said = [] if self.whole else [f"damaged: {self}; {self.messages} messages were read"]
+        if self.growing and self._parts() == [self.tail]:
+            said = [f"still being recorded: the {self.messages} messages so far were read"]
         said += [self.others] if self.foreign else []
         if self.unchecked and self.whole:
             said.append(f"{self.unchecked} messages have no checksum: errors in them do not show")

@@ -6,6 +6,7 @@ compression must end in an account and not in a shorter message; what is inside 
 the mcap library (https://mcap.dev/spec). Nothing here looks into a payload.
 """
 
+import fcntl
 import functools
 import io
 import logging
@@ -138,6 +139,7 @@ class _Reading:
 
     def _cut(self) -> str:
         end = self._stream.seek(0, io.SEEK_END)
+        self._damage.growing = _is_written(self._stream.fileno())
         if self._at == end:
             return f"ends at byte {end} without a close"
         return f"cut off or damaged from byte {self._at} of {end} on"
@@ -235,3 +237,15 @@ class _Reading:
             damage.tail = f"{rest} bytes behind its end are not read"
         if self._counted is not None and not damage.index:
             damage.missing = max(0, self._counted - damage.messages)
+
+
+def _is_written(fd: int) -> bool:
+    """Does a recorder have this file (store.lock)?"""
+    try:
+        fcntl.flock(fd, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:  # a file system without locks
+        return False
+    fcntl.flock(fd, fcntl.LOCK_UN)
+    return False

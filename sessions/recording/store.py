@@ -49,11 +49,14 @@ def versions() -> dict[str, str]:
 
 def lock(fd: int) -> bool:
     """Mark a recording as being written by this process; False when another one has it."""
-    try:
-        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
+    for again in (True, True, False):  # a reader that looks has it for a moment
+        try:
+            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        except BlockingIOError:
+            if again:
+                time.sleep(0.01)
+    return False
 
 
 class SessionStore:

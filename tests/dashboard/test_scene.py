@@ -313,6 +313,17 @@ def test_only_rejected_fixes_are_marked_and_they_lie_where_the_fix_is(store):
     assert len(rejected) == 2
 
 
+def test_a_rejection_filled_in_from_before_may_be_the_first_that_is_heard(store):
+    feeder = Feeder(Direct(store))
+    feeder.cube(0.0)
+    rejected = pb.Innovation(header=pb.Header(device="cube-01", utc_ns=UTC0_NS), nis=30.0)
+    store.put_late("cube-01", [(tp.INNOVATION, name, rejected) for name in ("kf", "ekf")], False)
+    device = store.device("cube-01")
+    assert device.estimators("innovation") == ["ekf", "kf"]
+    assert device.leads("innovation", "ekf") and not device.leads("innovation", "kf")
+    assert all(len(device.window("innovation", name, -9, 9)[0]) == 1 for name in ("ekf", "kf"))
+
+
 def test_values_get_stale_by_their_arrival_not_by_their_time_stamp(store):
     truth = pb.Truth(header=pb.Header(utc_ns=UTC0_NS), q_nb=[1, 0, 0, 0])
     store.put(tp.TRUTH, "cube-01", "", truth, arrived=100.0)

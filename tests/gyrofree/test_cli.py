@@ -7,6 +7,8 @@ import socket
 import subprocess
 import sys
 
+from support.stack import free_port
+
 
 def gyrofree(*arguments, cwd, stdin=""):
     command = [sys.executable, "-m", "gyrofree", *arguments]
@@ -60,8 +62,9 @@ def test_a_taken_port_is_said_and_no_other_is_used(tmp_path):
             f"bus port {port} is taken",
             "--bus-port",
         )
+        free = str(free_port())
         refused(
-            gyrofree("demo", "--port", port, cwd=tmp_path),
+            gyrofree("demo", "--port", port, "--bus-port", free, cwd=tmp_path),
             3,
             f"dashboard port {port} is taken",
             "--port",

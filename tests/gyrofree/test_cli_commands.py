@@ -99,7 +99,17 @@ def test_what_is_wrong_is_said_in_few_words(line, tmp_path, monkeypatch):
     )
     said = result.stderr.strip()
     assert said and "Traceback" not in said and len(said.splitlines()) <= 6
+    assert "Errno" not in said  # a name and a reason, not a number
     assert result.stdout == ""
+
+
+@pytest.mark.parametrize("line", ["sessions list", "replay --list", "users list"])
+def test_a_list_of_nothing_says_so_and_what_to_do(line, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = gyrofree(*line.split())
+    assert result.exit_code == 0
+    assert result.stdout.startswith("no") and "; " in result.stdout and "┃" not in result.stdout
+    assert json.loads(gyrofree(*line.split(), "--json").stdout) == []
 
 
 def test_comparing_takes_an_offset_with_its_session(tmp_path):

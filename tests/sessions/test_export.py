@@ -256,10 +256,12 @@ def test_no_cell_of_a_csv_begins_a_formula(tmp_path):
     """Notes of whoever was on the bus, opened by a spreadsheet; numbers stay what they are."""
     path = tmp_path / "recording.mcap"
     words = ["=1+1", "+cmd|' /C calc'!A0", "-2+3", "@SUM(A1)", "\t=1", "plain, with comma", '="x"']
+    # a note longer than the contract allows is no note
+    words += [word for word in HOSTILE if len(word) < 4000]
     with path.open("wb") as stream:
         log = McapLog(stream.fileno(), 1024)
         channel = log.open_channel("gyrofree/cube/note", NOTE)
-        for k, word in enumerate([*words, *HOSTILE]):
+        for k, word in enumerate(words):
             at = 1_700_000_000_000_000_000 + k * 10**9
             note = pb.Note(header=pb.Header(device="cube", utc_ns=at, sequence=k + 1), text=word)
             log.add(channel, at, at, note.SerializeToString(), k + 1)
@@ -268,8 +270,8 @@ def test_no_cell_of_a_csv_begins_a_formula(tmp_path):
     [file] = export(path, "csv", tmp_path / "out")
     with file.open(newline="", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
-    assert len(rows) == len(words) + len(HOSTILE)
-    for row, word in zip(rows, [*words, *HOSTILE], strict=True):
+    assert len(rows) == len(words)
+    for row, word in zip(rows, words, strict=True):
         assert row["text"] == cell(word)
         assert row["text"][:1] not in ("=", "+", "-", "@", "\t", "\r", "\n")
         assert float(row["utc_s"]) > 1.6e9 and not {"\x1b", "\u202e"} & set(row["text"])

@@ -197,6 +197,7 @@ def test_chunks_stay_below_the_limit_and_reach_the_file_at_each_flush(settings):
     damage = Damage()
     assert len(list(read(store.folder / "recording.mcap", damage))) == 200
     assert "without a close" in damage.tail
+    assert damage.said() == ["still being recorded: the 200 messages so far were read"]
     assert store.close()
     with (store.folder / "recording.mcap").open("rb") as stream:
         chunks = make_reader(stream).get_summary().chunk_indexes

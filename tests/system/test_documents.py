@@ -4,6 +4,9 @@ import re
 from pathlib import Path
 
 import pytest
+import typer
+
+from gyrofree.commands.main import app
 
 ROOT = Path(__file__).resolve().parents[2]
 GUIDES = ("README.md", "CONTRIBUTING.md", "docs/glossary.md")
@@ -56,3 +59,52 @@ def test_the_guide_names_a_way_for_frame_estimator_and_panel():
     for heading in ("a frame to the wire", "a rate estimator", "a panel"):
         part = guide.split(f"## How to add {heading}")[1].split("\n## ")[0]
         assert len(NAMED.findall(part)) >= 6, heading
+
+
+COMMAND = re.compile(r"(?:^|`|    |\.venv/bin/)gyrofree ([a-z][^`\n#]*)", re.MULTILINE)
+
+
+def commands_of(page: str) -> list[list[str]]:
+    """What a page tells people to type after `gyrofree`, word by word."""
+    return [found.split() for found in COMMAND.findall(text_of(page))]
+
+
+@pytest.mark.parametrize(
+    "page", ["README.md", *(f"docs/{p.name}" for p in (ROOT / "docs").glob("*.md"))]
+)
+def test_every_command_of_a_page_exists_with_its_options(page):
+    for words in commands_of(page):
+        command, rest = typer.main.get_command(app), list(words)
+        while hasattr(command, "commands") and rest:
+            name = rest.pop(0).rstrip(",.:;")
+            assert name in command.commands, f"{page}: gyrofree {' '.join(words)}"
+            command = command.commands[name]
+        known = {option for parameter in command.params for option in parameter.opts}
+        asked = {
+            word.strip("[],.;").split("=")[0] for word in rest if word.strip("[").startswith("--")
+        }
+        assert asked <= known | {"--help"}, f"{page}: gyrofree {' '.join(words)}"
+
+
+def test_the_guide_shows_commands():
+    assert sum(len(commands_of(f"docs/{p.name}")) for p in (ROOT / "docs").glob("*.md")) > 30
+
+
+def test_every_figure_of_the_readme_has_its_command_beside_it():
+    table = text_of("README.md").split("## Figures")[1].split("\n## ")[0]
+    rows = [line for line in table.splitlines() if line.startswith("| ")][1:]
+    assert len(rows) > 20
+    for row in rows:
+        last = row.strip("| ").split(" | ")[-1]
+        assert last == "same" or "`" in last or "](docs/" in last, row
+        for name in re.findall(r"`(?:pytest )?(tests/[\w/.]+)", last):
+            assert (ROOT / name).exists(), row
+
+
+@pytest.mark.parametrize(
+    "word", ["bad bytes", "clock skew", "fresh", "latency", "tachometer", "blind", "NIS", "bound"]
+)
+def test_words_of_the_page_are_in_the_glossary(word):
+    assert re.search(rf"^\| [^|]*{word}", text_of("docs/glossary.md"), re.MULTILINE)
+    said = "".join(p.read_text() for p in (ROOT / "dashboard/scene").rglob("*.py"))
+    assert word.split()[0] in said, "no longer on the page"

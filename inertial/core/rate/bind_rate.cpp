@@ -68,8 +68,9 @@ class ProductsFilter {
   }
 
   void exclude(const Sensor& sensor, const MatrixIn& T, const MatrixIn& unknown) {
-    memory_->frame.exchange_axes(Matrix<MEASURED>(map(T)), Matrix<MEASURED>(map(unknown)));
+    const bool fewer = (c_.sensor.used - sensor.used).maxCoeff() > 0.0;
     c_.sensor = sensor;
+    memory_->frame.exchange_axes(c_, {fewer, Matrix<MEASURED>(map(T)), Matrix<MEASURED>(map(unknown))});
   }
 
   bool correct(double t_s, double rate, double sigma, bool is_signed, const VectorIn& axis_b) {
@@ -115,7 +116,7 @@ class LeastSquaresFilter {
 
   void exclude(const Sensor& sensor) {
     sensor_ = sensor;
-    memory_->gap();
+    memory_->exchange_axes();
   }
 
   void gap() { memory_->gap(); }

@@ -12,8 +12,10 @@ constexpr int FREE_FOR = 200;          // samples
 constexpr double FEW_SAY_AT_MOST = 2.0;  // of the balance, by a fit of few samples
 
 // omega that many samples before one with state `end`, by what was measured of omega' since (E-49).
-Vector3 back(const StateVector& end, const Measurement& now, const Measurement& then, long samples, double dt) {
-  const Vector3 gained = (now - then).segment<3>(ALPHA_M) - samples * end.segment<3>(BIAS_ALPHA);
+Vector3 back(const StateVector& end, const Measurement& now, const Measurement& then, long samples, double dt,
+             const Sensor& s) {
+  Vector3 gained = (now - then).segment<3>(ALPHA_M) - samples * end.segment<3>(BIAS_ALPHA);
+  if (s.feedback) gained -= samples * product(s.SQ_alpha, squares(end.segment<3>(OMEGA)));
   return end.segment<3>(OMEGA) - dt * gained;
 }
 
@@ -29,6 +31,7 @@ void Frame::gap() {
 // The rate is unknown: wait for a standstill, or start while turning.
 void Frame::restart() {
   gap();
+  since_rest_.forget();
   started_ = still_ = moved_ = false;
   agreement_.forget();
   perhaps_still_ = false;
@@ -62,6 +65,7 @@ const Constants& Frame::believed(const Constants& c) {
 void Frame::advance(const Constants& configured, double t_s, const double* a) {
   if (passed_over(configured, t_s, a)) return;
   tick(t_s);
+  since_rest_.take(configured.sensor, a, dt_, started_ && still_, first_.filter);
   watch_.take(configured.sensor, a, dt_);
   const Constants& c = believed(configured);
   said_ = Said();
@@ -226,7 +230,7 @@ void Frame::run(const Constants& c, long first, long now, bool fixed, const Stat
     const bool eighth = sample % EVERY == 0;
     if (eighth && keeps) arrivals_.keep(sample, first_.filter);
     Vector3 at;
-    if (end != nullptr) at = back(*end, watch_.total(now), watch_.total(sample), now - sample, dt_);
+    if (end != nullptr) at = back(*end, watch_.total(now), watch_.total(sample), now - sample, dt_, c.sensor);
     const Moment moment{watch_.dt(sample), !still_, fixed, eighth ? EVERY * dt_ : 0.0, end == nullptr ? nullptr : &at,
                         agreement_.forgetting(), watch_.wander()};
     step(first_.filter, c.sensor, c.tuning, watch_.y(sample), moment, said_);
@@ -297,25 +301,6 @@ void Frame::count(const Constants& c) {
   Filter& f = first_.filter;
   f.P.block<3, 3>(LIFT, LIFT) += c.tuning.tilt * Matrix3::Identity();
   f.P.block<3, 3>(PIVOT, PIVOT) += c.tuning.pivot * Matrix3::Identity();
-}
-
-void Frame::exchange_axes(const Matrix<MEASURED>& T, const Matrix<MEASURED>& unknown) {
-  watch_.unlearn();
-  renewed_ = true;
-  kept_.clear();
-  fitted_ = 0;
-  Covariance full = Covariance::Identity();
-  for (int i = 0; i < MEASURED; ++i)
-    for (int j = 0; j < MEASURED; ++j) full(bias_state(i), bias_state(j)) = T(i, j);
-  for (Start* begun : {&first_, &second_}) {
-    Filter& f = begun->filter;
-    f.x = product(full, f.x);
-    f.P = product_transposed(product(full, f.P), full);
-    symmetrise(f.P);
-    add_to_biases(f.P, unknown, 1.0);
-    f.rest_bias = product(T, f.rest_bias);
-    f.rest_variance = f.level = bias_variances(f.P);
-  }
 }
 
 }  // namespace gyrofree::rate

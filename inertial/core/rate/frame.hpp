@@ -10,6 +10,7 @@
 
 #include "rate/agreement.hpp"
 #include "rate/intake.hpp"
+#include "rate/since_rest.hpp"
 #include "rate/start.hpp"
 
 namespace gyrofree::rate {
@@ -71,14 +72,21 @@ struct Report {
   Vector3 axis_b;  // of unit length
 };
 
+// Axes of which some are not used now, or are used again.
+struct Axes {
+  bool fewer;                // some are not used any more
+  Matrix<MEASURED> T;        // biases become T b
+  Matrix<MEASURED> unknown;  // plus what was not known of the axes (E-42)
+};
+
 class Frame {
  public:
   // One sample of all axes, m/s^2, read at t_s (s, growing).
   void advance(const Constants& c, double t_s, const double* a);
   // Samples are missing: the next step predicts across.
   void gap();
-  // Other axes are in use: what the biases were becomes T b plus what was not known of the axes (E-42).
-  void exchange_axes(const Matrix<MEASURED>& T, const Matrix<MEASURED>& unknown);
+  // Other axes are in use; configured: with them.
+  void exchange_axes(const Constants& configured, const Axes& axes);
   // Correct the state after the newest sample by an older report (E-50). False, and nothing is changed,
   // when it is too old, contradicts by more than 6 sigma, or nothing is known.
   bool correct(const Constants& c, const Report& report);
@@ -127,6 +135,8 @@ class Frame {
   bool diverged();
   void count(const Constants& c);
   void stay();
+  void carry_biases(const Axes& axes);
+  void from_rest(const Constants& c);
 
   Watch watch_;
   Constants now_;       // with the noise that was measured, where that is not as configured
@@ -138,6 +148,7 @@ class Frame {
   KeptStates<4> arrivals_;  // of the moving horizon: states before samples of this turn
   Agreement agreement_;
   Intake intake_;
+  SinceRest since_rest_;
   bool perhaps_still_ = false;  // a start while turning that may be a standstill with biases
   int perhaps_for_ = 0;         // samples of it
   double against_s_ = 0.0;      // s in which innovations contradict the filter

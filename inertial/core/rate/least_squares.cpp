@@ -66,6 +66,12 @@ void LeastSquares::restart() {
   moving_s_ = 0.0;
 }
 
+// Its integral, and what it stood on, were made with other axes.
+void LeastSquares::exchange_axes() {
+  watch_.unlearn();
+  restart();
+}
+
 // Biases and tilt from the mean of the standstill (E-7). All of omega' is bias; of p, what exceeds
 // gravity along the measured vertical. A bias across the vertical reads like a tilt and stays in it.
 void LeastSquares::align() {

@@ -33,6 +33,8 @@ class LeastSquares {
   LeastSquares();
   void advance(const Sensor& s, const LeastSquaresLimits& c, double t_s, const double* a);
   void gap() { watch_.forget(); }
+  // Other axes are in use.
+  void exchange_axes();
   Intake& intake() { return intake_; }
   void write(const Sensor& s, Row& row) const;
 
