@@ -25,6 +25,7 @@ from gateway.board.resume import Past, again, unseen
 from gateway.board.state import BoardState
 from gateway.board.watch import BoardWatch
 from gateway.gnss.flow import GnssFlow
+from gateway.ports.backlog import Backlog
 from gateway.ports.keeper import Keeper
 from gateway.ports.reader import Chunk, Reader
 from gateway.samples.flow import SampleFlow
@@ -69,7 +70,7 @@ class DeviceLink:
             folder, settings.journal_bytes, settings.segment_bytes, settings.sync_s
         )
         self.spool = Spool(folder / "published", settings.published_bytes, settings.published_age_s)
-        self.queue: queue.SimpleQueue[Chunk | None] = queue.SimpleQueue()
+        self.queue: Backlog[Chunk] = Backlog()
         self.readers: list[Reader] = []
         self.door = Door("gateway")
         self.decoder = Decoder(FrameDoor(self.door, name, device.time_scale))
@@ -114,7 +115,10 @@ class DeviceLink:
             past = Past(self.spool, self._next_put)
             # before the readers append to the journal what came since
             left = unseen(past, self.journal) if past.read_ns else []
-        self.readers = [Reader(*port, self.journal, self.queue, self._keeper) for port in ports]
+        scale = self.device.time_scale
+        self.readers = [
+            Reader(*port, self.journal, self.queue, self._keeper, scale) for port in ports
+        ]
         try:
             if past is not None and past.read_ns:
                 self.resume(past, left)

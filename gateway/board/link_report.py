@@ -20,6 +20,7 @@ from messages.history.spool import Spool
 UNREADABLE_S = 2.0  # bytes but no frame for so long: not our protocol, or not our speed
 UNREADABLE_BYTES = 100
 REFUSED_TOLD_S = 60.0  # that something was refused is said for so long
+HELD_TOLD_S = 10.0  # that reading had to wait is said for so long
 BEHIND_CHUNKS = 2000
 CRYSTAL_PPM = 1000.0  # no crystal is this far off
 TOLD_S = 60.0  # that this process was stopped is said for so long
@@ -107,6 +108,8 @@ class LinkReport:
         )
         for name, count in self._gnss.refused.items():
             status.refused[f"receiver: {name}"] = count
+        if held := sum(reader.held for reader in readers):
+            status.refused["reads held back"] = held
         self._at, self._samples_at = now, self._samples.count
         self._frames_at = ledger.good_frames
         return status
@@ -116,6 +119,12 @@ class LinkReport:
     ) -> list[str]:
         device, skew_ppm = self._device, self._clock.skew_ppm
         found = [reader.message for reader in readers if reader.message]
+        found += [
+            f"{reader.url}: more comes than can be taken (reading waited {reader.held} times): no"
+            " board is so fast; is it the right address, does its other side send what it should?"
+            for reader in readers
+            if reader.held_at is not None and now - reader.held_at < HELD_TOLD_S
+        ]
         if self._stopped_at is not None and now - self._stopped_at < TOLD_S:
             found.append(
                 f"this gateway's process was stopped for {self._last_stop_s:.1f} s,"

@@ -42,7 +42,7 @@ class Port:
         )
         self._fd = fd
         self._owner = owner
-        self._is_file = is_file
+        self.is_file = is_file  # as fast as it can be read
 
     def fileno(self) -> int:
         """Descriptor for select; non-blocking."""
@@ -62,7 +62,7 @@ class Port:
             ) from None
         if data:
             return data
-        if self._is_file:
+        if self.is_file:
             raise PortEnd(f"{self.url}: read to its end")
         raise PortError(f"{self.url}: the other side closed it; waiting until it is back")
 
@@ -70,7 +70,7 @@ class Port:
         """Send to the board; raises PortError when the port cannot take it all at once, a file
         never can.
         """
-        if self._is_file:
+        if self.is_file:
             raise PortError(f"{self.url}: is a file, nobody behind it takes commands")
         try:
             sent = os.write(self._fd, data)

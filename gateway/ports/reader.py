@@ -6,12 +6,12 @@ the scheduler makes it.
 
 import logging
 import os
-import queue
 import select
 import threading
 import time
 from dataclasses import dataclass
 
+from gateway.ports.backlog import LINE_BYTES_S, Backlog, Pace
 from gateway.ports.keeper import Keeper
 from gateway.ports.ports import Port, PortEnd, PortError, adopt_port, open_port
 from messages.history.journal import Journal
@@ -21,6 +21,7 @@ log = logging.getLogger(__name__)
 FIRST_RETRY_S = 0.1
 LAST_RETRY_S = 2.0
 LOOK_MS = 500  # a silent port is looked at so often, so that silence is told from being stopped
+HOLD_S = 0.02
 STOPPED_NS = 1_500_000_000  # between two looks: this process was stopped, or got no processor
 
 
@@ -45,14 +46,18 @@ class Reader:
         baud: int,
         channel: int,
         journal: Journal,
-        out: "queue.SimpleQueue[Chunk | None]",
+        out: "Backlog[Chunk]",
         keeper: Keeper,
+        time_scale: float = 1.0,
     ) -> None:
         self.url = url
         self.baud = baud
         self.connected = False
         self.message = f"{url}: not opened yet"
         self.reconnects = 0
+        self.held = 0  # times that reading waited, as more came than can be decoded
+        self.held_at: float | None = None  # s, monotonic, of the last one
+        self._rate = LINE_BYTES_S * max(1.0, time_scale)
         self._opened = 0
         self._channel = channel
         self._journal = journal
@@ -132,8 +137,12 @@ class Reader:
         poller = select.poll()
         poller.register(port.fileno(), select.POLLIN)
         poller.register(self._wake_out, select.POLLIN)
-        looked, late = time.monotonic_ns(), False
+        looked, late, pace = time.monotonic_ns(), False, Pace(self._rate)
         while not self._stop.is_set():
+            if self._out.full(self._channel):
+                self._hold(HOLD_S)
+                looked, late = time.monotonic_ns(), True
+                continue
             ready = poller.poll(0)
             if not ready:
                 late = False  # nothing of the time before is left
@@ -145,6 +154,17 @@ class Reader:
             data = port.read() if ready else b""
             if data:
                 self._take(data, time.monotonic_ns(), time.time_ns(), late)
+            if not port.is_file and (wait_s := pace.wait_s(len(data))) > 0.0:
+                self._hold(wait_s)
+                looked, late = time.monotonic_ns(), True
+
+    def _hold(self, seconds: float) -> None:
+        """Read later: what comes now is too much."""
+        self.held += 1
+        self.held_at = time.monotonic()
+        if self.held & (self.held - 1) == 0:  # a flood stays readable
+            log.warning("%s: more comes than can be taken (%d so far)", self.url, self.held)
+        self._stop.wait(seconds)
 
     def _say(self, message: str) -> None:
         if message != self.message:

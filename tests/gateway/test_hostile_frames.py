@@ -30,7 +30,9 @@ class Board:
     def __init__(self, folder):
         settings = GatewaySettings(journal=folder)
         self.link = DeviceLink(DeviceSettings(name="cube", port="file:///none"), settings)
-        self.link.readers = [SimpleNamespace(connected=True, message="", reconnects=0)]
+        self.link.readers = [
+            SimpleNamespace(connected=True, message="", reconnects=0, held=0, held_at=None)
+        ]
         self.out = []
         self.link.out.direct(lambda topic, device, message: self.out.append((topic, message)))
         self._at_ns = time.monotonic_ns()
