@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from logs.figures.names import line_colour, line_title
 from sessions.library.compare import Comparison, Overlaid, moved
 from sessions.library.curves import RATE, TACHO, TRUTH, Line
 
@@ -95,7 +96,9 @@ def _line(
         "session": number,
         "key": line.key,
         "kind": line.kind,
-        "title": line.title,
+        "title": line_title(line.title),
+        "colour": line_colour(line.title),
+        "reference": line.kind in (TACHO, TRUTH),
         "t0": t + one.offset_s,
         "dt": step,
         "rate": parts,
@@ -153,7 +156,9 @@ def _tracks(found: Comparison) -> list[dict[str, Any]]:
             {
                 "session": number,
                 "key": key,
-                "title": key.split("/", 1)[1].removeprefix("nav/"),
+                "title": line_title(key.split("/", 1)[1].removeprefix("nav/")),
+                "colour": line_colour(key.split("/", 1)[1].removeprefix("nav/")),
+                "dots": key.endswith("/gnss"),
                 "t": np.round(points[:, 0] + one.offset_s, 2).tolist(),
                 "north": np.round(points[:, 1], 3).tolist(),
                 "east": np.round(points[:, 2], 3).tolist(),
