@@ -6,6 +6,7 @@ import numpy as np
 import viser
 from scipy.stats import chi2
 
+from dashboard.data.device import Device
 from dashboard.scene.drawing.chart import Curve
 from dashboard.scene.drawing.page import note, rows, sub
 from dashboard.scene.drawing.palette import AXES, GREY, estimator_title, number
@@ -19,7 +20,15 @@ class Innovations(Panel):
     """NIS first, then the innovations; the table says how many values lie inside."""
 
     title = "NIS"
+    workspace = "diagnose"
     _table = None
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        topic = "innovation" if device.is_vehicle else "rate"
+        if device.estimators(topic):
+            return ""
+        return "no filter has corrected itself by a measurement yet"
 
     def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
         super().__init__(client, folder)
