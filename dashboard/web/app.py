@@ -17,10 +17,10 @@ from dashboard.web import (
     desk_api,
     intake_api,
     pages,
-    proxy,
     session_api,
     session_pages,
 )
+from dashboard.web.frame import proxy
 from dashboard.web.front import Front
 from dashboard.web.guard import Guard
 from dashboard.web.users import UsersError

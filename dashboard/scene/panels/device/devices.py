@@ -239,7 +239,7 @@ def _said_rate(s: Snapshot, name: str, m: pb.RateEstimate) -> tuple[str, Markup 
     if sight == pb.RateEstimate.SIGHT_AMBIGUOUS:
         return f"± {number(abs(omega) * DEG, 1)}", joined([term("ambiguous"), ": sign not known"])
     if m.still and abs(omega) > TURNS_RADPS:
-        return shown, bad("drifted: the body stands still")
+        return shown, tag("span", "drifted: the body stands still", class_="gf-bad")
     return shown, "still" if m.still else f"angle {number(m.angle_z_rad * DEG, 0, '°')}"
 
 

@@ -19,7 +19,7 @@ from starlette.websockets import WebSocketDisconnect
 
 from dashboard.settings import DashboardSettings
 from dashboard.web.auth import Gate, Role
-from dashboard.web.scene_messages import (
+from dashboard.web.frame.scene_messages import (
     DROPPED_QUIETLY,
     BadMessage,
     Widgets,
@@ -27,7 +27,7 @@ from dashboard.web.scene_messages import (
     message_type,
     update,
 )
-from dashboard.web.scene_page import policy, scene_page, script_hashes
+from dashboard.web.frame.scene_page import policy, scene_page, script_hashes
 from messages.text import plain
 
 log = logging.getLogger(__name__)
