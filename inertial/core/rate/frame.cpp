@@ -82,8 +82,11 @@ void Frame::advance(const Constants& configured, double t_s, const double* a) {
     return;
   }
   const long now = watch_.newest();
-  const long first = begin_of_motion(verdict, now);
-  if (verdict.against && !still_) begin(c);  // the rate was wrong, and so is what it was made of
+  const long first = begin_of_motion(c, verdict, now);
+  if (verdict.against && !still_) {  // the rate was wrong, and so is what it was made of
+    begin(c);
+    rest_from_ = -DEPTH;
+  }
   still_ = verdict.still;
   const bool fixed = !still_ && on_axis(c);
   if (still_) arrivals_.clear();
@@ -181,20 +184,33 @@ void Frame::fit_start(const Constants& c, bool still) {
 }
 
 // First sample to run: the newest one, or where a turn began that is noticed now.
-long Frame::begin_of_motion(const Verdict& verdict, long now) {
+long Frame::begin_of_motion(const Constants& c, const Verdict& verdict, long now) {
   if (verdict.still) {
+    if (!still_) {
+      before_rest_ = first_.filter;
+      rest_from_ = now;
+    }
     if (now % EVERY == 0) kept_.keep(now, first_.filter);
     return now;
   }
   if (!still_) return now;
   moved_ = true;
-  const long first = kept_.nearest(now - verdict.depth, now);
-  if (first >= 0) {
+  long first = kept_.nearest(now - verdict.depth, now);
+  if (now - rest_from_ < DEPTH - EVERY && branches_ == 1) {  // so short that it was none
+    first = rest_from_;
+    first_.filter = before_rest_;
+  } else if (first >= 0) {
     first_.filter = *kept_.of(first);
-    taken_back_ += now - first;
   }
+  if (first >= 0) taken_back_ += now - first;
   kept_.clear();
+  if (noisier_) first_.filter.P.block<3, 3>(OMEGA, OMEGA) += late(c) * Matrix3::Identity();
   return first >= 0 ? first : now;
+}
+
+// A turn is noticed the later the more the axes scatter.
+double Frame::late(const Constants& c) const {
+  return c.tuning.unseen_rate * (watch_.noise().unnoticed() - 1.0);
 }
 
 // Does omega keep its direction? Not while omega' across it, summed over 16 or 64 samples, is more than

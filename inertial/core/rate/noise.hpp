@@ -22,6 +22,9 @@ class Noise {
   // Variances over the configured ones, at least 1: of omega' and c, and of p.
   double quiet() const { return std::max(quiet_.believed(QUIET_SLACK), heard_.believed(QUIET_SLACK)); }
   double force() const { return std::max(force_.believed(FORCE_SLACK), heard_.believed(FORCE_SLACK)); }
+  // Variance of what of a turn is not noticed yet, over that of axes as configured: it is seen by omega'
+  // and by p, and p may scatter so much that it shows nothing.
+  double unnoticed() const { return as_configured() ? 1.0 : quiet() * std::clamp(force() / quiet(), 2.4, 4.0); }
   // Do the axes scatter at all? Those of a model without noise do not.
   bool any() const { return quiet_.value > 0.05; }
   bool as_configured() const { return quiet() == 1.0 && force() == 1.0; }

@@ -49,7 +49,7 @@ class Watch {
   Measurement total(long sample) const { return ring_total.col((sample + TOTALS) % TOTALS); }
   Measurement mean_of(int window) const;
   // (m/s^2)^2 per s, by which biases of one axis wander more than is configured.
-  double wander() const { return 2.0 * walk.variance() * std::clamp(seconds - settled_s, 2.0, 20.0); }
+  double wander() const { return 2.0 * walk.possible() * std::clamp(seconds - settled_s, 2.0, 20.0); }
   Noise& noise() { return measured; }
   const Noise& noise() const { return measured; }
 
