@@ -127,8 +127,11 @@ bool Frame::settle_start(const Constants& c) {
 bool Frame::contradicted() {
   constexpr double FAR = 2.0;       // of NIS per degree of freedom, over a second
   constexpr double PATIENCE_S = 3.0;  // s
+  constexpr int NOT_DAMAGE = 10;      // samples in a row that the products of omega refuse
+  unused_ = said_.used ? 0 : unused_ + 1;
   against_s_ = agreement_.fast() > FAR ? against_s_ + dt_ : 0.0;
-  if (against_s_ < PATIENCE_S) return false;
+  if (against_s_ < PATIENCE_S && unused_ < NOT_DAMAGE) return false;
+  unused_ = 0;
   ++lost_;
   return true;
 }

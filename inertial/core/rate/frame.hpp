@@ -166,6 +166,7 @@ class Frame {
   int branches_ = 0;    // signs that are followed
   int fitted_ = 0;      // samples of a start while turning that is still being fitted
   int free_for_ = 0;    // samples for which the body is taken to turn freely
+  int unused_ = 0;      // samples in a row whose products were refused
   long unlike_ = 0;     // samples in a row whose force was refused
   long refused_ = 0;
   long refused_force_ = 0;

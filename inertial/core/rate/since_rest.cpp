@@ -39,8 +39,10 @@ void SinceRest::fold() {
 
 void SinceRest::coarsen() {
   for (int k = 0; k < MOST_BLOCKS / 2; ++k) {
-    blocks_[k] = blocks_[2 * k];
-    blocks_[k].add(blocks_[2 * k + 1]);
+    const Block* pair = &blocks_[k + k];
+    Block both = pair[0];
+    both.add(pair[1]);
+    blocks_[k] = both;
   }
   count_ = MOST_BLOCKS / 2;
   length_ *= 2;
