@@ -1,7 +1,7 @@
 """The Earth under a local navigation frame: WGS-84 radii, gravity, rates, places near by.
 
 Latitude L and longitude l in rad, ellipsoidal height h in m up, frame n = north-east-down at the
-vehicle. Numbers or arrays of one shape. Equations E-20 to E-22 of docs/equations-ins.md. The C++
+vehicle. Numbers or arrays of one shape. Equations E-100 to E-102 of docs/equations-ins.md. The C++
 twin, with the same bits, is core/common/earth.hpp.
 """
 
@@ -24,14 +24,14 @@ Place = tuple[float, float, float]  # latitude, longitude, rad; ellipsoidal heig
 
 
 def radii(L: ArrayLike) -> tuple[Array, Array]:
-    """Meridian and prime-vertical radius of curvature R_N, R_E, m (E-20)."""
+    """Meridian and prime-vertical radius of curvature R_N, R_E, m (E-100)."""
     s = sin(L)
     root = np.sqrt(1.0 - ECCENTRICITY2 * s * s)
     return SEMI_MAJOR_AXIS * (1.0 - ECCENTRICITY2) / (root * root * root), SEMI_MAJOR_AXIS / root
 
 
 def gravity(L: ArrayLike, h: ArrayLike) -> Array:
-    """Magnitude of normal gravity at height h, m/s^2, along +D (E-21)."""
+    """Magnitude of normal gravity at height h, m/s^2, along +D (E-101)."""
     s = sin(L)
     s2 = s * s
     surface = GRAVITY_EQUATOR * (1.0 + GRAVITY_FORMULA * s2) / np.sqrt(1.0 - ECCENTRICITY2 * s2)
@@ -41,14 +41,14 @@ def gravity(L: ArrayLike, h: ArrayLike) -> Array:
 
 
 def earth_rate(L: ArrayLike) -> tuple[Array, Array, Array]:
-    """omega_ie_n, rad/s (E-22)."""
+    """omega_ie_n, rad/s (E-102)."""
     return EARTH_RATE * cos(L), np.zeros(np.shape(L))[()], -EARTH_RATE * sin(L)
 
 
 def transport_rate(
     L: ArrayLike, h: ArrayLike, v_north: ArrayLike, v_east: ArrayLike
 ) -> tuple[Array, Array, Array]:
-    """omega_en_n, rad/s: n turns against the Earth because the vehicle moves over it (E-22)."""
+    """omega_en_n, rad/s: n turns against the Earth because the vehicle moves over it (E-102)."""
     R_N, R_E = radii(L)
     return v_east / (R_E + h), -v_north / (R_N + h), -v_east * tan(L) / (R_E + h)
 

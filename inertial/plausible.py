@@ -22,6 +22,8 @@ FAR = 0.12  # relative error of one g that no bias explains
 NEAR = 0.06  # relative distance at which a factor is named
 LONGEST_PERIOD_S = 0.25  # the slowest output rate of an ADXL345 is 6.25 Hz
 SHORTEST_PERIOD_S = 2e-5
+FROZEN = 100  # samples of a log in which no axis ever changes by a count
+REVERSED = 1.0  # rad^2/s^2, of a squared rate below zero that no noise explains
 TURNING = 0.02  # rad, of gravity over a window; less tells nothing of a rate's unit
 ALIKE = 0.7  # correlation of both turns, below which acceleration rules
 FASTEST_GYRO = 70.0  # rad/s, 4000 deg/s: beyond what such gyroscopes measure
@@ -96,6 +98,40 @@ def doubt_of_gravity(f_b: Array, lsb_mg: float | None = None) -> Doubt | None:
     if abs(ratio * 1e-3 - 1.0) <= FAR or abs(ratio * 1e-3 * GRAVITY - 1.0) <= FAR:
         return Doubt("gravity", f"{found}: these look like mg; name the columns _mg")
     return Doubt("gravity", f"{found}: check the unit and the scale of the axes")
+
+
+def doubt_of_frozen(values: Array) -> Doubt | None:
+    """Does anything ever change? values (n, m) as read; a real sensor has noise."""
+    if len(values) < FROZEN or np.any(values != values[0]):
+        return None
+    return Doubt(
+        "frozen",
+        f"all {values.shape[1]} columns read the same in all {len(values)} samples: frozen or stale"
+        " data, which say nothing of a rate; check the logger",
+    )
+
+
+def doubt_of_sense(square: Array) -> Doubt | None:
+    """Is the squared rate (n,), rad^2/s^2, that the axes show below zero where the body turns?
+
+    Against the log's beginning, which is at rest: offsets of the axes drop out.
+    """
+    n = len(square) // WINDOW
+    if n < 4:
+        return None
+    mean = square[: n * WINDOW].reshape(n, WINDOW).mean(axis=1)
+    mean = mean - mean[0]
+    steps = np.abs(np.diff(square))
+    noise = 1.05 * float(np.median(steps)) / math.sqrt(WINDOW)  # one sigma of a window
+    low, high = (float(q) for q in np.quantile(mean, [0.05, 0.95]))
+    if -low < max(REVERSED, 6.0 * noise) or high > -0.25 * low:
+        return None
+    return Doubt(
+        "sense",
+        f"the squared rate that the axes show falls by {-low:.3g} rad^2/s^2 from the log's"
+        " beginning and hardly rises, which no rotation from rest does: axes of the wrong sign,"
+        " turned or mixed sensors, or a log that begins while turning; do not trust its rates",
+    )
 
 
 def doubt_of_rate(t_s: Array, f_b: Array, omega_b: Array) -> Doubt | None:

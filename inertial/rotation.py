@@ -6,7 +6,7 @@
     roll pitch yaw  -> euler_matrix, euler_angles <- matrix   rad, the z-y-x sequence
 
 q_nb and C_nb turn a vector of b into n; n is north-east-down. All take stacks over the leading
-axes. Equations E-10 to E-12 of docs/equations.md, E-23 and E-35 of docs/equations-ins.md. The C++
+axes. Equations E-10 to E-12 of docs/equations.md, E-103 and E-115 of docs/equations-ins.md. The C++
 twin, with the same bits, is core/common/rotation.hpp.
 """
 
@@ -125,7 +125,7 @@ def rotation_vector(C: ArrayLike) -> Array:
 
 
 def euler_matrix(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Array:
-    """C_nb (..., 3, 3) = Rz(yaw) Ry(pitch) Rx(roll), rad (E-23)."""
+    """C_nb (..., 3, 3) = Rz(yaw) Ry(pitch) Rx(roll), rad (E-103)."""
     cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (cos, sin))
     return _matrix(
         [
@@ -167,7 +167,7 @@ def level(f_b: ArrayLike) -> Array:
 
 
 def roll_pitch(f_b: ArrayLike) -> tuple[Array, Array]:
-    """Roll and pitch, rad, of a body at rest that feels f_b (..., 3) (E-35)."""
+    """Roll and pitch, rad, of a body at rest that feels f_b (..., 3) (E-115)."""
     x, y, z = _parts(f_b)
     return atan2(-y, -z), atan2(x, np.sqrt(y * y + z * z))
 

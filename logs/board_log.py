@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 
 from inertial.layouts.catalogue import CUBE
 from inertial.navigation.fix import Fix
-from inertial.plausible import doubt_of_gravity, doubt_of_rate
+from inertial.plausible import doubt_of_frozen, doubt_of_gravity, doubt_of_rate, doubt_of_sense
 from inertial.timing import Timing
-from logs.cube_log import LSB_MG, centre_force, read_log
+from logs.cube_log import LSB_MG, centre_force, read_log, squared_rate
 from logs.drive_log import IMU, read_fixes
 from logs.quantities import read_si, refuse, said_of, timing_of
 from logs.sheet import LogError, Sheet, open_sheet
@@ -130,8 +130,15 @@ def _cube(path: Path, as_named: bool, lsb_mg: float) -> BoardLog:
             f"{path}: column '{CUBE_AXES[column]}_counts' at {log.t_s[row]:.3f} s:"
             f" {counts[row, column]}; want a whole number of 16 bits"
         )
-    doubt = doubt_of_gravity(centre_force(log.f_axis, CUBE(HALF_SIDE)), lsb_mg)
-    notes = refuse(path, [doubt], as_named) + said_of(path, log.timing, log.cut_off)
+    shape = CUBE(HALF_SIDE)
+    doubts = [
+        doubt_of_frozen(log.f_axis),
+        doubt_of_gravity(centre_force(log.f_axis, shape), lsb_mg),
+    ]
+    notes = refuse(path, doubts, as_named) + said_of(path, log.timing, log.cut_off)
+    square = squared_rate(log.f_axis, shape)
+    if square is not None and (doubt := doubt_of_sense(square)):
+        notes.append(doubt.text)
     return BoardLog(
         path,
         "cube",

@@ -15,7 +15,7 @@ from inertial.calibration.card import Card, read_card
 from inertial.constants import GRAVITY
 from inertial.layouts.catalogue import find
 from inertial.layouts.layout import GeometryError, Layout
-from inertial.plausible import doubt_of_gravity
+from inertial.plausible import doubt_of_frozen, doubt_of_gravity, doubt_of_sense
 from inertial.rate import resolved
 from inertial.rate.batch import RateColumns
 from inertial.rate.beliefs import make
@@ -24,7 +24,7 @@ from inertial.rate.names import LEADER
 from inertial.rate.sight import BLIND
 from inertial.rate.tachometer import SUFFIX
 from logs.cube_axes import agreement, axes_of, moving
-from logs.cube_log import CubeLog, centre_force, read_log
+from logs.cube_log import CubeLog, centre_force, read_log, squared_rate
 from logs.cube_parts import Monitored, Part, cut, monitored
 from logs.cube_run import EstimatorRun, reference
 from logs.cube_score import bound_of, notes_of, score
@@ -78,8 +78,16 @@ def run_cube(
     data = read_log(log, shape.axis_names, lsb_mg)
     used = read_card(card) if card is not None else None
     doubtful = refuse(
-        log, [doubt_of_gravity(centre_force(data.f_axis, shape), _lsb(data))], units_as_named
+        log,
+        [
+            doubt_of_frozen(data.f_axis),
+            doubt_of_gravity(centre_force(data.f_axis, shape), _lsb(data)),
+        ],
+        units_as_named,
     )
+    square = squared_rate(data.f_axis, shape)
+    if square is not None and (doubt := doubt_of_sense(square)):
+        doubtful.append(doubt.text)
     if tacho_aid and data.tacho is None:
         raise LogError(f"--tacho-aid: {log} has no column tacho_rad_s")
     lean = plot is None and not resolve

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.constants import GRAVITY
-from inertial.layouts.layout import Layout
+from inertial.layouts.layout import PRODUCTS, Layout
 from inertial.timing import Timing
 from logs.quantities import UNITS, column_of, in_range, timing_of
 from logs.sheet import LogError, Sheet, Table, open_sheet
@@ -131,6 +131,16 @@ def centre_force(f_axis: Array, shape: Layout) -> Array:
     """
     J = np.column_stack([np.cross(shape.r_b, shape.theta_b), shape.theta_b])
     return (f_axis * np.array(shape.gain)) @ np.linalg.pinv(J).T[:, 3:]
+
+
+def squared_rate(f_axis: Array, shape: Layout) -> Array | None:
+    """|omega|^2 (n,), rad^2/s^2, as axes (n, m) show it in any motion (E-4); None where a layout
+    does not see all products.
+    """
+    if shape.rank < 12:
+        return None
+    squares = shape.field_inverse[6:][np.equal(*PRODUCTS)]
+    return (f_axis * np.array(shape.gain)) @ squares.sum(axis=0)
 
 
 def _digest(path: Path) -> str:

@@ -14,7 +14,7 @@ from inertial.toml_file import MARKS
 FIRST_LOOK = 1 << 16  # bytes in which the header must stand
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar"}
 COMMENTS = ("#", "%", "//")
-MISSING = ["", "NA", "N/A", "na", "nan", "NaN", "NAN", "null", "-"]
+MISSING = ["", "NA", "N/A", "na", "nan", "NaN", "NAN", "null", "NULL", "None", "-", "--"]
 LINE = 1 << 20  # bytes of the longest line, read at once
 SHAPES = {
     stat.S_IFDIR: "a folder",

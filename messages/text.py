@@ -24,6 +24,10 @@ LONGEST = 500  # characters of one text that are shown
 MARKS = 4  # combining marks on one character; Vietnamese needs two, Hebrew with accents four
 JOINERS = "\u200c\u200d"  # Persian and joined emoji need them, between characters of their own kind
 EXECUTED = "=+-@\t\r\n\uff1d\uff0b\uff0d\uff20"  # what begins a formula; the last four are wide
+# other spreadsheets begin a new cell at these, also in the middle of a text
+_NEXT_CELL = re.compile(
+    rf"(?s:(?<=.[;\t\n\r]))([\s\"']*)(?=[{re.escape(EXECUTED[:4] + EXECUTED[7:])}])"
+)
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
 
 
@@ -127,7 +131,8 @@ def cell(value: object) -> object:
     if not isinstance(value, str) or _NUMBER.fullmatch(value):
         return value
     shown = "".join(f"<U+{ord(c):04X}>" if acts(c) and c not in "\t\n\r" else c for c in value)
-    return f"'{shown}" if value.lstrip(" \u00a0")[:1] in (*EXECUTED,) else shown
+    shown = _NEXT_CELL.sub(r"\1'", shown)
+    return f"'{shown}" if value.lstrip(" \u00a0\u3000")[:1] in (*EXECUTED,) else shown
 
 
 FORBIDDEN_IN_FILES = re.compile(r'[/\\:*?"<>|]')  # by the file systems of others

@@ -1,7 +1,7 @@
 """Initial alignment: roll, pitch and gyro bias from standstill, heading from the course once the
 vehicle moves.
 
-A vehicle that never stands is aligned under way (alignment_motion.py). Equations E-35 and E-36 of
+A vehicle that never stands is aligned under way (alignment_motion.py). Equations E-115 and E-116 of
 docs/equations-ins.md (inmotion-alignment, section 10).
 """
 
@@ -292,7 +292,7 @@ class Alignment:
 
     def heading(self, C_then: Array, v_n: Array) -> Array | None:
         """C_nb (3, 3) with the heading of the course v_n (3,); C_then is C at that time. None: too
-        slow (E-36).
+        slow (E-116).
         """
         if not self.levelled or norm(v_n[:2]) < self.settings.course_speed:
             return None

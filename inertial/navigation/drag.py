@@ -1,5 +1,5 @@
 """A GNSS position that walks off slowly, unseen by a gate for jumps: the receiver's own velocity
-tells. E-52, E-53.
+tells. E-132, E-133.
 
 A position that is dragged by some decimetres a second looks like a drive to a filter: each fix
 alone is plausible. But the receiver measures its velocity by Doppler shift, apart from its

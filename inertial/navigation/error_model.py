@@ -3,7 +3,7 @@
 Error state, error = computed - true, positions in metres, with its segments:
     psi_n (3, rad)  dv_n (3, m/s)  dN dE dh (m)  B (3, m/s^2)  D (3, rad/s)
 with C_true = Exp(psi) C_computed, B and D what is left of the biases after the current estimates.
-Further states stand at the end where a filter asks for them. Equations E-26 to E-31 of
+Further states stand at the end where a filter asks for them. Equations E-106 to E-111 of
 docs/equations-ins.md; inertial/core/navigation/ carries them, and each entry is tested against
 finite differences of the mechanisation.
 """
@@ -36,14 +36,15 @@ class ImuNoise:
     sigma_bias_accel: float = 0.03  # m/s^2, Gauss-Markov
     sigma_bias_gyro: float = math.radians(0.05)  # rad/s, Gauss-Markov
     tau: float = 300.0  # s, of both
-    # share of the readings' shaking from sample to sample that is noise to navigation (E-51)
+    # share of the readings' shaking from sample to sample that is noise to navigation (E-131)
     shake: float = 1.0
-    turn: float = 0.007  # of 1, scale and cross-axis errors of the gyros (E-59)
+    turn: float = 0.007  # of 1, scale and cross-axis errors of the gyros (E-139)
+    cross: float = 0.005  # of 1, cross-axis errors alone: where scale errors are states
     turn_length: float = 5.0  # s, over which a turn keeps its direction
     position: float = 1e-3  # m/sqrt(s), keeps the position covariance from closing completely
 
     def density(self) -> Array:
-        """(15,): diagonal of the noise density G (E-29)."""
+        """(15,): diagonal of the noise density G (E-109)."""
         psi, v, p = self.gyro**2, self.accel**2, self.position**2
         ba = 2.0 / self.tau * self.sigma_bias_accel**2
         bg = 2.0 / self.tau * self.sigma_bias_gyro**2
@@ -70,6 +71,6 @@ def make_model(noise: ImuNoise, scale: bool = False, lag: bool = False, car: boo
         density=np.concatenate([noise.density(), extra]),
         decay=np.concatenate([noise.decay(), extra]),
         shake=noise.shake,
-        turn=noise.turn**2 * noise.turn_length,
+        turn=(noise.cross if scale else noise.turn) ** 2 * noise.turn_length,
         **places,
     )

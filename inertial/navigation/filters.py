@@ -24,7 +24,7 @@ WINDOWS = {"none": 0, "predictive": 1, "robust": 2}
 @dataclass(frozen=True)
 class Trial:
     """When the data agree with the wheels: a filter with their constraint and one without differ by
-    no more than they may (E-54 to E-56).
+    no more than they may (E-134 to E-136).
     """
 
     memory: float = 10.0  # s of motion over which the difference is averaged
@@ -104,6 +104,8 @@ class FilterConfig:
     latency: bool = False  # of the receiver's position and velocity, as states
     sigma_latency: tuple[float, float] = (0.05, 0.1)  # s, position, velocity
     constraints: Constraints = Constraints()
+    # m/s^2 and rad/s, by which a bias may have changed where innovations last (E-141)
+    jump: tuple[float, float] = (0.0, 0.0)
     gated: bool = True  # refuse fixes beyond FixSettings.gate
 
     low_weight: float = 0.2  # of a fix that a robust filter hardly believes
@@ -140,6 +142,8 @@ class FilterConfig:
             wander=fix.wander,
             lag=fix.lag,
             adapt=fix.adapt,
+            jump_accel=self.jump[0],
+            jump_gyro=self.jump[1],
             rules=self.constraints.core(),
             tries=self.constraints.car and self.constraints.tried,
             trial=self.constraints.trial.core(),
@@ -161,11 +165,12 @@ class FilterConfig:
 
 
 _CAR = Constraints(car=True, standstill=True)
-_ROBUST = FilterConfig(huber=2.5, latency=True)
+_JUMP = (0.3, math.radians(0.3))
+_ROBUST = FilterConfig(huber=2.5, latency=True, jump=_JUMP)
 
 FILTERS: dict[str, FilterConfig] = {
     "kf": FilterConfig(),
-    "kf-nhc": FilterConfig(latency=True, constraints=_CAR),
+    "kf-nhc": FilterConfig(latency=True, constraints=_CAR, jump=_JUMP),
     "kf-fading": FilterConfig(fading=1.05),
     "kf-scale": FilterConfig(scale=True, latency=True),
     "kf-latency": FilterConfig(latency=True),

@@ -108,9 +108,9 @@ class FixSettings:
     )  # m/s: a receiver's velocity lags in turns
     floor_yaw: float = 0.005  # rad, of a heading by two antennas
     timing: float = 0.002  # s, of the fix's time against the samples' clock: counts with the speed
-    wander: float = 0.75  # of its sigma wanders slowly and does not average out (E-58)
+    wander: float = 0.75  # of its sigma wanders slowly and does not average out (E-138)
     lag: float = 0.05  # s, its position is older than it says, where a filter does not estimate it
-    adapt: float = 0.05  # of the newest fix in what is known of its noise (E-57)
+    adapt: float = 0.05  # of the newest fix in what is known of its noise (E-137)
     false_alarm: float = (
         1e-6  # chance that the NIS gate refuses a good fix of a filter whose model is right
     )
@@ -152,7 +152,7 @@ def typical_sigma(quality: int) -> tuple[Array, Array]:
 
 
 def core_fix(fix: Fix, settings: FixSettings) -> Any:
-    """The fix as the core's filters take it, its sigmas floored (E-31). A height or a vertical
+    """The fix as the core's filters take it, its sigmas floored (E-111). A height or a vertical
     speed that is unknown stays NaN: its row is silent.
     """
     given: dict[str, Any] = {}

@@ -1,5 +1,5 @@
 """The fuzzy horizon: how hard the vehicle moves decides how many fixes the predictive estimator
-looks back. E-48, E-49.
+looks back. E-128, E-129.
 
 Sets S, M, H on |f| and |w|, nine rules, singleton consequents. Break points and rules stand in
 fuzzy_horizon.toml beside this module, which people may edit; RULES is what it says.
@@ -110,10 +110,10 @@ def memberships(force: float, rate: float, rules: FuzzyRules = RULES) -> list[fl
 
 
 def horizon(force: float, rate: float, rules: FuzzyRules = RULES) -> float:
-    """1 + No, not yet rounded, from |f| in m/s^2 and |w| in rad/s (E-49)."""
+    """1 + No, not yet rounded, from |f| in m/s^2 and |w| in rad/s (E-129)."""
     return core.crisp_horizon(force, rate, rules.core())
 
 
 def fixes(crisp: float) -> int:
-    """N: the horizon rounded half up, 2 to 10 fixes (E-49)."""
+    """N: the horizon rounded half up, 2 to 10 fixes (E-129)."""
     return core.whole_horizon(crisp)

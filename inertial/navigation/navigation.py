@@ -79,7 +79,7 @@ class Navigator:
         return self._live.head.x
 
     def covariance(self) -> Array:
-        """(n, n) at the newest sample, with what wanders in the receiver's position (E-58)."""
+        """(n, n) at the newest sample, with what wanders in the receiver's position (E-138)."""
         head = self._live.head
         P = head.covariance(self._live.model)
         P[DP, DP] += np.diag(head.receiver.wander)

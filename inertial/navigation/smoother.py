@@ -1,5 +1,5 @@
 """Offline: all fixes for every moment of a drive. Rauch, Tung and Striebel's smoother, and a robust
-one. E-46, E-50.
+one. E-126, E-130.
 
 The forward pass is the filter of the name; each fix, used or not, and each constraint that held is
 an event at which Phi, both covariances and the correction c are kept. Going back, the error left in
@@ -109,7 +109,7 @@ def smooth_drive(
 
 def _doubted(fix: Any, left: Array) -> Any:
     """The core's fix, its sigmas raised by Cauchy weights 1 / (1 + (d / CAUCHY)^2) of the smoothed
-    residuals left (7,) (E-50).
+    residuals left (7,) (E-130).
     """
     if fix.withheld:
         return fix

@@ -1,5 +1,5 @@
 """When a vehicle counts as standing, as moving, and what a standstill tells: gravity and the gyro's
-bias. E-35.
+bias. E-115.
 """
 
 import math

@@ -117,7 +117,10 @@ def test_gap_in_the_log_is_a_gap_in_the_index(tmp_path):
 def test_cube_log_with_table_rate(tmp_path):
     header = ",".join((*CUBE, "tacho_rad_s")) + "\n"
     rows = "".join(f"{k / 100},{','.join(REST)},{3.0 if k < 100 else -3.0}\n" for k in range(200))
-    log = read_board_log(write(tmp_path / "cube.csv", "# a comment\n" + header + rows))
+    path = write(tmp_path / "cube.csv", "# a comment\n" + header + rows)
+    with pytest.raises(LogError, match="frozen or stale"):
+        read_board_log(path)
+    log = read_board_log(path, units_as_named=True)
     assert log.kind == "cube"
     wire = Wire()
     board = VirtualBoard(wire, PLAYED, sample_period_s=log.timing.period_s)

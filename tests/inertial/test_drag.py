@@ -1,5 +1,5 @@
 """A GNSS position that walks off slowly: found by the receiver's own velocity, said, and believed
-less. E-52, E-53.
+less. E-132, E-133.
 """
 
 import math

@@ -5,8 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inertial.plausible import doubt_of_gravity, doubt_of_rate, doubt_of_time
+from inertial.layouts.catalogue import CUBE
+from inertial.plausible import (
+    doubt_of_frozen,
+    doubt_of_gravity,
+    doubt_of_rate,
+    doubt_of_sense,
+    doubt_of_time,
+)
 from inertial.rotation import from_rotation_vector, multiply, to_matrix
+from logs.cube_log import squared_rate
 
 G = 9.80665
 
@@ -61,3 +69,26 @@ def test_a_period_says_which_unit_the_times_have(period, word):
     doubt = doubt_of_time(period)
     assert (doubt is None) if word is None else (word in doubt.text)
     assert "t_ms" in doubt_of_time(12.0).text
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(st.integers(0, 2**32 - 1))
+def test_axes_of_the_wrong_sign_are_doubted_and_right_ones_are_not(seed):
+    rng = np.random.default_rng(seed)
+    shape = CUBE(rng.choice([0.02, 0.05, 0.15]))
+    t = np.arange(0.0, 15.0, rng.choice([0.01, 0.02]))
+    rate = rng.uniform(3.0, 9.0) * np.clip((t - 2.0) / 3.0, 0.0, 1.0)
+    axis = rng.normal(size=3)
+    omega = rate[:, None] * axis / np.linalg.norm(axis)
+    f = np.array([shape.J[:, 3:] @ [0.0, 0.0, 9.81] + shape.quadratic(w) for w in omega])
+    f += rng.normal(0.0, 0.04, f.shape) + rng.normal(0.0, 0.1, f.shape[1])
+    assert doubt_of_sense(squared_rate(f, shape)) is None
+    doubt = doubt_of_sense(squared_rate(-f, shape))
+    assert doubt is not None and "wrong sign" in doubt.text
+
+
+def test_a_log_in_which_nothing_ever_changes_is_doubted():
+    frozen = np.tile(np.arange(12.0), (300, 1))
+    assert "frozen" in doubt_of_frozen(frozen).text
+    frozen[200, 3] += 1.0
+    assert doubt_of_frozen(frozen) is None

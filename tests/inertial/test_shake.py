@@ -1,5 +1,5 @@
 """Noise that the readings themselves show: an axis that vibrates is believed less, and only that
-axis. E-51.
+axis. E-131.
 """
 
 import math

@@ -7,7 +7,7 @@ import pytest
 from support.estimator_drive import drive, exact
 
 from inertial.navigation.batch import run_filters
-from inertial.navigation.filters import FILTERS
+from inertial.navigation.filters import DEFAULT, FILTERS
 from inertial.navigation.smoother import smooth_drive
 from inertial.simulation.drive import simulate
 
@@ -48,6 +48,20 @@ def test_a_fading_filter_forgets_a_bias_that_jumped() -> None:
     after = plain.t > 152.0
     error = {name: rms((run.x["v_n"] - town.truth.v_n[rows])[after]) for name, run in runs.items()}
     assert error["kf-fading"] < 0.9 * error["kf"]
+
+
+def test_the_default_doubts_itself_and_not_the_receiver_when_a_bias_jumped() -> None:
+    town = simulate(2, "H2", 200.0)
+    deaf = replace(FILTERS[DEFAULT], jump=(0.0, 0.0))
+    runs = run_filters(town.imu, town.fixes, {"default": FILTERS[DEFAULT], "deaf": deaf})
+    run = runs["default"]
+    rows = [town.row_of(t) for t in run.t]
+    error = {name: r.x["v_n"] - town.truth.v_n[rows] for name, r in runs.items()}
+    after, found = run.t > 152.0, run.t > 160.0
+    assert rms(error["default"][after]) < 0.6 * rms(error["deaf"][after])
+    variance = np.diagonal(run.P, axis1=1, axis2=2)[:, 3:6]
+    assert np.mean(error["default"][found] ** 2 / variance[found]) < 2.0
+    assert run.leg.receiver.velocity < 2.0
 
 
 def test_the_robust_smoother_is_not_drawn_by_gross_fixes() -> None:

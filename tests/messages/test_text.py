@@ -141,3 +141,10 @@ def test_a_path_is_no_file_name(bad):
 )
 def test_cells(value, wanted):
     assert text.cell(value) == wanted
+
+
+@pytest.mark.parametrize("mark", ["=", "+", "-", "@", "\uff1d"])
+@pytest.mark.parametrize("before", ["a;", "a; ", 'a;"', "a\t", "a\n"])
+def test_a_formula_behind_another_spreadsheets_separator_is_text(before, mark):
+    assert text.cell(f"{before}{mark}cmd()") == f"{before}'{mark}cmd()"
+    assert text.cell("a; b - c = d") == "a; b - c = d"

@@ -61,6 +61,35 @@ def test_the_guide_names_a_way_for_frame_estimator_and_panel():
         assert len(NAMED.findall(part)) >= 6, heading
 
 
+DEFINED = re.compile(r"^(?:\| |\()(E-\d+)(?: \||\))", re.MULTILINE)
+
+
+def test_an_equation_has_one_number_and_a_number_one_equation():
+    """The code cites numbers alone, so that each must lead to one place."""
+    places: dict[str, list[str]] = {}
+    for page in sorted((ROOT / "docs").glob("equations*.md")):
+        for number in DEFINED.findall(page.read_text(encoding="utf-8")):
+            places.setdefault(number, []).append(page.name)
+    assert len(places) > 100
+    assert {n: pages for n, pages in places.items() if len(pages) > 1} == {}
+
+
+def test_an_equation_that_the_code_cites_is_written_down():
+    known = {
+        number
+        for page in (ROOT / "docs").glob("equations*.md")
+        for number in re.findall(r"\bE-\d+\b", page.read_text(encoding="utf-8"))
+    }
+    sources = [p for kind in ("py", "hpp", "cpp") for p in (ROOT / "inertial").rglob(f"*.{kind}")]
+    cited = {
+        (number, path.relative_to(ROOT).as_posix())
+        for path in sources
+        for number in re.findall(r"\bE-\d+\b", path.read_text(encoding="utf-8"))
+    }
+    assert len(cited) > 100
+    assert sorted(c for c in cited if c[0] not in known) == []
+
+
 COMMAND = re.compile(r"(?:^|`|    |\.venv/bin/)gyrofree ([a-z][^`\n#]*)", re.MULTILINE)
 
 

@@ -1,4 +1,4 @@
-// The Earth under a local navigation frame: WGS-84 radii, gravity, rates, places near by (E-20 to E-22
+// The Earth under a local navigation frame: WGS-84 radii, gravity, rates, places near by (E-100 to E-102
 // of docs/equations-ins.md). numpy twin, with the same bits: inertial/earth.py.
 #pragma once
 
@@ -30,14 +30,14 @@ struct Radii {
   double east = 0.0;   // R_E, m, of the prime vertical
 };
 
-// Radii of curvature (E-20).
+// Radii of curvature (E-100).
 inline Radii radii(double latitude) {
   const double s = elementary::sin(latitude);
   const double root = std::sqrt(1.0 - ECCENTRICITY2 * s * s);
   return {SEMI_MAJOR_AXIS * (1.0 - ECCENTRICITY2) / (root * root * root), SEMI_MAJOR_AXIS / root};
 }
 
-// Magnitude of normal gravity at a height, m/s^2, along +D (E-21).
+// Magnitude of normal gravity at a height, m/s^2, along +D (E-101).
 inline double gravity(double latitude, double height) {
   const double s = elementary::sin(latitude);
   const double s2 = s * s;
@@ -47,12 +47,12 @@ inline double gravity(double latitude, double height) {
   return surface * (1.0 - 2.0 * part * slope + 3.0 * part * part);
 }
 
-// omega_ie_n, rad/s (E-22).
+// omega_ie_n, rad/s (E-102).
 inline Vector3 earth_rate(double latitude) {
   return {RATE * elementary::cos(latitude), 0.0, -RATE * elementary::sin(latitude)};
 }
 
-// omega_en_n, rad/s: n turns against the Earth because the vehicle moves over it (E-22).
+// omega_en_n, rad/s: n turns against the Earth because the vehicle moves over it (E-102).
 inline Vector3 transport_rate(double latitude, double height, double v_north, double v_east) {
   const Radii r = radii(latitude);
   return {v_east / (r.east + height), -v_north / (r.north + height),

@@ -1,5 +1,5 @@
 // Rotations: quaternions w x y z of unit length, direction cosine matrices C_nb, rotation vectors,
-// Euler angles (E-10 to E-12 of docs/equations.md, E-23 and E-35 of docs/equations-ins.md).
+// Euler angles (E-10 to E-12 of docs/equations.md, E-103 and E-115 of docs/equations-ins.md).
 // numpy twin, with the same bits: inertial/rotation.py.
 #pragma once
 
@@ -115,7 +115,7 @@ struct EulerAngles {
   double yaw = 0.0;
 };
 
-// C_nb = Rz(yaw) Ry(pitch) Rx(roll) (E-23).
+// C_nb = Rz(yaw) Ry(pitch) Rx(roll) (E-103).
 inline Matrix3 euler_matrix(const EulerAngles& a) {
   const double cr = elementary::cos(a.roll), sr = elementary::sin(a.roll);
   const double cp = elementary::cos(a.pitch), sp = elementary::sin(a.pitch);
@@ -151,7 +151,7 @@ inline std::optional<Quaternion> level(const Vector3& f_b) {
   return from_matrix(C);
 }
 
-// Roll and pitch of a body at rest that feels f_b; yaw 0 (E-35).
+// Roll and pitch of a body at rest that feels f_b; yaw 0 (E-115).
 inline EulerAngles roll_pitch(const Vector3& f_b) {
   return {elementary::atan2(-f_b.y(), -f_b.z()),
           elementary::atan2(f_b.x(), std::sqrt(f_b.y() * f_b.y() + f_b.z() * f_b.z())), 0.0};

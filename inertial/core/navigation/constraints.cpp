@@ -42,7 +42,7 @@ bool turns(const Vector3& mean_omega, const Vector3& bias, double limit) {
   return false;
 }
 
-// Zero velocity, and what is left of the gyro's bias (E-41).
+// Zero velocity, and what is left of the gyro's bias (E-121).
 Measurement standstill(const Leg& leg, const Model& model, const Rules& rules) {
   const Tick& last = leg.ticks.back();
   Measurement z(STILL_ROWS, model.states);
@@ -55,7 +55,7 @@ Measurement standstill(const Leg& leg, const Model& model, const Rules& rules) {
   return z;
 }
 
-// The rear axle does not slide sideways and does not leave the ground (E-40). No rows: too slow for
+// The rear axle does not slide sideways and does not leave the ground (E-120). No rows: too slow for
 // the wheels to tell, or too fast a turn for the tyres.
 Measurement wheels(const Leg& leg, const Model& model, const Rules& rules) {
   const Nominal& x = leg.x;

@@ -1,5 +1,5 @@
 // What a car's wheels say: no sideways or vertical speed under way, no speed and no rate at
-// standstill (E-40, E-41). All limits and sigmas are data.
+// standstill (E-120, E-121). All limits and sigmas are data.
 #pragma once
 
 #include "navigation/update.hpp"
@@ -28,7 +28,7 @@ struct Rules {
   }
 };
 
-// Does the last second look like a standstill: quiet readings, no turn, no speed? (E-41)
+// Does the last second look like a standstill: quiet readings, no turn, no speed? (E-121)
 bool standing(const Leg& leg, const Rules& rules);
 // What holds now; no rows: nothing.
 Measurement constraint(const Leg& leg, const Model& model, const Rules& rules);

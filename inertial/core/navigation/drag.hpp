@@ -1,4 +1,4 @@
-// The difference of a receiver's position and its integrated velocity, and how it walks off (E-52).
+// The difference of a receiver's position and its integrated velocity, and how it walks off (E-132).
 #pragma once
 
 #include "common/matrix.hpp"
@@ -16,7 +16,7 @@ struct DragFilter {
   // y. False, and nothing done, when the sum of the squared normalised innovations is above the gate.
   bool look(double dt, const Vector<6>& noise, const Vector3& y, const Vector3& speed, const Vector3& white,
             double gate);
-  // Squared drag in its own sigmas (E-53), 3 degrees of freedom.
+  // Squared drag in its own sigmas (E-133), 3 degrees of freedom.
   double statistic() const;
 
   template <class Self, class Visitor>

@@ -5,6 +5,7 @@
 
 #include "common/elementary.hpp"
 #include "navigation/local_earth.hpp"
+#include "navigation/receiver.hpp"
 
 namespace gyrofree::navigation {
 namespace {
@@ -41,34 +42,7 @@ void answer(FixResult& out, const Leg& leg, const Covariance& P, Status status) 
   for (int i = 0; i < 3; ++i) out.P(DP + i, DP + i) += leg.receiver.wander(i);
 }
 
-// R by what the fixes before have shown (E-57).
-void raise(Measurement& z, const Receiver& receiver) {
-  for (const auto& [group, first, size] : blocks_of(z.rows())) {
-    if (group == POSITION) z.R.block(first, first, size, size) *= receiver.position;
-    if (group == VELOCITY) z.R.block(first, first, size, size) *= receiver.velocity;
-  }
-}
-
-constexpr double MOST_NEWS = 4.0;     // NIS per row that one fix may show: a gross one is no noise
-constexpr double MOST_NOISE = 1000.0;
-
-void follow(double& noise, double nis_per_row, double adapt) {
-  const double news = std::min(nis_per_row, MOST_NEWS) - 1.0;
-  noise = std::clamp(noise * (1.0 + adapt * news), 1.0, MOST_NOISE);
-}
-
-// What this fix shows of the receiver's noise: by S before it is used.
-void learn(Receiver& receiver, const Measurement& z, const RowMatrix& S, double adapt) {
-  for (const auto& [group, first, size] : blocks_of(z.rows())) {
-    int said = 0;
-    for (int r = first; r < first + size; ++r) said += is_silent(z, r) ? 0 : 1;
-    if (said == 0 || group == HEADING) continue;
-    const double nis = whiten(S.block(first, first, size, size), z.y.segment(first, size)).nis;
-    if (nis >= 0.0) follow(group == POSITION ? receiver.position : receiver.velocity, nis / said, adapt);
-  }
-}
-
-// Quiet readings are a standstill only where the fixes' velocities say so too (E-60).
+// Quiet readings are a standstill only where the fixes' velocities say so too (E-140).
 void check_standstill(Leg& leg, const Fix& fix) {
   constexpr double SHARE = 0.2, MOST = 25.0;
   if (leg.quiet && fix.has_v) {
@@ -84,7 +58,7 @@ void check_standstill(Leg& leg, const Fix& fix) {
   leg.quiet = false;
 }
 
-// The error that all its fixes have in common for a while (E-58).
+// The error that all its fixes have in common for a while (E-138).
 void remember_wander(Leg& leg, const Model& model, const Settings& s, const Fix& fix) {
   const double lag = model.has_lag() ? 0.0 : s.lag;
   for (int i = 0; i < 3; ++i) {
@@ -248,6 +222,7 @@ namespace {
 // Sample k is the one that reaches over the fix.
 FixResult take_one(Leg& leg, const Model& model, const Settings& settings, Memory& memory, Samples samples,
                    std::size_t k, std::size_t stop, const Fix& fix) {
+  open_biases(leg, settings.jump_accel, settings.jump_gyro);
   Leg trial = leg;
   run_to(trial, model, settings.rules, samples, k, std::min(k + 1, stop), fix.t);
   FixResult out = take(trial, model, settings, memory, fix, samples[std::min(k, stop - 1)].omega_b);

@@ -1,4 +1,4 @@
-// What a filter does with one fix, and the run over many samples and fixes (E-32 to E-47).
+// What a filter does with one fix, and the run over many samples and fixes (E-112 to E-127).
 #pragma once
 
 #include <span>
@@ -35,9 +35,11 @@ struct Settings {
   int passes = 0;           // of reweighting in the robust horizon
   bool literal = false;     // fuzzy inputs as read, not conditioned
   FuzzyRules fuzzy;
-  double wander = 0.0;      // share of a receiver's sigma that wanders and does not average out (E-58)
+  double wander = 0.0;      // share of a receiver's sigma that wanders and does not average out (E-138)
   double lag = 0.0;         // s, of a receiver's position where the filter does not estimate it
-  double adapt = 0.0;       // share of the newest fix in what is known of the receiver's noise (E-57)
+  double adapt = 0.0;       // share of the newest fix in what is known of the receiver's noise (E-137)
+  double jump_accel = 0.0;  // m/s^2, by which a bias may have changed where innovations last (E-141)
+  double jump_gyro = 0.0;   // rad/s
   Rules rules;
   bool tries = false;       // wheels are believed only while the data agree
   TrialSettings trial;
@@ -49,6 +51,7 @@ struct Settings {
     v("low_weight", s.low_weight), v("window", s.window), v("horizon", s.horizon);
     v("arrival", s.arrival), v("kappa", s.kappa), v("passes", s.passes), v("literal", s.literal);
     v("fuzzy", s.fuzzy), v("wander", s.wander), v("lag", s.lag), v("adapt", s.adapt);
+    v("jump_accel", s.jump_accel), v("jump_gyro", s.jump_gyro);
     v("rules", s.rules), v("tries", s.tries), v("trial", s.trial);
     v("lever_b", s.lever_b);
   }
@@ -80,7 +83,7 @@ struct FixResult {
   int horizon = 0;             // fixes looked back
   Wheels wheels = Wheels::NONE;  // what is believed of them after it
   int switched = 0;            // 1: since this fix
-  double difference = 0.0;     // of the filters with and without wheels (E-55)
+  double difference = 0.0;     // of the filters with and without wheels (E-135)
   double nis = 0.0;
   double crisp = 0.0;          // the horizon before rounding
   Vector<2> inputs;            // of the fuzzy rules, m/s^2 and rad/s
@@ -114,7 +117,7 @@ std::size_t run_to(Leg& leg, const Model& model, const Rules& rules, Samples sam
 FixResult take(Leg& leg, const Model& model, const Settings& settings, Memory& memory, const Fix& fix,
                const Vector3& rate_b);
 
-// The two inputs of the fuzzy rules (E-48): |f^b| in m/s^2 and |omega^b| in rad/s.
+// The two inputs of the fuzzy rules (E-128): |f^b| in m/s^2 and |omega^b| in rad/s.
 Vector<2> motion(const Leg& leg, bool literal, double still_f);
 
 // Starts the trial of the wheels, where the settings ask for one and none runs.

@@ -1,4 +1,4 @@
-// The fuzzy horizon: how hard the vehicle moves decides how many fixes are looked back (E-48, E-49).
+// The fuzzy horizon: how hard the vehicle moves decides how many fixes are looked back (E-128, E-129).
 #pragma once
 
 #include <array>
@@ -21,9 +21,9 @@ struct FuzzyRules {
 
 // S, M, H of a value: a partition of unity over three break points.
 Vector3 membership(double value, const Vector3& points);
-// 1 + No, not yet rounded, from |f| and |omega| (E-49).
+// 1 + No, not yet rounded, from |f| and |omega| (E-129).
 double crisp_horizon(double force, double rate, const FuzzyRules& rules);
-// N: the horizon rounded half up, 2 to 10 fixes (E-49).
+// N: the horizon rounded half up, 2 to 10 fixes (E-129).
 int whole_horizon(double crisp);
 
 }  // namespace gyrofree::navigation

@@ -19,17 +19,19 @@ void orthonormalise(Attitude& C_nb) {
 // A diag(d) A^T
 Matrix3 spread(const Matrix3& A, const Vector3& d) { return A * d.asDiagonal() * A.transpose(); }
 
-// Half an interval's noise: T/2 G (E-28, E-29) and what the readings' shaking adds, in n (E-51).
+// Half an interval's noise: T/2 G (E-108, E-109) and what the readings' shaking adds, in n (E-131).
 void add_half_noise(Covariance& Q, const Leg& leg, const Model& model) {
   const double half = 0.5 * leg.interval.length;
   for (int i = 0; i < model.states; ++i) Q(i, i) += half * model.density(i);
   const Matrix3 mean = leg.interval.U1 / leg.interval.length;
   Q.block<3, 3>(PSI, PSI) += spread(mean, half * model.shake * leg.shake.gyro);
   Q.block<3, 3>(DV, DV) += spread(mean, half * model.shake * leg.shake.accel);
-  // a turn that is told wrongly by its scale and cross-axis errors
+  // a turn that is told wrongly by its scale and cross-axis errors; scale errors that are states are none
   const Vector3 omega_b = leg.interval.omega_b / leg.interval.length - leg.x.bias_gyro;
   const double turn = half * model.turn * square_of(omega_b);
   for (int i = PSI; i < PSI + 3; ++i) Q(i, i) += turn;
+  if (model.has_scale())
+    Q.block<3, 3>(PSI, PSI) -= spread(mean, half * model.turn * omega_b.cwiseProduct(omega_b));
   static_assert(SHAKEN <= MOVING);
 }
 

@@ -1,5 +1,5 @@
 // From fix to fix: the nominal state, and Phi and Q of the error since the last measurement.
-// E-25 to E-29, E-31, E-34, E-37.
+// E-105 to E-109, E-111, E-114, E-117.
 #pragma once
 
 #include <limits>
@@ -16,7 +16,7 @@ constexpr double FOREVER = std::numeric_limits<double>::infinity();
 
 using Samples = std::span<const Sample>;
 
-// Runs samples start..stop-1 to the end of the open tick, or to time `until` (E-25). The sample that
+// Runs samples start..stop-1 to the end of the open tick, or to time `until` (E-105). The sample that
 // reaches over `until` acts in part. Returns the first sample not used up. The state is the same to
 // the bit however the samples are cut into calls.
 std::size_t mechanise(Leg& leg, Samples samples, std::size_t start, std::size_t stop, double until);
@@ -24,10 +24,10 @@ std::size_t mechanise(Leg& leg, Samples samples, std::size_t start, std::size_t 
 // Takes the open tick into the integrals of the interval and into the ring.
 void fold(Leg& leg);
 
-// Phi over the open interval (E-28).
+// Phi over the open interval (E-108).
 Transition transition(const Leg& leg, const Model& model);
 
-// Closes the open interval: Phi and Q reach the time of x (E-28).
+// Closes the open interval: Phi and Q reach the time of x (E-108).
 void close(Leg& leg, const Model& model);
 
 // Mechanises and closes intervals as far as `until`, sample `stop`, or until `every` s have passed
@@ -37,7 +37,7 @@ std::size_t run_leg(Leg& leg, const Model& model, Samples samples, std::size_t s
 
 // Phi P Phi^T, symmetric.
 Covariance carried(const Transition& Phi, const Covariance& P);
-// factor Phi P Phi^T + Q (E-31).
+// factor Phi P Phi^T + Q (E-111).
 Covariance predicted(const Covariance& P, const Transition& Phi, const Covariance& Q, double factor = 1.0);
 // Phi m, and Phi^T m.
 StateVector moved(const Transition& Phi, const StateVector& m);
@@ -47,7 +47,7 @@ Transition after(const Transition& later, const Transition& Phi);
 // P at the time of the leg's state, which stays as it is.
 Covariance covariance_now(Leg leg, const Model& model);
 
-// Takes the estimated error out of the nominal state: closed loop (E-34).
+// Takes the estimated error out of the nominal state: closed loop (E-114).
 void reset(Nominal& x, const StateVector& error, const Model& model);
 // Applies an estimate and starts a new leg; the ring's velocities are corrected with it.
 void correct(Leg& leg, const Model& model, const StateVector& error);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/rotation.hpp"
+#include "navigation/receiver.hpp"
 
 namespace gyrofree::navigation {
 namespace {
@@ -58,10 +59,11 @@ void Live::stop() {
 
 bool Live::too_late(double t) const { return t < anchor.time - SAME_TIME_S; }
 
-// A fix that is not used moves the anchor too, up to it; the head is then as it was.
+// A fix that is not used moves the anchor too, up to it; the head is then as it was, but for biases that
+// opened.
 FixResult Live::take(const Fix& fix) {
   FixResult out = take_at(anchor, model, settings, memory, history, anchor_next, history.size(), fix);
-  if (!was_used(out.status) && out.switched == 0) return out;
+  if (!was_used(out.status) && out.switched == 0 && !surely_wrong(anchor.receiver)) return out;
   head = anchor;
   const std::size_t k = anchor_next;
   head_next = run_to(head, model, settings.rules, history, k, history.size(), FOREVER);

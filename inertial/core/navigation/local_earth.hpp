@@ -1,4 +1,4 @@
-// The Earth's terms at the start of an interval (E-37).
+// The Earth's terms at the start of an interval (E-117).
 #pragma once
 
 #include "common/earth.hpp"

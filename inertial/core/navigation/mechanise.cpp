@@ -12,7 +12,7 @@ namespace {
 
 constexpr double SHAKE_MEMORY_S = 1.0;
 
-// The Earth at the vehicle (E-37).
+// The Earth at the vehicle (E-117).
 struct Here {
   double inverse_n, inverse_e;  // 1/m
   double gravity;               // m/s^2
@@ -44,7 +44,7 @@ Matrix3 turned_against(const Vector3& u, const Matrix3& C) {
   return out;
 }
 
-// Position by the mean velocity of the sample (E-25).
+// Position by the mean velocity of the sample (E-105).
 void move(Nominal& x, const LocalEarth& e, const Here& here, const Vector3& v_after, double dt) {
   const Vector3 mean = 0.5 * (x.v_n + v_after);
   const double latitude = x.latitude + mean[NORTH] * dt * here.inverse_n;
@@ -55,7 +55,7 @@ void move(Nominal& x, const LocalEarth& e, const Here& here, const Vector3& v_af
   x.v_n = v_after;
 }
 
-// One sample, or a part of it, of length dt (E-25).
+// One sample, or a part of it, of length dt (E-105).
 void step(Nominal& x, OpenTick& tick, const LocalEarth& around, const Sample& sample, double dt) {
   const Vector3 f_b = sample.f_b - x.bias_accel - x.scale_accel.cwiseProduct(sample.f_b);
   const Vector3 omega_b = sample.omega_b - x.bias_gyro - x.scale_gyro.cwiseProduct(sample.omega_b);
@@ -77,7 +77,7 @@ void step(Nominal& x, OpenTick& tick, const LocalEarth& around, const Sample& sa
   x.C_nb = after;
 }
 
-// g_i^2 <- g_i^2 + part (dt (u_k - u_(k-1))_i^2 / 2 - g_i^2) (E-51)
+// g_i^2 <- g_i^2 + part (dt (u_k - u_(k-1))_i^2 / 2 - g_i^2) (E-131)
 void follow(Vector3& density, const Vector3& change, double dt) {
   const double part = std::min(1.0, dt / SHAKE_MEMORY_S);
   density += part * (0.5 * dt * change.cwiseProduct(change) - density);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "navigation/receiver.hpp"
+
 namespace gyrofree::navigation {
 namespace {
 
@@ -12,7 +14,7 @@ struct Event {
   Kept before, after;     // covariance before and after what was measured; `after` becomes the smoothed
   StateVector applied;    // the correction
   Nominal x;              // after it; becomes the smoothed
-  Vector3 wander;         // m^2, of the receiver's position (E-58)
+  Vector3 wander;         // m^2, of the receiver's position (E-138)
   StateVector error;      // left in the filter's solution
 
   Event(const Leg& leg, const Model& model)
@@ -94,6 +96,7 @@ struct Forward {
   }
 
   void fix(const Fix& fix, const Vector3& rate_b) {
+    open_biases(leg, settings.jump_accel, settings.jump_gyro);
     close(leg, model);
     Event event(leg, model);
     fixes.push_back({events.size(), compared(leg, model, rate_b, settings.lever_b, fix)});
@@ -111,7 +114,7 @@ struct Forward {
   }
 };
 
-// G = P_e Phi^T (P-_(e+1))^-1, dx_e = G (c_(e+1) + dx_(e+1)), P_s = P_e + G (P_s - P-)_(e+1) G^T (E-46)
+// G = P_e Phi^T (P-_(e+1))^-1, dx_e = G (c_(e+1) + dx_(e+1)), P_s = P_e + G (P_s - P-)_(e+1) G^T (E-126)
 void backward(std::vector<Event>& events, const Model& model) {
   for (std::size_t e = events.size(); e-- > 1;) {
     const Event& later = events[e];

@@ -1,4 +1,4 @@
-// All fixes for every moment of a drive: Rauch, Tung and Striebel's smoother (E-46). The forward pass
+// All fixes for every moment of a drive: Rauch, Tung and Striebel's smoother (E-126). The forward pass
 // is a filter; each fix, used or not, and each constraint that held is an event. Going back, the error
 // left in the filter's own solution is found and taken off.
 #pragma once

@@ -11,7 +11,7 @@ namespace gyrofree::navigation {
 // Components of vectors in n = north, east, down. Heights count up: HEIGHT takes the place of DOWN.
 constexpr int NORTH = 0, EAST = 1, DOWN = 2, HEIGHT = 2;
 
-// Segments of the error state, error = computed - true, positions in metres (E-26):
+// Segments of the error state, error = computed - true, positions in metres (E-106):
 // C_true = Exp(psi) C_computed; what is left of the biases after the current estimates.
 constexpr int PSI = 0;          // psi_n, rad
 constexpr int DV = 3;           // of v_n, m/s
@@ -80,10 +80,10 @@ struct Model {
   int mount_pitch = ABSENT;
   int mount_yaw = ABSENT;
   int axle = ABSENT;
-  StateVector density = StateVector::Zero(CORE);   // diagonal of G (E-29), unit^2/s
+  StateVector density = StateVector::Zero(CORE);   // diagonal of G (E-109), unit^2/s
   StateVector decay = StateVector::Zero(CORE);     // 1/s, of what only decays
-  double shake = 1.0;  // share of the readings' shaking that is noise to navigation (E-51)
-  double turn = 0.0;   // s, turns' share that gyros tell wrongly, squared, by the length of a turn (E-59)
+  double shake = 1.0;  // share of the readings' shaking that is noise to navigation (E-131)
+  double turn = 0.0;   // s, turns' share that gyros tell wrongly, squared, by the length of a turn (E-139)
 
   bool has_scale() const { return scale_accel != ABSENT; }
   bool has_lag() const { return lag_position != ABSENT; }
@@ -145,7 +145,7 @@ struct Tick {
   }
 };
 
-// Integrals over the ticks of the open interval (E-28).
+// Integrals over the ticks of the open interval (E-108).
 struct Interval {
   double length = 0.0;                        // s
   Vector3 s1 = Vector3::Zero();               // int f_n
@@ -164,7 +164,7 @@ struct Interval {
   }
 };
 
-// The Earth's terms at the start of an interval, and how they change with L and h (E-37).
+// The Earth's terms at the start of an interval, and how they change with L and h (E-117).
 struct LocalEarth {
   double latitude = 0.0, height = 0.0;
   double sine = 0.0, cosine = 1.0, tangent = 0.0;      // of the latitude
@@ -183,7 +183,7 @@ struct LocalEarth {
   }
 };
 
-// Noise that the readings show by themselves (E-51).
+// Noise that the readings show by themselves (E-131).
 struct Shake {
   bool seen = false;
   Vector3 last_f = Vector3::Zero();           // the last whole sample
@@ -198,15 +198,23 @@ struct Shake {
   }
 };
 
-// What the fixes show of their own noise, and what no filter of white noise can know (E-57, E-58).
+// What the fixes show of their own noise, and what no filter of white noise can know (E-137, E-138).
+// Differences between a fix and the filter that stay are not the receiver's: they say that the filter
+// is wrong (E-141).
 struct Receiver {
   double position = 1.0;              // its position's variance over what it says, 1 or more
   double velocity = 1.0;              // likewise
   Vector3 wander = Vector3::Zero();   // m^2, of the part of its position's error that wanders slowly
+  Vector3 last_position = Vector3::Zero();  // m, innovation of the last fix
+  Vector3 last_velocity = Vector3::Zero();  // m/s
+  Vector3 lasting = Vector3::Zero();  // innovations of velocity over their sigma, a mean
+  double disagreement = 1.0;          // mean square of that over what white ones give
 
   template <class Self, class Visitor>
   static void visit(Self& s, Visitor& v) {
     v("position", s.position), v("velocity", s.velocity), v("wander", s.wander);
+    v("last_position", s.last_position), v("last_velocity", s.last_velocity);
+    v("lasting", s.lasting), v("disagreement", s.disagreement);
   }
 };
 
@@ -220,9 +228,9 @@ struct Leg {
   double time = 0.0;            // s, of x
   double since_constraint = 0.0;  // s
   bool wheels = true;           // whether the wheels' constraint, where the model has it, is applied
-  double strain = 0.0;          // NIS per row of the wheels' constraint, mean over the last looks (E-56)
+  double strain = 0.0;          // NIS per row of the wheels' constraint, mean over the last looks (E-136)
   bool quiet = false;           // since the last fix the readings looked like a standstill
-  double moved = 0.0;           // squared velocity of fixes then over its variance, a mean (E-60)
+  double moved = 0.0;           // squared velocity of fixes then over its variance, a mean (E-140)
   Covariance P;                 // just after the last measurement
   Transition Phi;               // since then, closed intervals
   Covariance Q;

@@ -1,5 +1,5 @@
 // Phi over an interval: the integrals of a flat Earth exactly, the terms of the round, turning Earth
-// to first order (E-27, E-28).
+// to first order (E-107, E-108).
 #include "navigation/local_earth.hpp"
 #include "navigation/leg.hpp"
 
@@ -77,7 +77,7 @@ void position_rows(MovingMatrix& F, const Terms& t) {
   F(P_E, P_H) = -t.en_n;
 }
 
-// The terms of F that are there because the Earth is round and turns (E-27).
+// The terms of F that are there because the Earth is round and turns (E-107).
 MovingMatrix earth_terms(const Nominal& x, const LocalEarth& e) {
   const Terms t(x, e);
   MovingMatrix F = MovingMatrix::Zero();
@@ -105,7 +105,7 @@ void accel_columns(Upper& Phi, const Interval& i, int at, const Vector3& share) 
   Phi.block<3, 3>(DP, at) = height_up(i.U2 * share.asDiagonal());
 }
 
-// Phi over a flat Earth that does not turn: exact (E-28).
+// Phi over a flat Earth that does not turn: exact (E-108).
 Upper flat(const Interval& i, const Model& model, const StateVector& decay) {
   Upper Phi = Upper::Zero(MOVING, model.states);
   Phi.leftCols<MOVING>().setIdentity();

@@ -1,5 +1,5 @@
 // Do this vehicle's wheels tell the truth? A filter with their constraint and one without run side by
-// side; what they differ by is judged against what it may be (E-54 to E-56).
+// side; what they differ by is judged against what it may be (E-134 to E-136).
 //
 // Where the constraint holds, the filter that has it is the better of two that agree, and their
 // difference has the covariance P_without - P_with (Hausman's test). Where it does not, the difference
@@ -49,7 +49,7 @@ struct Trial {
   Leg other;              // with wheels while they are not believed, without while they are
   int refused = 0;        // of the other filter: fixes in a row
   int doubted = 0;
-  double difference = 0.0;  // its mean square (E-55)
+  double difference = 0.0;  // its mean square (E-135)
   double agreement = 0.0;   // s
   double wanted = 0.0;      // s of it
   Vector3 forward = Vector3::Zero();  // of the body in n, level, at its beginning
@@ -79,7 +79,7 @@ struct State {
   double nis_per_row;
 };
 
-// The mean over attitude and velocity of the squared difference over its variance (E-54).
+// The mean over attitude and velocity of the squared difference over its variance (E-134).
 double difference_of(const State& with, const State& without, const TrialSettings& settings);
 
 // Looks at both filters at a fix of time t that the one without wheels used; `shown` is what `leg`

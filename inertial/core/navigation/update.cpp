@@ -43,7 +43,7 @@ Motion motion_before(const Leg& leg, double lag) {
   return m;
 }
 
-// Antenna against fix, measured with our own radii: the same metres as the error state (E-30).
+// Antenna against fix, measured with our own radii: the same metres as the error state (E-110).
 void position_rows(Measurement& z, const Nominal& x, const Vector3& arm_n, const Fix& fix) {
   const Vector3 ned = earth::ned_between(place_of(x), {fix.latitude, fix.longitude, fix.height});
   z.y.segment<3>(POSITION_ROW) = upward(arm_n - ned);
@@ -52,7 +52,7 @@ void position_rows(Measurement& z, const Nominal& x, const Vector3& arm_n, const
   z.H.block<1, 3>(POSITION_ROW + HEIGHT, PSI) *= -1.0;
 }
 
-// The antenna swings about the IMU with w_eb (E-30).
+// The antenna swings about the IMU with w_eb (E-110).
 void velocity_rows(Measurement& z, const Nominal& x, const Vector3& swing_n, const Vector3& lever_b,
                    const Fix& fix) {
   z.y.segment<3>(VELOCITY_ROW) = x.v_n + swing_n - fix.v_n;
@@ -61,7 +61,7 @@ void velocity_rows(Measurement& z, const Nominal& x, const Vector3& swing_n, con
   z.H.block<3, 3>(VELOCITY_ROW, BIAS_GYRO) = -(x.C_nb * skew(lever_b));
 }
 
-// The receiver speaks of a moment before its time (E-38).
+// The receiver speaks of a moment before its time (E-118).
 void late_rows(Measurement& z, const Leg& leg, const Model& model) {
   const Vector3 way = upward(motion_before(leg, 0.5 * leg.x.lag_position).v_n);
   z.y.segment<3>(POSITION_ROW) -= way * leg.x.lag_position;
@@ -121,7 +121,7 @@ Measurement chosen(const Measurement& all, const Fix& fix) {
   z.R.diagonal().segment<3>(POSITION_ROW) = fix.sigma_p.cwiseProduct(fix.sigma_p);
   if (fix.has_v) {
     z.R.diagonal().segment<3>(VELOCITY_ROW) = fix.sigma_v.cwiseProduct(fix.sigma_v);
-    Vector3 way = upward(fix.v_n) * fix.timing;  // what its own timing costs (E-31)
+    Vector3 way = upward(fix.v_n) * fix.timing;  // what its own timing costs (E-111)
     if (!std::isfinite(way[HEIGHT])) way[HEIGHT] = 0.0;
     z.R.block<3, 3>(POSITION_ROW, POSITION_ROW) += way * way.transpose();
   }
@@ -164,7 +164,7 @@ Whitened whiten(const RowMatrix& S, const RowVector& y) {
   return out;
 }
 
-// W = P H^T L^-T: K y = W u, P - W W^T, symmetric (E-33).
+// W = P H^T L^-T: K y = W u, P - W W^T, symmetric (E-113).
 StateVector absorb(Covariance& P, const Innovation& innovation, const Whitened& white) {
   const auto& L = white.factor.L;
   const int rows = static_cast<int>(L.rows()), n = static_cast<int>(P.rows());

@@ -1,4 +1,4 @@
-// One measurement: residual, NIS, gain, robust weights. E-30 to E-33, E-38, E-39.
+// One measurement: residual, NIS, gain, robust weights. E-110 to E-113, E-118, E-119.
 #pragma once
 
 #include <array>
@@ -78,16 +78,16 @@ struct Blocks {
 Blocks blocks_of(int rows);  // 3, 4, 6 or 7
 
 // All seven rows of a fix at the leg's state; rate_b is the measured rate, lever_b the antenna from
-// the IMU (E-30, E-38). R stays zero.
+// the IMU (E-110, E-118). R stays zero.
 Measurement compared(const Leg& leg, const Model& model, const Vector3& rate_b, const Vector3& lever_b,
                      const Fix& fix);
-// Of them those that the fix has, with R (E-31). Where a height or a vertical speed is unknown, its row
+// Of them those that the fix has, with R (E-111). Where a height or a vertical speed is unknown, its row
 // stays and is silent.
 Measurement chosen(const Measurement& all, const Fix& fix);
 bool is_silent(const Measurement& z, int row);
 int said_rows(const Measurement& z);  // those that are not
 
-// P H^T and S = H P H^T + R (E-32).
+// P H^T and S = H P H^T + R (E-112).
 struct Innovation {
   UpTo<MOST_STATES, MOST_ROWS> PHt;
   RowMatrix S;
@@ -102,12 +102,12 @@ struct Whitened {
 };
 Whitened whiten(const RowMatrix& S, const RowVector& y);
 
-// P := (I - K H) P; returns K y (E-33).
+// P := (I - K H) P; returns K y (E-113).
 StateVector absorb(Covariance& P, const Innovation& innovation, const Whitened& white);
 
-// Huber weights: limit / d where a group's Mahalanobis distance d exceeds the limit (E-39).
+// Huber weights: limit / d where a group's Mahalanobis distance d exceeds the limit (E-119).
 Weights huber_weights(const RowMatrix& S, const RowVector& y, double limit);
-// Raises R so that each group of S grows by 1 / weight: the gain is then Huber's (E-39).
+// Raises R so that each group of S grows by 1 / weight: the gain is then Huber's (E-119).
 void inflate(RowMatrix& S, RowMatrix& R, const Weights& weight);
 // Multiplies P by the smallest power of 2 that brings NIS down to the rows that say anything; returns it.
 double make_consistent(Covariance& P, const Measurement& z);

@@ -1,4 +1,4 @@
-// The predictive estimator: the last N fixes solved anew from a state N fixes ago (E-42 to E-47).
+// The predictive estimator: the last N fixes solved anew from a state N fixes ago (E-122 to E-127).
 //
 // Muske and Rawlings' linear moving horizon, in the form "restart a Kalman filter N fixes ago with
 // covariance P_arr". With the Kalman filter's own covariance there it is the Kalman filter; with a
@@ -62,13 +62,13 @@ struct Window {
   void push(const Transition& Phi, const Covariance& Q, const Measurement& z, const Covariance& start);
   // Brings the Kalman covariance over the newest fix, and its sum.
   void kalman_beside();
-  // Covariance at the start of the last N fixes (E-43); while fewer have come, P0.
+  // Covariance at the start of the last N fixes (E-123); while fewer have come, P0.
   Covariance arrival(int N, Arrival mode, double kappa) const;
-  // A Kalman pass over the last n fixes from mean 0 and P_arr (E-44); the newest epoch holds the end.
+  // A Kalman pass over the last n fixes from mean 0 and P_arr (E-124); the newest epoch holds the end.
   void forward(int n, const Covariance& P_arr);
-  // State at each of the last n fixes given all of them (E-46), after `forward`.
+  // State at each of the last n fixes given all of them (E-126), after `forward`.
   void smooth(int n);
-  // `forward` with Huber weights found from the smoothed residuals of the horizon (E-47).
+  // `forward` with Huber weights found from the smoothed residuals of the horizon (E-127).
   void robust(int n, const Covariance& P_arr, double huber, int passes);
 
   template <class Self, class Visitor>

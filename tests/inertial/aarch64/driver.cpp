@@ -176,7 +176,7 @@ std::vector<navigation::Sample> drive(int samples) {
   return out;
 }
 
-// Twelve seconds of samples with a fix every second (E-25 to E-34).
+// Twelve seconds of samples with a fix every second (E-105 to E-114).
 void run_navigation() {
   navigation::Model model;
   model.density.setConstant(1e-4);

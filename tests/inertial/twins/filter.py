@@ -1,7 +1,7 @@
 """The navigation filter's kernels in numpy, as on paper: twins of inertial/core/navigation/.
 
 Plain matrices instead of segments that know their zeros, integrals by sums over the samples instead
-of ticks; equations E-26 to E-29, E-40, E-49, E-52 of docs/equations-ins.md.
+of ticks; equations E-106 to E-109, E-120, E-129, E-132 of docs/equations-ins.md.
 """
 
 from itertools import product
@@ -21,7 +21,7 @@ HEIGHT_UP = np.diag([1.0, 1.0, -1.0])
 
 
 def F(x: State, f_n: Array, tau: float) -> Array:
-    """(15, 15) of xdot = F x (E-27): numeric derivatives of (E-22) and (E-24) for the Earth's
+    """(15, 15) of xdot = F x (E-107): numeric derivatives of (E-102) and (E-104) for the Earth's
     terms, the rest as written.
     """
     out = np.zeros((15, 15))
@@ -78,7 +78,7 @@ def phi_and_q(x: State, imu: Array, density: Array, tau: float) -> tuple[Array, 
 
 
 def wheels(x: Any, omega_b: Array) -> Array:
-    """y (2,) of the wheels (E-40) at the core's Nominal x: sideways and vertical speed of the rear
+    """y (2,) of the wheels (E-120) at the core's Nominal x: sideways and vertical speed of the rear
     axle in the vehicle's axes.
     """
     v = x.C_nb.T @ x.v_n
@@ -92,7 +92,7 @@ def wheels(x: Any, omega_b: Array) -> Array:
 
 
 def crisp_horizon(force: float, rate: float, rules: Any) -> float:
-    """1 + No of a fuzzy.FuzzyRules (E-49), over interpolated sets."""
+    """1 + No of a fuzzy.FuzzyRules (E-129), over interpolated sets."""
     sets = [
         [np.interp(value, points, ordinates) for ordinates in np.eye(3)]
         for value, points in ((force, rules.force), (rate, rules.rate))
@@ -104,7 +104,7 @@ def crisp_horizon(force: float, rate: float, rules: Any) -> float:
 def drag_look(
     x: Array, P: Array, dt: float, noise: Array, y: Array, speed: Array, white: Array
 ) -> tuple[Array, Array, float]:
-    """x (7,), P (7, 7) after a prediction and a correction with all axes at once (E-52), and the
+    """x (7,), P (7, 7) after a prediction and a correction with all axes at once (E-132), and the
     NIS.
     """
     Phi = np.eye(7)

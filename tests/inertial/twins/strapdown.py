@@ -1,5 +1,5 @@
-"""Strapdown mechanisation in numpy, one IMU sample at a time, as on paper (E-24, E-25): the twin of
-inertial/core/navigation/mechanise.cpp, which carries the Earth's terms to first order instead.
+"""Strapdown mechanisation in numpy, one IMU sample at a time, as on paper (E-104, E-105): the twin
+of inertial/core/navigation/mechanise.cpp, which carries the Earth's terms to first order instead.
 """
 
 from dataclasses import dataclass, field
@@ -38,7 +38,7 @@ def rates(x: State) -> tuple[Array, Array]:
 
 
 def moved(x: State, v_next: Array, dt: float) -> tuple[float, float, float]:
-    """The place after dt s, by the mean of the velocities (E-25)."""
+    """The place after dt s, by the mean of the velocities (E-105)."""
     v = 0.5 * (x.v_n + v_next)
     R_N, R_E = radii(x.latitude)
     latitude = x.latitude + v[0] * dt / (R_N + x.height)
@@ -48,7 +48,7 @@ def moved(x: State, v_next: Array, dt: float) -> tuple[float, float, float]:
 
 
 def step(x: State, f_b: Array, omega_b: Array, dt: float) -> State:
-    """The state after dt s with readings f_b and omega_b, (3,) each (E-25)."""
+    """The state after dt s with readings f_b and omega_b, (3,) each (E-105)."""
     ie, en = rates(x)
     turned = turn_matrix(-(ie + en) * dt) @ x.C_nb @ turn_matrix((omega_b - x.bias_gyro) * dt)
     f_n = 0.5 * (x.C_nb + turned) @ (f_b - x.bias_accel)
@@ -59,7 +59,7 @@ def step(x: State, f_b: Array, omega_b: Array, dt: float) -> State:
 
 def inverse_step(x: State, v_next: Array, C_next: Array, dt: float) -> tuple[Array, Array]:
     """Readings f_b and omega_b, (3,) each, with which step takes x to v_next (3,) and C_next (3, 3)
-    exactly (E-25).
+    exactly (E-105).
     """
     ie, en = rates(x)
     turn = rotation_vector(x.C_nb.T @ turn_matrix((ie + en) * dt) @ C_next)
