@@ -169,6 +169,7 @@ double Frame::fit(const Constants& c) {
 // One more sample of a start while turning: fitted anew now and then, carried on between (E-46).
 void Frame::fit_start(const Constants& c, bool still) {
   const int n = ++fitted_;
+  if (watch_.rough(c.sensor, 1)) return restart();  // a damaged sample
   if (still) {  // it was no turn
     begin(c);
     moved_ = false;

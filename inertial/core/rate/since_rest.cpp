@@ -33,7 +33,7 @@ void SinceRest::take(const Sensor& s, const double* a, double dt, bool still, co
 // The oldest block was of rest for certain.
 void SinceRest::fold() {
   rest_.add(blocks_[0]);
-  std::move(blocks_ + 1, blocks_ + count_, blocks_);
+  std::move(blocks_.begin() + 1, blocks_.begin() + count_, blocks_.begin());
   --count_;
 }
 

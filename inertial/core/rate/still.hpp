@@ -38,6 +38,9 @@ class Watch {
 
   // May a body that never stood be standing, with axes' biases of that variance, (m/s^2)^2?
   bool could_stand(const Sensor& s, const StillLimits& c, double bias);
+  // Does a sample of the newest n stand out of its neighbours by far more than noise? s has the measured
+  // noise.
+  bool rough(const Sensor& s, int n) const;
   bool never_stood() const { return learnt == 0; }
   long newest() const { return count - 1; }
   int filled_samples() const { return filled; }
