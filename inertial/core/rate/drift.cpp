@@ -6,7 +6,7 @@ namespace {
 constexpr double FEWEST_FOR_SLOPE = 100.0;  // samples that a slope needs
 constexpr double LOOK_EVERY = 8.0;     // samples between two looks
 constexpr double SLOPE_SURE = 1.5;     // of the variance that noise explains: what is beyond it is believed
-constexpr double NOT_DENIED = 0.25;    // of it: a drift as small may hide in it,
+constexpr double NOT_DENIED = 0.1;     // of it: a drift as small may hide in it,
 constexpr double HIDDEN = 1e-6;        // (m/s^2)^2 per s^2, at most: 0.1 mg/s, a sensor that warms up
 
 }  // namespace
