@@ -1,1 +1,1 @@
-"""The frame that viser's scene stands in: its page, its policy, and what each role may send to it."""
+"""The frame of the scene: its page, its policy, and what each role may send to it."""
