@@ -74,11 +74,11 @@ class Browser:
         told = msgspec.msgpack.decode(zstandard.decompress(frame[16 : 16 + packed]))
         sizes = told["binaryBufferLengths"]
         rest = Counter()
-        for message in told["messages"]:
-            kind = _kind(message)
-            arrays = list(_arrays(message))
+        for one in told["messages"]:
+            kind = _kind(one)
+            arrays = list(_arrays(one))
             self.bytes[kind] += sum(sizes[k] for k in arrays)
-            rest[kind] += len(msgspec.msgpack.encode(message))
+            rest[kind] += len(msgspec.msgpack.encode(one))
         for kind, size in rest.items():  # its share of the packed part
             self.bytes[kind] += round(packed * size / max(1, rest.total()))
 

@@ -11,7 +11,7 @@ import viser
 from dashboard.data.device import Device
 from dashboard.data.store import Store
 from dashboard.desk import Desk
-from dashboard.scene.drawing.chart import Chart, Curve, Shade
+from dashboard.scene.drawing.chart import Chart, Curve, Range, Shade
 from dashboard.scene.drawing.page import Markup, html
 from dashboard.scene.drawing.palette import estimator_colour, estimator_title
 from messages.bus.orders import OrderError
@@ -129,7 +129,7 @@ class Panel:
             s.t1,
             s.dark,
             late=s.device.late,
-            marks=[at for at, _ in s.device.marks],
+            ranges=ranges(s.device),
             shades=shades,
         )
 
@@ -165,6 +165,20 @@ class Panel:
 
     def hide(self) -> None:
         """Another page was opened."""
+
+
+def ranges(device: Device) -> list[Range]:
+    """Notes, what was filled in, and the steps of a procedure that runs, on the device's axis."""
+    found = [Range(at, at, text[:60]) for at, text in device.marks]
+    found += [Range(begin, end, "filled in", "late") for begin, end in device.late]
+    procedure = device.get("procedure")
+    for step in procedure.message.steps if procedure is not None else ():
+        if step.from_utc_ns and step.until_utc_ns >= step.from_utc_ns:
+            begin, end = (
+                (at - device.utc0_ns) * 1e-9 for at in (step.from_utc_ns, step.until_utc_ns)
+            )
+            found.append(Range(begin, end, step.name[:60], "step"))
+    return found
 
 
 def estimator_curve(
