@@ -14,6 +14,7 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import viser
@@ -21,6 +22,7 @@ import viser
 from dashboard.scene.drawing import series
 from dashboard.scene.drawing.page import tag
 from dashboard.scene.drawing.palette import number, rgba
+from logs.figures.stretch import stretch
 
 LATE_HEIGHT = 0.035  # of the strip that marks filled-in data, of the chart's height
 MOST_RANGES = 24  # named in one chart
@@ -109,15 +111,25 @@ class Chart:
         late: Sequence[Sequence[float]] = (),
         ranges: Sequence[Range] = (),
         shades: Sequence[Shade] = (),
+        cursors: tuple[float, float] | tuple[()] = (),
+        origin: str = "",
     ) -> None:
         """Draw the window [t0, t1]; gaps are those of the curve number `primary`.
 
         Stretches [from, until] of `late` get a strip at the bottom: filled in after a loss. Each of
-        `ranges` is drawn with its name. A shade lies behind the times it names.
+        `ranges` is drawn with its name. A shade lies behind the times it names. Between the
+        cursors all samples are measured; `origin` says what the time counts from.
         """
         shades = [shade for shade in shades if len(shade.t)]
         inside = [one for one in ranges if one.t1 >= t0 and one.t0 <= t1][-MOST_RANGES:]
-        heading = self._heading_html(curves, shades, inside)
+        told = {
+            "title": re.sub(r"<[^>]*>", "", str(self._title)),
+            "unit": self._unit,
+            "origin": origin,
+            "ranges": [[one.t0, one.t1, one.text, one.kind] for one in inside],
+            "measured": _measured(curves, *cursors) if cursors else None,
+        }
+        heading = self._heading_html(curves, shades, told)
         if self._heading.content != heading:
             self._heading.content = heading
         curves = [curve for curve in curves if len(curve.t)]
@@ -137,9 +149,9 @@ class Chart:
             # Changed in place: a browser that is behind would complain of an update of a chart
             # already removed.
             self._plot.series, self._plot.bands = _lines(curves, dark, shades)
-            self._plot.data = data
+            _send(self._plot, data)
         elif not _same(self._plot.data, data):
-            self._plot.data = data
+            _send(self._plot, data)
         self._signature = signature
         if not self._plot.visible:
             self._plot.visible = True
@@ -147,8 +159,8 @@ class Chart:
     def _heading_html(
         self,
         curves: Sequence[Curve],
-        shades: Sequence[Shade] = (),
-        ranges: Sequence[Range] = (),
+        shades: Sequence[Shade],
+        told: dict[str, Any],
     ) -> str:
         items = []
         for curve in curves:
@@ -171,11 +183,6 @@ class Chart:
                 items.append(tag("span", sample, shade.label, class_="gf-item"))
         items = items or [tag("span", "no data yet", class_="gf-item gf-stale")]
         title = tag("span", self._title, " ", tag("em", self._unit), class_="gf-title")
-        told = {
-            "title": re.sub(r"<[^>]*>", "", str(self._title)),
-            "unit": self._unit,
-            "ranges": [[one.t0, one.t1, one.text, one.kind] for one in ranges],
-        }
         legend = tag("span", *items, class_="gf-legend")
         data = json.dumps(told, separators=(",", ":"), ensure_ascii=False)
         return str(tag("div", title, legend, class_="gf-chart", data_chart=data))
@@ -284,6 +291,23 @@ def _data(
     pause = max(series.gap_limit(t), 2.5 * (edges[1] - edges[0]))
     out.append(series.gap_mask(t, edges, pause).astype(np.uint8))
     return tuple(out)
+
+
+def _measured(curves: Sequence[Curve], a: float, b: float) -> dict[str, Any]:
+    """What lies between two cursors, of every sample; by label."""
+    return {
+        str(curve.label): stretch(curve.t, curve.y, a, b) | {"at": [a, b]}
+        for curve in curves
+        if curve.label
+    }
+
+
+def _send(plot: viser.GuiUplotHandle, data: tuple[np.ndarray, ...]) -> None:
+    """Set the data in the types that they have: viser's own setter makes 64 bits of each value,
+    which its page does not ask for, and which doubles what a browser receives.
+    """
+    plot._impl.props.data = data
+    plot._queue_update("data", data)
 
 
 def _same(before: Sequence[np.ndarray], now: Sequence[np.ndarray]) -> bool:

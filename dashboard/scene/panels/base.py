@@ -4,6 +4,7 @@ import logging
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 
 import numpy as np
 import viser
@@ -40,6 +41,7 @@ class Snapshot:
     t1: float
     now: float  # time.monotonic(), s; of a replay that is paused, when it was
     dark: bool
+    cursors: tuple[float, float] | tuple[()] = ()  # s, of the stretch that is measured
 
     def rows(self, topic: str, estimator: str = "") -> tuple[np.ndarray, np.ndarray]:
         """Times (n,) s and rows (n,) of a topic inside the window; columns by name (tables.py)."""
@@ -130,6 +132,8 @@ class Panel:
             s.dark,
             late=s.device.late,
             ranges=ranges(s.device),
+            cursors=s.cursors,
+            origin=f"s since {when(s.device.utc0_ns)} UTC",
             shades=shades,
         )
 
@@ -165,6 +169,12 @@ class Panel:
 
     def hide(self) -> None:
         """Another page was opened."""
+
+
+def when(utc_ns: int) -> str:
+    """A moment for people, UTC."""
+    moment = datetime.fromtimestamp(utc_ns * 1e-9, UTC) if 0 <= utc_ns < 1 << 62 else None
+    return "?" if moment is None else f"{moment:%Y-%m-%d %H:%M:%S}"
 
 
 def ranges(device: Device) -> list[Range]:

@@ -28,9 +28,12 @@ export class Overlay {
     const mine = ++this.turn;
     for (;;) {
       const query = new URLSearchParams({ ids: this.ids.join(","), ...this.more() });
+      const asked = this.group.asked;
+      if (asked) query.set("cursors", asked);
       if (begin !== undefined) { query.set("begin", begin); query.set("end", end); }
       const answer = await call(`compare?${query}`).catch((error) => { this.hooks.state(error.message, true); return null; });
       if (!answer || mine !== this.turn) return;
+      if (answer.lines) for (const line of answer.lines) line.asked = asked;
       if (answer.lines) this.show(answer, begin === undefined);
       const share = Math.round(100 * answer.done);
       this.hooks.state(answer.state === "done" ? "" : answer.lines ? `First look; reading all of it, ${share} %` : `Reading the recording, ${share} %`);
@@ -47,7 +50,9 @@ export class Overlay {
     const marks = answer.sessions.flatMap((s, k) => s.marks.map((m) => ({ ...m, color: MARKS })));
     const lines = answer.lines.map((line) => ({ ...line, id: `${line.session} ${line.key}` }));
     for (const { figure, kind, part, plot } of this.plots) {
-      const mine = lines.filter((line) => line[kind][part]).map((line) => this.line(line, line[kind][part]));
+      const mine = lines.filter((line) => line[kind][part]).map((line) => ({
+        ...this.line(line, line[kind][part]), measured: line.measured?.[kind]?.[part], asked: line.asked,
+      }));
       figure.hidden = !mine.length;
       if (kind === "error" && mine.length) figure.querySelector("small").textContent = `against ${[...new Set(mine.map((l) => l.against))].join(", ")}, °/s`;
       plot.set(mine, marks);
