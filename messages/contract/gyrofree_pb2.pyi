@@ -1146,7 +1146,7 @@ class ProcedureCommand(_message.Message):
     def __init__(self, action: _Optional[_Union[ProcedureCommand.Action, str]] = ..., device: _Optional[str] = ..., procedure: _Optional[str] = ..., unit: _Optional[str] = ..., user: _Optional[str] = ..., text: _Optional[str] = ..., own_session: _Optional[bool] = ...) -> None: ...
 
 class ProcedureStatus(_message.Message):
-    __slots__ = ("header", "state", "run", "procedure", "title", "sha256", "toml", "unit", "operator", "session", "step", "instruction", "progress", "message", "steps", "table", "table_radps", "offered", "started_utc_ns", "reference")
+    __slots__ = ("header", "state", "run", "procedure", "title", "sha256", "toml", "unit", "operator", "session", "step", "instruction", "progress", "message", "steps", "table", "table_radps", "offered", "started_utc_ns", "up_b", "reference")
     class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATE_IDLE: _ClassVar[ProcedureStatus.State]
@@ -1244,6 +1244,7 @@ class ProcedureStatus(_message.Message):
     TABLE_RADPS_FIELD_NUMBER: _ClassVar[int]
     OFFERED_FIELD_NUMBER: _ClassVar[int]
     STARTED_UTC_NS_FIELD_NUMBER: _ClassVar[int]
+    UP_B_FIELD_NUMBER: _ClassVar[int]
     REFERENCE_FIELD_NUMBER: _ClassVar[int]
     header: Header
     state: ProcedureStatus.State
@@ -1264,5 +1265,6 @@ class ProcedureStatus(_message.Message):
     table_radps: float
     offered: _containers.RepeatedScalarFieldContainer[str]
     started_utc_ns: int
+    up_b: _containers.RepeatedScalarFieldContainer[float]
     reference: _containers.RepeatedScalarFieldContainer[str]
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., state: _Optional[_Union[ProcedureStatus.State, str]] = ..., run: _Optional[str] = ..., procedure: _Optional[str] = ..., title: _Optional[str] = ..., sha256: _Optional[str] = ..., toml: _Optional[str] = ..., unit: _Optional[str] = ..., operator: _Optional[str] = ..., session: _Optional[str] = ..., step: _Optional[int] = ..., instruction: _Optional[str] = ..., progress: _Optional[float] = ..., message: _Optional[str] = ..., steps: _Optional[_Iterable[_Union[ProcedureStatus.Step, _Mapping]]] = ..., table: _Optional[str] = ..., table_radps: _Optional[float] = ..., offered: _Optional[_Iterable[str]] = ..., started_utc_ns: _Optional[int] = ..., reference: _Optional[_Iterable[str]] = ...) -> None: ...
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., state: _Optional[_Union[ProcedureStatus.State, str]] = ..., run: _Optional[str] = ..., procedure: _Optional[str] = ..., title: _Optional[str] = ..., sha256: _Optional[str] = ..., toml: _Optional[str] = ..., unit: _Optional[str] = ..., operator: _Optional[str] = ..., session: _Optional[str] = ..., step: _Optional[int] = ..., instruction: _Optional[str] = ..., progress: _Optional[float] = ..., message: _Optional[str] = ..., steps: _Optional[_Iterable[_Union[ProcedureStatus.Step, _Mapping]]] = ..., table: _Optional[str] = ..., table_radps: _Optional[float] = ..., offered: _Optional[_Iterable[str]] = ..., started_utc_ns: _Optional[int] = ..., up_b: _Optional[_Iterable[float]] = ..., reference: _Optional[_Iterable[str]] = ...) -> None: ...

@@ -20,6 +20,7 @@ THIN = 0.01  # s, one estimate in so long is kept
 MEAN = 0.3  # s, over which pulses are averaged
 SILENCE = 0.6  # s without a pulse: the table stands, as in the report
 FRESH = 1.0  # s that an estimate is believed
+TABLE_FRESH = 2.5  # s that a table's own word is
 WINDOW = 0.5  # s, of vibration and of the direction of gravity
 
 
@@ -54,6 +55,7 @@ class Evidence:
     estimates: deque[Estimate] = field(default_factory=deque)
     samples: deque[tuple[Array, Array]] = field(default_factory=deque)
     own_axes: bool = True
+    table: tuple[float, float] | None = None  # s, rad/s: what a driven table said last
     _thinned: dict[str, int] = field(default_factory=dict)
 
     def forget(self) -> None:
@@ -61,6 +63,7 @@ class Evidence:
         self.pulses.clear()
         self.estimates.clear()
         self.samples.clear()
+        self.table = None
 
     def add_pulse(self, seen: Pulse) -> None:
         """One rate of the tachometer."""
@@ -102,6 +105,8 @@ class Evidence:
                 return Reference(0.0, True, "tachometer")
             mean = float(np.mean([p.omega for p in near]))
             return Reference(mean, all(p.signed for p in near), "tachometer")
+        if self.table is not None and abs(t - self.table[0]) < TABLE_FRESH:
+            return Reference(self.table[1], True, "table")
         for one in self.newest(t):
             if one.still or one.valid:
                 return Reference(0.0 if one.still else one.omega, True, one.estimator)

@@ -74,7 +74,14 @@ class Line:
     text: str
 
 
-Seen = Samples | Pulse | Turned | Axes | Line
+@dataclass(frozen=True)
+class TableSays:
+    """The rate that a driven table reads on itself; it counts where no tachometer is."""
+
+    omega: float  # rad/s
+
+
+Seen = Samples | Pulse | Turned | Axes | Line | TableSays
 
 
 def of(message: object) -> Seen | None:

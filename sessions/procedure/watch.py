@@ -17,7 +17,7 @@ from inertial.constants import GRAVITY, MILLI_G
 from sessions.procedure.evidence import Evidence, Reference
 from sessions.procedure.live import Live
 from sessions.procedure.model import DEG, Step
-from sessions.procedure.seen import Axes, Line, Pulse, Samples, Seen, Turned
+from sessions.procedure.seen import Axes, Line, Pulse, Samples, Seen, TableSays, Turned
 
 TICK = 0.05  # s, of the board's clock
 LAG = 0.15  # s, pulses wait for company and estimates are computed
@@ -104,6 +104,8 @@ class Watch:
                 self.evidence.add_estimates(seen)
             case Axes():
                 self.evidence.axes = seen
+            case TableSays() if np.isfinite(self.now):
+                self.evidence.table = self.now, seen.omega
             case Line() if not seen.connected:
                 self._broken(f"the line to the board is down: {seen.text}".rstrip(": "))
 
