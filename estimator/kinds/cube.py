@@ -35,6 +35,7 @@ from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import AXES, CALIBRATION, ESTIMATOR, POSE, RATE
 
 POSE_HZ = 20.0
+SETTINGS = "settings: "  # begins the message of a status that doubts one
 
 
 class Cube:
@@ -170,9 +171,9 @@ class Cube:
             out.append(Output(AXES, device, "", messages.axes(header, board.health, last_s)))
         if due:
             doubts = board.doubts(last_s)
-            for name in common.settings.rate:
+            for k, name in enumerate(common.settings.rate):
                 status = self._status(header, board, name)
-                status.message = doubts
+                status.message = f"{SETTINGS}{doubts}" if doubts and k == 0 else ""
                 out.append(Output(ESTIMATOR, device, name, status))
         return out
 
