@@ -17,6 +17,7 @@ from estimator.settings import EstimatorSettings
 from gateway.settings import GatewaySettings
 from inertial.toml_file import parsed, text_of
 from messages.bus.session import BusSettings
+from sessions.procedure.settings import ProcedureSettings
 from sessions.recording.settings import RecorderSettings
 
 DEFAULT_PATH = Path("gyrofree.toml")
@@ -35,6 +36,7 @@ class Settings(BaseModel):
     gateway: GatewaySettings = Field(default_factory=GatewaySettings)
     estimator: EstimatorSettings = Field(default_factory=EstimatorSettings)
     recorder: RecorderSettings = Field(default_factory=RecorderSettings)
+    procedures: ProcedureSettings = Field(default_factory=ProcedureSettings)
     dashboard: DashboardSettings = Field(default_factory=DashboardSettings)
 
 

@@ -5,14 +5,21 @@ from typing import Annotated
 
 import typer
 
-from gyrofree.commands import calibrate, handover, layout, sessions, users
+from gyrofree.commands import calibrate, handover, layout, procedure, sessions, users
 from gyrofree.commands import run as logs
 from gyrofree.commands.board import board
 from gyrofree.commands.demo import demo, play
 from gyrofree.commands.doctor import doctor
 from gyrofree.commands.options import say
 from gyrofree.commands.replay import replay
-from gyrofree.commands.services import dashboard, estimator, gateway, record, router
+from gyrofree.commands.services import (
+    dashboard,
+    estimator,
+    gateway,
+    procedures,
+    record,
+    router,
+)
 from gyrofree.commands.simulate import simulate
 
 app = typer.Typer(
@@ -29,6 +36,7 @@ app = typer.Typer(
 app.add_typer(users.app, name="users")
 app.add_typer(layout.app, name="layout")
 app.add_typer(sessions.app, name="sessions")
+app.add_typer(procedure.app, name="procedure")
 handover.mount(app)
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(logs.app, name="reproduce")
@@ -40,6 +48,7 @@ for command in (
     gateway,
     estimator,
     record,
+    procedures,
     dashboard,
     simulate,
     play,

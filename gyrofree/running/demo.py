@@ -38,6 +38,7 @@ class Plan:
     time_scale: float = 1.0  # seconds of the log per second
     estimator: str = ""  # further lines of [estimator]
     once: bool = False  # the board is a log that is played to its end
+    table: bool = False  # the board stands on a table that takes orders
 
 
 SIMULATED = {  # boards of `gyrofree simulate` besides the table: its arguments, device, layout
@@ -82,6 +83,10 @@ cards = "{plan.folder / "cards"}"
 root = "{plan.folder / "sessions"}"
 auto_start = {str(plan.record).lower()}
 
+[procedures]
+root = "{plan.folder / "procedures"}"
+folder = "{plan.folder / "own-procedures"}"
+{_table(plan)}
 [dashboard]
 host = "{plan.host}"
 port = {plan.port}
@@ -91,6 +96,17 @@ demo = true
 """
     )
     return path
+
+
+def _table(plan: Plan) -> str:
+    """The simulated table as one that procedures drive."""
+    if not plan.table:
+        return ""
+    return f"""[[procedures.tables]]
+device = "{plan.device}"
+port = "{plan.folder / "table"}"
+description = "simulated"
+"""
 
 
 def run(plan: Plan) -> None:
@@ -150,12 +166,13 @@ def _summary(settings: Settings, plan: Plan) -> str:
 
 def _supervise(plan: Plan, config: Path) -> Supervisor:
     supervisor = Supervisor()
-    for service in ("router", "gateway", "estimator", "record", "dashboard"):
+    for service in ("router", "gateway", "estimator", "record", "procedures", "dashboard"):
         supervisor.add(service, service, "--config", str(config))
     # The board comes last: estimators that see its first standstill know its heading and biases
     # from the start.
     name, *arguments = plan.board  # a log's name may begin with -, and comes last
     places = [f"--config={config}", f"--link={plan.folder / 'board'}"]
+    places += [f"--table-link={plan.folder / 'table'}"] if plan.table else []
     board = [name, *places, *arguments]
     supervisor.add("board", *board, waits_for=("estimator", "estimating"), once=plan.once)
     return supervisor
