@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from gyrofree.commands import calibrate, handover, layout, sessions, users
+from gyrofree.commands import calibrate, config, handover, layout, sessions, users
 from gyrofree.commands import run as logs
 from gyrofree.commands.board import board
 from gyrofree.commands.demo import demo, play
@@ -14,6 +14,7 @@ from gyrofree.commands.options import say
 from gyrofree.commands.replay import replay
 from gyrofree.commands.services import dashboard, estimator, gateway, record, router
 from gyrofree.commands.simulate import simulate
+from gyrofree.commands.up import up
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -27,6 +28,7 @@ app = typer.Typer(
 )
 
 app.add_typer(users.app, name="users")
+app.add_typer(config.app, name="config")
 app.add_typer(layout.app, name="layout")
 app.add_typer(sessions.app, name="sessions")
 handover.mount(app)
@@ -36,6 +38,7 @@ for command in (
     logs.run,
     board,
     demo,
+    up,
     router,
     gateway,
     estimator,
