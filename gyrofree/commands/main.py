@@ -13,6 +13,7 @@ from gyrofree.commands.doctor import doctor
 from gyrofree.commands.options import say
 from gyrofree.commands.replay import replay
 from gyrofree.commands.services import dashboard, estimator, gateway, record, router
+from gyrofree.commands.setup import setup
 from gyrofree.commands.simulate import simulate
 from gyrofree.commands.up import up
 
@@ -38,6 +39,7 @@ for command in (
     logs.run,
     board,
     demo,
+    setup,
     up,
     router,
     gateway,

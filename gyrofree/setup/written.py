@@ -56,7 +56,9 @@ def _table(
     below: list[str] = []
     for key in keys_of(type(model)):
         value = getattr(model, key.name)
-        if value is None or not (everything or _stands(key) or value != key.default):
+        if not (everything or _stands(key) or value != key.default):
+            continue
+        if value is None and key.default is None:
             continue
         if key.model is not None:
             for name, inner, listed in _inner(key, value):
@@ -125,6 +127,9 @@ def _name(key: str) -> str:
 
 
 def _value(value: Any) -> str:
+    """As TOML, which has no word for none: where that is meant, the text is empty."""
+    if value is None:
+        return '""'
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_value, value))}]"
     return _right({"k": str(value) if isinstance(value, Path) else value}).partition(" = ")[2]
