@@ -125,9 +125,11 @@ class EstimatorSettings(BaseModel):
         shown=True,
     )
     journal_bytes: int = setting(
-        1 << 30, "kept there, the oldest go first ...", unit="bytes", ge=1 << 20
+        1 << 30, "kept there, the oldest go first", unit="bytes", ge=1 << 20
     )
-    journal_age_s: float = setting(7200.0, "... and for so long", unit="s", ge=60.0)
+    journal_age_s: float = setting(
+        7200.0, "what is published is kept there no longer", unit="s", ge=60.0
+    )
     rate_limit_hz: float = setting(
         200.0, "at most, of each rate/<estimator>", unit="Hz", gt=0.0, le=1000.0
     )

@@ -64,10 +64,13 @@ class GatewaySettings(BaseModel):
         2 << 30, "kept per device, oldest segments go first", unit="bytes", ge=1 << 20
     )
     published_bytes: int = setting(
-        1 << 30, "of published messages kept per device ...", unit="bytes", ge=1 << 20
+        1 << 30,
+        "of published messages kept per device, for consumers that missed some",
+        unit="bytes",
+        ge=1 << 20,
     )
     published_age_s: float = setting(
-        7200.0, "... and for so long, for consumers that missed some", unit="s", ge=60.0
+        7200.0, "published messages are kept no longer", unit="s", ge=60.0
     )
     segment_bytes: int = setting(
         4 << 20, "of a journal file; a history query reads whole ones", unit="bytes", ge=1 << 16

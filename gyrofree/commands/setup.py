@@ -96,7 +96,7 @@ def setup(
         dashboard_port=dashboard_port,
         bus_port=bus_port,
     )
-    manner = dialogue.Manner(config, ports_in, seconds, listen, look, force, yes or as_json)
+    manner = dialogue.Manner(config, ports_in, seconds, listen, look, force, yes, as_json)
     result = dialogue.hold(wishes, manner)
     if as_json:
         say(json.dumps(result, indent=2))

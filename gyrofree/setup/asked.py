@@ -20,20 +20,23 @@ COLOURS = {"board": "bold green", "receiver": "green", "text": "yellow", "other"
 
 
 class Asker:
-    """Asks at a terminal; quiet: takes every proposal and says nothing."""
+    """Asks at a terminal.
 
-    def __init__(self, quiet: bool) -> None:
-        self.quiet = quiet
+    quiet: takes every proposal instead. silent: says nothing either.
+    """
+
+    def __init__(self, quiet: bool, silent: bool) -> None:
+        self.quiet, self.silent = quiet or silent, silent
         self.console: Console = Terminal(stderr=True, highlight=False)
 
     def say(self, text: str, style: str = "") -> None:
         """A line."""
-        if not self.quiet:
+        if not self.silent:
             self.console.print(Text(text, style), soft_wrap=True)
 
     def heard(self, found: list[Found]) -> None:
         """What speaks where, as a table with numbers to choose by."""
-        if self.quiet or not found:
+        if self.silent or not found:
             return
         table = Table("", "port", "baud", "what speaks", show_lines=len(found) > 1)
         for number, one in enumerate(found, 1):

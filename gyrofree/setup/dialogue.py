@@ -47,16 +47,19 @@ class Manner:
     look: bool  # listen only
     force: bool
     yes: bool  # ask nothing
+    silent: bool  # nor say anything
 
 
 def hold(wishes: Wishes, manner: Manner) -> dict:
     """Listen, ask, write; what came of it. Ends the command with a word where it cannot go on."""
-    asker = Asker(manner.yes or not sys.stdin.isatty())
+    asker = Asker(manner.yes or not sys.stdin.isatty(), manner.silent)
     before = _before(manner, asker)
     found = _heard(wishes, manner, asker)
     result: dict = {"ports": [one.as_dict() for one in found]}
     if manner.look:
-        return _looked(asker, found, result)
+        if not found:
+            raise fail("no serial port is there")
+        return result
     answers = _answers(wishes, found, before, asker)
     try:
         settings = settings_with(before, answers)
@@ -70,7 +73,6 @@ def hold(wishes: Wishes, manner: Manner) -> dict:
     except (OSError, UsersError) as error:
         raise fail(error) from None
     words = "gyrofree up" + _named(manner.config)
-    asker.quiet = manner.yes
     asker.say(f"written: {manner.config}" + (f"; the old one is {kept}" if kept else ""))
     if user:
         asker.say(f"{user[0]} may sign in as administrator")
@@ -127,16 +129,6 @@ def _heard(wishes: Wishes, manner: Manner, asker: Asker) -> list[Found]:
     found = [listen(port, bauds.get(port), manner.seconds, asker.say) for port in ports]
     asker.heard(found)
     return found
-
-
-def _looked(asker: Asker, found: list[Found], result: dict) -> dict:
-    if not found:
-        raise fail("no serial port is there")
-    if asker.quiet:
-        asker.quiet = False
-        for one in found:
-            asker.say(f"{one.port}\t{one.baud}\t{one.said}")
-    return result
 
 
 def _answers(wishes: Wishes, found: list[Found], before: Settings, asker: Asker) -> Answers:

@@ -11,6 +11,7 @@ from pydantic import BaseModel
 from gateway.settings import DeviceSettings
 from gyrofree.config import Settings
 from gyrofree.setup.keys import Key, is_list, keys_of
+from messages.text import plain
 
 WIDTH = 110  # characters of a line
 EXAMPLE = DeviceSettings(
@@ -115,7 +116,10 @@ def _said(key: Key) -> str:
 
 
 def _comment(text: str) -> list[str]:
-    return [f"# {line}" for line in textwrap.wrap(text, WIDTH - 2, break_on_hyphens=False)]
+    return [
+        f"# {line}"
+        for line in textwrap.wrap(plain(text, 4 * WIDTH), WIDTH - 2, break_on_hyphens=False)
+    ]
 
 
 def _joined(path: tuple[str, ...]) -> str:
