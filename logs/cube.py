@@ -232,14 +232,14 @@ def run_estimator(
     estimator, n = make(ESTIMATORS[name], shape, card), len(data.t_s)
     reports = _reports(data) if tacho_aid else {}
     said = _Said(n, SCORED if lean else SAID)
-    busy, mask, refused = 0, 0, ""
+    busy, trust, refused = 0, (0, 0.0), ""
     for part in cut(parts, list(reports)):
         began = time.thread_time_ns()
         if part.missing:
             estimator.skip(part.missing)
-        if part.mask != mask:
-            mask = part.mask
-            if (error := leave_out(estimator, mask)) is not None:
+        if (part.mask, part.scale) != trust:
+            trust = part.mask, part.scale
+            if (error := leave_out(estimator, *trust)) is not None:
                 refused = f"{name} knew nothing while axes were not good: {error}"
         for begin in range(part.begin, part.end, BLOCK):
             rows = slice(begin, min(begin + BLOCK, part.end))

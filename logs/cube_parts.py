@@ -4,7 +4,7 @@ axes are believed, so that a log gives the same answer whichever way it goes.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ class Part:
     end: int
     missing: int  # samples before its first
     mask: int  # bit k: axis k is not believed
+    scale: float = 0.0  # scale errors of all axes beyond what is expected, sigma, of 1
 
 
 @dataclass(frozen=True)
@@ -54,8 +55,8 @@ def monitored(data: CubeLog, shape: Layout, f_axis: Array) -> Monitored:
         if missing:
             monitor.skip(missing)
         at = begin
-        for stop, mask in monitor.feed(data.t_s[begin:end], f_axis[begin:end]):
-            parts.append(Part(at, begin + stop, missing if at == begin else 0, mask))
+        for stop, *trust in monitor.feed(data.t_s[begin:end], f_axis[begin:end]):
+            parts.append(Part(at, begin + stop, missing if at == begin else 0, *trust))
             at = begin + stop
     return Monitored(tuple(parts), tuple(monitor.faults), monitor.belief.width.text)
 
@@ -64,9 +65,9 @@ def cut(parts: Sequence[Part], rows: Sequence[int]) -> list[Part]:
     """The parts cut once more so that each of `rows` is the last of a part."""
     ends, out = sorted(rows), []
     for part in parts:
-        begin = part.begin
+        begin, missing = part.begin, part.missing
         for row in (row for row in ends if part.begin <= row < part.end - 1):
-            out.append(Part(begin, row + 1, part.missing if begin == part.begin else 0, part.mask))
-            begin = row + 1
-        out.append(Part(begin, part.end, part.missing if begin == part.begin else 0, part.mask))
+            out.append(replace(part, begin=begin, end=row + 1, missing=missing))
+            begin, missing = row + 1, 0
+        out.append(replace(part, begin=begin, missing=missing))
     return out

@@ -63,7 +63,7 @@ class RateBoard:
         self._last_t: float | None = None
         self._period_s = 0.01
         self.health: Any = None  # inertial.rate.health.HealthMonitor
-        self._mask = 0  # axes that the estimators were told to leave out
+        self._trust = 0, 0.0  # axes that the estimators were told to leave out, and the scale
 
     def _start(self, reason: str) -> None:
         from inertial.rate.health import HealthMonitor  # here: loads only where it is needed
@@ -74,7 +74,7 @@ class RateBoard:
             name: make(kind, self.layout, self.card, self._beliefs)
             for name, kind in self._make.items()
         }
-        self.health, self._mask = HealthMonitor(self.layout, self._period_s), 0
+        self.health, self._trust = HealthMonitor(self.layout, self._period_s), (0, 0.0)
 
     def feed(
         self,
@@ -126,8 +126,8 @@ class RateBoard:
         self._last_t = float(t_s[-1])
         f_axis = np.ascontiguousarray(f_axis, dtype=np.float64)
         out, begin = [], 0
-        for end, mask in self.health.feed(t_s, f_axis, stale):
-            self._exclude(mask)
+        for end, mask, scale in self.health.feed(t_s, f_axis, stale):
+            self._tell(mask, scale)
             out += self._run(
                 first_index, begin, t_s[begin:end], f_axis[begin:end], every(period_s, self._limit)
             )
@@ -167,24 +167,28 @@ class RateBoard:
         self.cost_ns[name] = self.cost_samples[name] = 0
         return cost
 
-    def _exclude(self, mask: int) -> None:
-        """Tell the estimators when the axes they may use have changed; one that cannot do without
-        says so itself.
+    def _tell(self, mask: int, scale: float) -> None:
+        """Tell the estimators when the axes they may use have changed, or how far those may be off;
+        one that cannot do without says so itself.
         """
         from inertial.rate.estimators import leave_out  # here: loads only where it is needed
 
-        if mask == self._mask:
+        if (mask, scale) == self._trust:
             return
-        names = [name for k, name in enumerate(self.wiring.axis_names) if mask >> k & 1]
-        log.warning(
-            "%s: axes not used: %s", self.device, ", ".join(names) or "none, all are good again"
-        )
-        self._mask = mask
+        if mask != self._trust[0]:
+            self._say_left_out(mask)
+        self._trust = mask, scale
         for estimator in self._estimators.values():
-            if (error := leave_out(estimator, mask)) is not None:
+            if (error := leave_out(estimator, mask, scale)) is not None:
                 log.warning(
                     "%s: %s knows nothing until axes are good again: %s",
                     self.device,
                     estimator.name,
                     error,
                 )
+
+    def _say_left_out(self, mask: int) -> None:
+        names = [name for k, name in enumerate(self.wiring.axis_names) if mask >> k & 1]
+        log.warning(
+            "%s: axes not used: %s", self.device, ", ".join(names) or "none, all are good again"
+        )

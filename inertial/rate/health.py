@@ -27,6 +27,9 @@ from inertial.rate.samples import BRIDGED
 Array = NDArray[np.float64]
 
 
+# Faults that the others give away. Of more than a sixth of the axes, who are the others?
+BY_OTHERS = (AxisState.SWAPPED, AxisState.FLIPPED, AxisState.BIASED)
+
 # Blocks from one question to the next, and once readings could not be explained time and again.
 ASK, ASK_LESS = 3, 12
 
@@ -47,6 +50,7 @@ class HealthMonitor:
         self.newest = Newest(np.zeros(n), np.ones(n))
         self.message = ""
         self._mask = 0
+        self._beyond_belief = False
         self._sees = bool(np.isfinite(layout.gdop))
         self.belief = Belief(layout, config, self.per_block)
         self._near = np.zeros((axis_samples.KEPT, n))
@@ -68,8 +72,13 @@ class HealthMonitor:
 
     @property
     def mask(self) -> int:
-        """Bit k: axis k is excluded."""
-        return self._mask
+        """Bit k: axis k is excluded; all of them where so many do not fit that none is believed."""
+        return (1 << self.layout.axes) - 1 if self._beyond_belief else self._mask
+
+    @property
+    def scale(self) -> float:
+        """Sigma of scale errors and directions, of 1, beyond what is expected; 0: as expected."""
+        return self.belief.width.scale
 
     def _known(self) -> Known:
         belief = self.belief
@@ -85,14 +94,15 @@ class HealthMonitor:
         """
         self.feed(np.array([t_s]), np.asarray(f_axis)[None], stale)
 
-    def feed(self, t_s: Array, f_axis: Array, stale: int = 0) -> list[tuple[int, int]]:
+    def feed(self, t_s: Array, f_axis: Array, stale: int = 0) -> list[tuple[int, int, float]]:
         """Samples at t_s (n,), s, board's clock, readings (n, N) m/s^2; how they are batched
         changes nothing.
 
-        Returns the batch cut where the mask changed: (end, mask) of each part. A change holds from
-        the very sample that made it.
+        Returns the batch cut where the mask or the scale changed: (end, mask, scale) of each part.
+        A change holds from the very sample that made it.
         """
-        f, row, parts, mask = np.ascontiguousarray(f_axis, dtype=np.float64), 0, [], self.mask
+        f, row, parts = np.ascontiguousarray(f_axis, dtype=np.float64), 0, []
+        trust = self.mask, self.scale
         near, marks = self._near, self._marks
         while row < len(f):
             row = axis_samples.gather(
@@ -116,10 +126,10 @@ class HealthMonitor:
             near[axis_samples.SUM] = 0.0
             self._block(block, dt)
             self._stale = 0
-            if self.mask != mask:
-                parts.append((row - 1, mask))
-                mask = self.mask
-        return [*(part for part in parts if part[0] > 0), (len(f), mask)]
+            if (self.mask, self.scale) != trust:
+                parts.append((row - 1, *trust))
+                trust = self.mask, self.scale
+        return [*(part for part in parts if part[0] > 0), (len(f), *trust)]
 
     def skip(self, samples: int) -> None:
         """Samples are missing before the next one."""
@@ -156,10 +166,12 @@ class HealthMonitor:
             if self.verdicts.returns(*about, self.belief):
                 self.history.clear()
             self._mask = self.verdicts.mask
+        doubted = sum(fault.excluded and fault.state in BY_OTHERS for fault in self.faults)
+        self._beyond_belief = doubted > self.layout.axes // 6
         if self._mask:
-            self.message = "; ".join(
-                filter(None, (f"axes: {self.verdicts.text}", self.belief.width.text))
-            )
+            none = "none is believed: check wiring and layout" if self._beyond_belief else ""
+            parts = f"axes: {self.verdicts.text}", none, self.belief.width.text
+            self.message = "; ".join(filter(None, parts))
         elif self.counts.blocks - self._clean_blocks > 0:
             self.message = self.belief.width.text
 

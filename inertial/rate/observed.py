@@ -102,6 +102,8 @@ def _solve(layout: Layout, keep: NDArray[np.int64]) -> tuple[Array, Array]:
     """S (6, n) and the rows of B (m, n) of the kept axes, solved with lengths in units of the
     layout's scale.
     """
+    if not len(keep):
+        raise GeometryError("no axis can be believed: check the wiring, the layout and the board")
     unit = np.array([layout.scale_m] * 3 + [1.0] * 3)
     J, Q = layout.J[keep] / unit, layout.Q[keep] / layout.scale_m
     left, sigma, right = native.svd(J)

@@ -46,13 +46,6 @@ def test_it_is_that_of_its_definition(milli_g):
     np.testing.assert_allclose(measured(log), noise(log.readings @ s.W.T, s), rtol=1e-9)
 
 
-def test_parity_is_heard():
-    estimator = ProductsRate(CUBE(0.05))
-    for _ in range(200):
-        estimator.core.native.hear(9.0)
-    assert estimator.core.native.noise == pytest.approx((9.0, 9.0), rel=0.01)
-
-
 def test_the_noise_that_a_layout_says_is_believed():
     def noisy(noise):
         layout = CUBE(0.05)

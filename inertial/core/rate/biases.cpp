@@ -102,7 +102,14 @@ void grow_biases(Filter& f, const Sensor& s, const Tuning& t, const Moment& mome
     f.x(b) = f.rest_bias(k) + follow(b) * (f.x(b) - f.rest_bias(k));
   }
   for (int j = 0; j < STATES; ++j) f.P.col(j) = f.P.col(j).cwiseProduct(follow * follow(j));
-  add_to_biases(f.P, s.drift, (t.drift + moment.wander) * seconds);
+  // what a bias wanders does not go when the readings come back
+  const double walked = (t.drift + moment.wander) * seconds;
+  add_to_biases(f.P, s.drift, walked);
+  if (turning)
+    for (int k = 0; k < MEASURED; ++k) {
+      f.rest_variance(k) += s.drift(k, k) * walked;
+      f.level(k) += s.drift(k, k) * walked;
+    }
   if (turning) swing_biases(f, s, t, seconds);
 }
 

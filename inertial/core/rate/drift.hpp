@@ -15,11 +15,15 @@ class Drift {
   void moved(const Sensor& s, const Measurement& d, double noise, double seconds);
   // Variance of one axis' slope, (m/s^2)^2 per s^2; 0 where none can be told from noise.
   double variance() const { return variance_; }
+  // The same with what may hide in the noise: what the filter must allow for.
+  double possible() const { return possible_; }
 
  private:
   static double of_one_axis(const Sensor& s, const Measurement& y);
+  void told(double found, double noise);
 
   double variance_ = 0.0;
+  double possible_ = 0.0;
   double known_ = 0.0;  // the noise it was told from
   // Of the samples of this standstill: how many, and sums of time, its square, y, and both.
   double count_ = 0.0, times_ = 0.0, squares_ = 0.0, begin_s_ = 0.0;

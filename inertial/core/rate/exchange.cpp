@@ -16,6 +16,7 @@ void Frame::exchange_axes(const Constants& configured, const Axes& axes) {
   arrivals_.clear();
   fitted_ = 0;
   against_s_ = 0.0;
+  rest_from_ = -DEPTH;
   if (!started_) return since_rest_.forget();
   if (axes.fewer) return from_rest(believed(configured));
   since_rest_.forget();

@@ -82,8 +82,11 @@ void Frame::advance(const Constants& configured, double t_s, const double* a) {
     return;
   }
   const long now = watch_.newest();
-  const long first = begin_of_motion(verdict, now);
-  if (verdict.against && !still_) begin(c);  // the rate was wrong, and so is what it was made of
+  const long first = begin_of_motion(c, verdict, now);
+  if (verdict.against && !still_) {  // the rate was wrong, and so is what it was made of
+    begin(c);
+    rest_from_ = -DEPTH;
+  }
   still_ = verdict.still;
   const bool fixed = !still_ && on_axis(c);
   if (still_) arrivals_.clear();
@@ -124,8 +127,11 @@ bool Frame::settle_start(const Constants& c) {
 bool Frame::contradicted() {
   constexpr double FAR = 2.0;       // of NIS per degree of freedom, over a second
   constexpr double PATIENCE_S = 3.0;  // s
+  constexpr int NOT_DAMAGE = 10;      // samples in a row that the products of omega refuse
+  unused_ = said_.used ? 0 : unused_ + 1;
   against_s_ = agreement_.fast() > FAR ? against_s_ + dt_ : 0.0;
-  if (against_s_ < PATIENCE_S) return false;
+  if (against_s_ < PATIENCE_S && unused_ < NOT_DAMAGE) return false;
+  unused_ = 0;
   ++lost_;
   return true;
 }
@@ -163,6 +169,7 @@ double Frame::fit(const Constants& c) {
 // One more sample of a start while turning: fitted anew now and then, carried on between (E-46).
 void Frame::fit_start(const Constants& c, bool still) {
   const int n = ++fitted_;
+  if (watch_.rough(c.sensor, 1)) return restart();  // a damaged sample
   if (still) {  // it was no turn
     begin(c);
     moved_ = false;
@@ -181,20 +188,33 @@ void Frame::fit_start(const Constants& c, bool still) {
 }
 
 // First sample to run: the newest one, or where a turn began that is noticed now.
-long Frame::begin_of_motion(const Verdict& verdict, long now) {
+long Frame::begin_of_motion(const Constants& c, const Verdict& verdict, long now) {
   if (verdict.still) {
+    if (!still_) {
+      before_rest_ = first_.filter;
+      rest_from_ = now;
+    }
     if (now % EVERY == 0) kept_.keep(now, first_.filter);
     return now;
   }
   if (!still_) return now;
   moved_ = true;
-  const long first = kept_.nearest(now - verdict.depth, now);
-  if (first >= 0) {
+  long first = kept_.nearest(now - verdict.depth, now);
+  if (now - rest_from_ < DEPTH - EVERY && branches_ == 1) {  // so short that it was none
+    first = rest_from_;
+    first_.filter = before_rest_;
+  } else if (first >= 0) {
     first_.filter = *kept_.of(first);
-    taken_back_ += now - first;
   }
+  if (first >= 0) taken_back_ += now - first;
   kept_.clear();
+  if (noisier_) first_.filter.P.block<3, 3>(OMEGA, OMEGA) += late(c) * Matrix3::Identity();
   return first >= 0 ? first : now;
+}
+
+// A turn is noticed the later the more the axes scatter.
+double Frame::late(const Constants& c) const {
+  return c.tuning.unseen_rate * (watch_.noise().unnoticed() - 1.0);
 }
 
 // Does omega keep its direction? Not while omega' across it, summed over 16 or 64 samples, is more than

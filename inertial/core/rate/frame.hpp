@@ -125,7 +125,8 @@ class Frame {
   void begin(const Constants& c);
   double fit(const Constants& c);
   void fit_start(const Constants& c, bool still);
-  long begin_of_motion(const Verdict& verdict, long now);
+  long begin_of_motion(const Constants& c, const Verdict& verdict, long now);
+  double late(const Constants& c) const;
   bool on_axis(const Constants& c);
   void free_for_a_while(const Constants& c);
   void run(const Constants& c, long first, long now, bool fixed, const StateVector* end);
@@ -146,6 +147,8 @@ class Frame {
   Start second_;  // of the other sign, while there are two
   KeptStates<DEPTH / EVERY + 1> kept_;
   KeptStates<4> arrivals_;  // of the moving horizon: states before samples of this turn
+  Filter before_rest_;   // as it was before the newest standstill
+  long rest_from_ = -DEPTH;  // sample that one begins with
   Agreement agreement_;
   Intake intake_;
   SinceRest since_rest_;
@@ -163,6 +166,7 @@ class Frame {
   int branches_ = 0;    // signs that are followed
   int fitted_ = 0;      // samples of a start while turning that is still being fitted
   int free_for_ = 0;    // samples for which the body is taken to turn freely
+  int unused_ = 0;      // samples in a row whose products were refused
   long unlike_ = 0;     // samples in a row whose force was refused
   long refused_ = 0;
   long refused_force_ = 0;

@@ -5,8 +5,26 @@ namespace {
 
 constexpr double AT_THE_END = 0.995;   // of the range
 constexpr double NEAR_THE_END = 0.9;   // of it: an axis that does not change there is at an end as well
+constexpr double JUMP = 10.0;          // m/s^2 from sample to sample: no body that is turned on a table does that
+constexpr int CALM = 8;                // samples without a jump, before one is taken for damage
 
 }  // namespace
+
+// Does an axis jump, and is it a spike? One that has not come back after BRIDGED_SAMPLES was a motion.
+bool Intake::spikes(const Sensor& s, const double* a) {
+  bool jumps = false;
+  for (int i = 0; i < s.n; ++i)
+    if (s.used(i) != 0.0 && std::fabs(a[i] - taken_(i)) > JUMP) jumps = true;
+  const bool damage = jumps && (spike_ > 0 ? spike_ < BRIDGED_SAMPLES : calm_ >= CALM);
+  if (damage) {
+    ++spike_;
+    return true;
+  }
+  spike_ = 0;
+  calm_ = jumps ? 0 : calm_ + 1;
+  for (int i = 0; i < s.n; ++i) taken_(i) = a[i];
+  return false;
+}
 
 bool Intake::usable(const Sensor& s, const double* a, double dt, bool noisy) {
   bool changes = false, inside = true;
@@ -19,7 +37,8 @@ bool Intake::usable(const Sensor& s, const double* a, double dt, bool noisy) {
     last_(i) = a[i];
   }
   same_s_ = changes ? 0.0 : same_s_ + dt;
-  return inside && !withheld_ && !(noisy && same_s_ >= FROZEN_S);
+  const bool spike = spikes(s, a);
+  return inside && !spike && !withheld_ && !(noisy && same_s_ >= FROZEN_S);
 }
 
 bool Intake::refuses(const Sensor& s, const double* a, double dt, bool noisy) {

@@ -1,5 +1,6 @@
 // Does a sample say anything of the body? Not where an axis is at the end of its range, where no axis
-// changes any more, or where somebody withholds them; unknown is then all that can be said.
+// changes any more, where one jumps and comes back, or where somebody withholds them; unknown is then
+// all that can be said.
 #pragma once
 
 #include "rate/sensor.hpp"
@@ -20,8 +21,12 @@ class Intake {
  private:
   static constexpr double FROZEN_S = 1.0;  // s in which no axis changes
   bool usable(const Sensor& s, const double* a, double dt, bool noisy);
+  bool spikes(const Sensor& s, const double* a);
 
   Vector<MOST_AXES> last_ = Vector<MOST_AXES>::Zero();
+  Vector<MOST_AXES> taken_ = Vector<MOST_AXES>::Zero();  // the newest sample that was no spike
+  int calm_ = 0;    // samples without a jump
+  int spike_ = 0;   // samples of a jump that may come back
   double same_s_ = 0.0;  // in which no axis changed
   int missing_ = 0;
   long refused_ = 0;

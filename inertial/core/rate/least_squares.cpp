@@ -91,7 +91,7 @@ void LeastSquares::align() {
 // Covariance of omega (E-8): white noise summed, bias error times time.
 Matrix3 LeastSquares::covariance(const Sensor& s) const {
   if (samples_ == 0) return UNKNOWN_RATE * UNKNOWN_RATE * Matrix3::Identity();
-  if (moving_s_ == 0.0) return watch_.noise().quiet() * UNSEEN_RATE * UNSEEN_RATE * Matrix3::Identity();
+  if (moving_s_ == 0.0) return watch_.noise().unnoticed() * UNSEEN_RATE * UNSEEN_RATE * Matrix3::Identity();
   return noise_ * s.R_alpha * (dt_ * moving_s_ + moving_s_ * moving_s_ / samples_);
 }
 

@@ -3,7 +3,6 @@
 namespace gyrofree::rate {
 namespace {
 
-constexpr double THIRD_DIFFERENCE = 20.0;  // variance of a third difference of white noise over the noise's own
 constexpr double NOISE_CLIP = 6.0;    // of one ratio over the mean so far: a jolt is no noise
 
 }  // namespace

@@ -12,16 +12,18 @@ namespace gyrofree::rate {
 
 constexpr int DIFFERENCED = 4;  // samples of one third difference
 
+constexpr double THIRD_DIFFERENCE = 20.0;  // variance of one of white noise over the noise's own
+
 class Noise {
  public:
   // y0 - 3 y1 + 3 y2 - y3 of samples in a row, by the configured noise of s.
   void observe(const Sensor& s, const Measurement& third_difference);
-  // What something else says of one sample: the axes' variance over the configured one (the chi-square
-  // of parity residuals over its degrees of freedom). No answer below is less than its mean.
-  void hear(double ratio) { heard_.add(ratio); }
   // Variances over the configured ones, at least 1: of omega' and c, and of p.
-  double quiet() const { return std::max(quiet_.believed(QUIET_SLACK), heard_.believed(QUIET_SLACK)); }
-  double force() const { return std::max(force_.believed(FORCE_SLACK), heard_.believed(FORCE_SLACK)); }
+  double quiet() const { return quiet_.believed(QUIET_SLACK); }
+  double force() const { return force_.believed(FORCE_SLACK); }
+  // Variance of what of a turn is not noticed yet, over that of axes as configured: it is seen by omega'
+  // and by p, and p may scatter so much that it shows nothing.
+  double unnoticed() const { return as_configured() ? 1.0 : quiet() * std::clamp(force() / quiet(), 2.4, 4.0); }
   // Do the axes scatter at all? Those of a model without noise do not.
   bool any() const { return quiet_.value > 0.05; }
   bool as_configured() const { return quiet() == 1.0 && force() == 1.0; }
@@ -37,7 +39,7 @@ class Noise {
     double believed(double slack) const;
   };
 
-  Mean quiet_, force_, heard_;
+  Mean quiet_, force_;
 };
 
 // The sensor with the noise that was measured.

@@ -88,7 +88,7 @@ void write(const Frame& frame, const Constants& c, Row& row) {
   if (!frame.started())
     for (int i = 0; i < 3; ++i) row.P[i][i] = UNKNOWN_RATE * UNKNOWN_RATE;
   if (phase_of(frame) == STILL)  // it may have begun to turn, the more of it unseen the noisier the axes are
-    for (int i = 0; i < 3; ++i) row.P[i][i] += c.tuning.unseen_rate * frame.noise().quiet();
+    for (int i = 0; i < 3; ++i) row.P[i][i] += c.tuning.unseen_rate * frame.noise().unnoticed();
   put(row.alpha_b, y.segment<3>(ALPHA_M) - f.x.segment<3>(BIAS_ALPHA));
   put(row.f_b, y.segment<3>(FORCE_M) - f.x.segment<3>(BIAS_FORCE));
   put(row.q_nb, f.q_nb);

@@ -33,14 +33,16 @@ void SinceRest::take(const Sensor& s, const double* a, double dt, bool still, co
 // The oldest block was of rest for certain.
 void SinceRest::fold() {
   rest_.add(blocks_[0]);
-  std::move(blocks_ + 1, blocks_ + count_, blocks_);
+  std::move(blocks_.begin() + 1, blocks_.begin() + count_, blocks_.begin());
   --count_;
 }
 
 void SinceRest::coarsen() {
   for (int k = 0; k < MOST_BLOCKS / 2; ++k) {
-    blocks_[k] = blocks_[2 * k];
-    blocks_[k].add(blocks_[2 * k + 1]);
+    const Block* pair = &blocks_[k + k];
+    Block both = pair[0];
+    both.add(pair[1]);
+    blocks_[k] = both;
   }
   count_ = MOST_BLOCKS / 2;
   length_ *= 2;

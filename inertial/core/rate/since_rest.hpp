@@ -5,6 +5,8 @@
 // and goes through these blocks with what is left (E-89).
 #pragma once
 
+#include <array>
+
 #include "rate/filter.hpp"
 
 namespace gyrofree::rate {
@@ -44,7 +46,7 @@ class SinceRest {
   void coarsen();
 
   Block rest_;
-  Block blocks_[MOST_BLOCKS];
+  std::array<Block, MOST_BLOCKS> blocks_;
   int count_ = 0;
   int length_ = 8;  // samples of a block
   bool standing_ = false;

@@ -197,6 +197,7 @@ double fit(Start& begun, const Watch& w, const Sensor& s, const Tuning& t, int n
 bool turns(const Watch& w, const Sensor& s, const Tuning& t) {
   if (w.filled_samples() < FEWEST || !s.plain) return false;
   const int n = std::min(w.filled_samples(), 32);
+  if (w.rough(s, n)) return false;  // a damaged sample
   const Products z = w.mean_of(n).segment<6>(PRODUCTS_M);
   const double size = SymmetricEigen<Matrix3>(outer(z)).values(2);
   const double noise = t.bias * s.drift(PRODUCTS_M, PRODUCTS_M) + s.R_c(0, 0) / n;

@@ -40,6 +40,18 @@ void Watch::take(const Sensor& s, const double* a, double dt) {
   measured.observe(s, y(last) - y(last - 3) + 3.0 * (y(last - 2) - y(last - 1)));
 }
 
+bool Watch::rough(const Sensor& s, int n) const {
+  constexpr double FAR = 40.0;  // of the mean square of third differences, over noise alone
+  for (long last = newest(); last > newest() - n && last - newest() + filled >= DIFFERENCED; --last) {
+    const Measurement e = y(last) - y(last - 3) + 3.0 * (y(last - 2) - y(last - 1));
+    double ratio = 0.0;
+    for (int k = 0; k < 3; ++k) ratio += square(e(ALPHA_M + k)) / s.R_alpha(k, k);
+    for (int k = 0; k < s.m; ++k) ratio += square(e(PRODUCTS_M + k)) / s.R_c(k, k);
+    if (ratio > FAR * THIRD_DIFFERENCE * (3 + s.m)) return true;
+  }
+  return false;
+}
+
 Measurement Watch::mean_of(int window) const {
   Measurement out = Measurement::Zero();
   for (int ago = 0; ago < window; ++ago) out += y(newest() - ago) / window;

@@ -38,6 +38,9 @@ class Watch {
 
   // May a body that never stood be standing, with axes' biases of that variance, (m/s^2)^2?
   bool could_stand(const Sensor& s, const StillLimits& c, double bias);
+  // Does a sample of the newest n stand out of its neighbours by far more than noise? s has the measured
+  // noise.
+  bool rough(const Sensor& s, int n) const;
   bool never_stood() const { return learnt == 0; }
   long newest() const { return count - 1; }
   int filled_samples() const { return filled; }
@@ -49,7 +52,7 @@ class Watch {
   Measurement total(long sample) const { return ring_total.col((sample + TOTALS) % TOTALS); }
   Measurement mean_of(int window) const;
   // (m/s^2)^2 per s, by which biases of one axis wander more than is configured.
-  double wander() const { return 2.0 * walk.variance() * std::clamp(seconds - settled_s, 2.0, 20.0); }
+  double wander() const { return 2.0 * walk.possible() * std::clamp(seconds - settled_s, 2.0, 20.0); }
   Noise& noise() { return measured; }
   const Noise& noise() const { return measured; }
 
