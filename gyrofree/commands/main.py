@@ -5,17 +5,19 @@ from typing import Annotated
 
 import typer
 
-from gyrofree.commands import calibrate, config, handover, layout, sessions, users
+from gyrofree.commands import calibrate, handover, layout, sessions, users
 from gyrofree.commands import run as logs
 from gyrofree.commands.board import board
 from gyrofree.commands.demo import demo, play
-from gyrofree.commands.doctor import doctor
+from gyrofree.commands.installation import config
+from gyrofree.commands.installation.completion import answer_the_shell, completion
+from gyrofree.commands.installation.doctor import doctor
+from gyrofree.commands.installation.setup import setup
+from gyrofree.commands.installation.up import up
 from gyrofree.commands.options import say
 from gyrofree.commands.replay import replay
 from gyrofree.commands.services import dashboard, estimator, gateway, record, router
-from gyrofree.commands.setup import setup
 from gyrofree.commands.simulate import simulate
-from gyrofree.commands.up import up
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -50,6 +52,7 @@ for command in (
     play,
     replay,
     doctor,
+    completion,
 ):
     app.command()(command)
 
@@ -72,4 +75,5 @@ def _root(
 
 def main() -> None:
     """Entry point of `gyrofree`."""
+    answer_the_shell()
     app()

@@ -28,6 +28,7 @@ ORDERS = {
     "calibrate simulate",
     "config default",
     "config reference",
+    "completion",
 }  # they do something, and have no result to print
 
 
