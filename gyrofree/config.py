@@ -18,6 +18,7 @@ from gateway.settings import GatewaySettings
 from inertial.toml_file import parsed, text_of
 from messages.bus.session import BusSettings
 from messages.setting import setting
+from sessions.procedure.settings import ProcedureSettings
 from sessions.recording.settings import RecorderSettings
 
 DEFAULT_PATH = Path("gyrofree.toml")
@@ -36,6 +37,9 @@ class Settings(BaseModel):
     gateway: GatewaySettings = setting(GatewaySettings(), "The boards and the journal of each")
     estimator: EstimatorSettings = setting(EstimatorSettings(), "Samples become motion")
     recorder: RecorderSettings = setting(RecorderSettings(), "What crossed the bus, kept")
+    procedures: ProcedureSettings = setting(
+        ProcedureSettings(), "Where runs of procedures are kept, and what they drive"
+    )
     dashboard: DashboardSettings = setting(DashboardSettings(), "The page in the browser")
 
 

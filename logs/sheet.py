@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.csv
 from numpy.typing import NDArray
 
+from logs.sheet_blocks import blocks, parsed, without_lines
 from logs.sheet_form import (
     COMMENTS,
     FIRST_LOOK,
@@ -34,8 +34,6 @@ from logs.sheet_form import (
     first_bytes,
     header_line,
     is_number,
-    long_line,
-    opened,
     printable,
 )
 
@@ -69,15 +67,16 @@ class _Rows:
     first: int  # number that the parser gives to the first row below the header
     skipped: array = field(default_factory=lambda: array("q"))  # comments and empty lines
     wrong: list[tuple[int, int, str]] = field(default_factory=list)  # row, cells, text: two at most
+    count: int = 0  # rows that the parser left out
 
-    def judge(self, row: pa.csv.InvalidRow) -> str:
-        """What to do with a row of a wrong number of cells."""
-        text = row.text.strip()
+    def judge(self, number: int, cells: int, text: str) -> None:
+        """Note a row of a wrong number of cells."""
+        self.count += 1
+        text = text.strip()
         if not text.strip(",;|\t ") or text.startswith(COMMENTS):
-            self.skipped.append(row.number)
+            self.skipped.append(number)
         elif len(self.wrong) < 2:
-            self.wrong.append((row.number, row.actual_columns, printable(text)))
-        return "skip"
+            self.wrong.append((number, cells, printable(text)))
 
     def lines(self, index: NDArray[np.int64]) -> NDArray[np.int64]:
         """Lines of the file of rows that were kept, by their order."""
@@ -164,49 +163,33 @@ class Sheet:
         columns = {name: column.whole() for name, column in kept.items()}
         return Table(columns, rows.lines(np.arange(done)), cut_off)
 
-    def _batches(self, names: list[str], rows: _Rows) -> Iterator[pa.RecordBatch]:
-        try:
-            with opened(self.path, self.size) as stream, self._open(stream, names, rows) as reader:
-                yield from reader
-        except UnicodeDecodeError as error:
-            raise LogError(f"{self.path}: no text in {self.encoding}: {error.reason}") from None
-        except pa.ArrowInvalid as error:
-            if "straddling" in str(error):
-                line = long_line(self.path, self.size)
-                raise LogError(
-                    f"{self.path}:{line}: a line of more than {LINE >> 20} MB; want one sample"
-                    " a line"
-                ) from None
-            raise LogError(
-                self._no_number(names) or f"{self.path}: {printable(str(error))}"
-            ) from None
-
-    def _open(self, stream, names: list[str], rows: _Rows) -> pa.csv.CSVStreamingReader:
+    def _batches(self, names: list[str], rows: _Rows) -> Iterator[pa.Table]:
         # names are ours: a column that stands twice, or has none, must not stop the reader
         unique = [f"{k}:{name}" for k, name in enumerate(self.header)]
         chosen = [unique[self.header.index(name)] for name in names]
-        return pa.csv.open_csv(
-            stream,
-            pa.csv.ReadOptions(
-                use_threads=False,
-                block_size=LINE,
-                skip_rows=self.header_line,
-                column_names=unique,
-                # numbers are ASCII; bytes that Windows-1252 does not know must not end the reading
-                encoding="latin-1" if self.encoding == "cp1252" else self.encoding,
-            ),
-            pa.csv.ParseOptions(
-                delimiter=self.separator,
-                ignore_empty_lines=False,
-                invalid_row_handler=rows.judge,
-            ),
-            pa.csv.ConvertOptions(
-                column_types=dict.fromkeys(chosen, pa.float64()),
-                include_columns=chosen,
-                null_values=MISSING,
-                decimal_point=self.decimal,
-            ),
-        )
+        # numbers are ASCII; bytes that Windows-1252 does not know must not end the reading
+        encoding = "latin-1" if self.encoding == "cp1252" else self.encoding
+        done, above = self.header_line, self.header_line
+        try:
+            for block in blocks(self.path, self.size, encoding):
+                if above:
+                    block, above = without_lines(block, above), 0
+                if not block:
+                    continue
+                left_out = rows.count
+
+                def judge(row: int, cells: int, text: str, before: int = done) -> None:
+                    rows.judge(before + row, cells, text)
+
+                table = parsed(block, unique, chosen, self.separator, self.decimal, judge)
+                done += len(table) + rows.count - left_out
+                yield table
+        except UnicodeDecodeError as error:
+            raise LogError(f"{self.path}: no text in {self.encoding}: {error.reason}") from None
+        except pa.ArrowInvalid as error:
+            raise LogError(
+                self._no_number(names) or f"{self.path}: {printable(str(error))}"
+            ) from None
 
     def _empty(
         self, table: dict[str, Array], rows: _Rows, done: int, text: Lines

@@ -106,6 +106,17 @@ class Store:
         with self.lock:
             return self.devices.get(name)
 
+    def recorded_s(self, device: str, now: float | None = None) -> float | None:
+        """How long the recording, or the replay that a device is of, has gone on, s; None when
+        there is neither. Call under the lock.
+        """
+        now = time.monotonic() if now is None else now
+        if self.replay.state(device, now):
+            return self.replay.status.position_s if self.replay.status else None
+        if self.recorder is None or not self.recorder.message.recording:
+            return None
+        return self.recorder.message.seconds + self.recorder.age(now)
+
     def put(
         self,
         topic: tp.Topic,

@@ -38,13 +38,12 @@ from dashboard.scene.drawing import geometry as geo
 from dashboard.scene.drawing.axis_arrows import AxisArrows
 from dashboard.scene.drawing.palette import estimator_colour, number, rgb, truth_colour
 from dashboard.scene.drawing.trails import Trails
+from dashboard.scene.workspaces import LAYERS
 from inertial.rotation import rotate
 
 ARROW_PER_RADPS = 0.55  # half sides per rad/s; 180 deg/s gives 1.7
 ARROW_LONGEST = 2.2
 MOST = 12  # estimators drawn of one device; the tables have them all
-
-LAYERS = ("truth", "estimates", "sensors", "rate", "trajectory", "fixes", "ellipsoid", "grid")
 
 
 @dataclass

@@ -9,6 +9,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, HTTPException, Query, Request
 from fastapi.responses import FileResponse
 
+from dashboard.data.alarms import alarms, bench_alarms
 from dashboard.web.auth import Role
 from dashboard.web.control import ControlError
 from dashboard.web.front import Asker, Front, asker, front_of, needs
@@ -20,6 +21,7 @@ from dashboard.web.schemas import (
     SessionOut,
     StartRecording,
     StartReplay,
+    alarms_out,
     device_out,
     recorder_fields,
     session_out,
@@ -103,8 +105,12 @@ def recording_out(front: Front) -> RecordingOut:
         lost=0,
         message="the recorder has not been heard of",
         replaying=replayed.parent.name if replayed else "",
+        alarms=[],
     )
     heard = front.store.recorder if front.store else None
+    if front.store is not None:
+        with front.store.lock:
+            out.alarms = alarms_out(bench_alarms(front.store))
     if heard is None:
         return out
     age = heard.age()
@@ -161,7 +167,11 @@ def devices(request: Request, who: SignedIn) -> list[DeviceOut]:
         return []
     with front.store.lock:
         found = [front.store.devices[name] for name in front.store.names()]
-        return [device_out(device, front.settings.stale_s) for device in found if device.spoken_of]
+        return [
+            device_out(device, front.settings.stale_s, alarms(front.store, device))
+            for device in found
+            if device.spoken_of
+        ]
 
 
 @routes.get("/recording", summary="State of the recorder and of a replay")

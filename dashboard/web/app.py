@@ -11,7 +11,16 @@ from fastapi.staticfiles import StaticFiles
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp
 
-from dashboard.web import api, compare_api, intake_api, pages, proxy, session_api, session_pages
+from dashboard.web import (
+    api,
+    compare_api,
+    desk_api,
+    intake_api,
+    pages,
+    session_api,
+    session_pages,
+)
+from dashboard.web.frame import proxy
 from dashboard.web.front import Front
 from dashboard.web.guard import Guard
 from dashboard.web.users import UsersError
@@ -30,6 +39,7 @@ def create_app(front: Front) -> ASGIApp:
         proxy.router(front.settings, front.gate, front.scene_port, front.open_labels)
     )
     app.include_router(api.routes, responses={401: {"description": "not signed in"}})
+    app.include_router(desk_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(intake_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(session_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(compare_api.routes, responses={401: {"description": "not signed in"}})
@@ -65,7 +75,7 @@ def _not_valid(request: Request, error: RequestValidationError) -> Response:
 def _refused(request: Request, error: HTTPException) -> Response:
     if _wants_page(request):
         if error.status_code == 401:
-            return RedirectResponse("/login", 303)
+            return RedirectResponse(pages.login_link(request), 303)
         return pages.error_page(request, error.status_code, str(error.detail))
     return JSONResponse({"error": error.detail}, error.status_code, headers=error.headers)
 

@@ -14,6 +14,7 @@ from dashboard.web.control import Replay
 from dashboard.web.jobs import Jobs
 from dashboard.web.readings import Readings
 from dashboard.web.uploads import Uploads
+from dashboard.web.views import Views
 from sessions.library.catalogue import Catalogue
 
 audit = logging.getLogger("dashboard.audit")
@@ -36,6 +37,11 @@ class Front:
     readings: Readings = field(default_factory=Readings)
     uploads: Uploads = field(default_factory=Uploads)
     open_labels: Collection[str] = ()  # of the scene's inputs that concern nobody else
+    views: Views = field(init=False)
+
+    def __post_init__(self) -> None:
+        users = self.settings.users
+        self.views = Views(users.with_name(users.name + ".views"))
 
 
 @dataclass(frozen=True)

@@ -2,15 +2,17 @@
 
 import importlib.metadata
 import logging
+import re
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
-from urllib.parse import parse_qs
+from urllib.parse import parse_qs, urlencode
 
 import jinja2
 from fastapi import APIRouter, Depends, HTTPException, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 
+from dashboard.terms import TERMS
 from dashboard.web import api
 from dashboard.web.auth import Role, WaitError, same_token
 from dashboard.web.front import Asker, address_of, asker, check_role, front_of
@@ -19,6 +21,8 @@ from messages.text import template_value
 
 log = logging.getLogger(__name__)
 
+# one slash first: two, or a backslash, would be another host
+OWN_PATH = re.compile(r"/(?![/\\])[A-Za-z0-9/?=&._~%+,:;@-]{0,1500}")
 routes = APIRouter(include_in_schema=False)
 SignedIn = Annotated[Asker, Depends(asker)]
 
@@ -126,10 +130,25 @@ async def _signed_form(request: Request) -> tuple[Asker, dict[str, str]]:
     return who, fields
 
 
-def _enter(request: Request, token: str) -> RedirectResponse:
-    """Set the cookie and go to the main page."""
+def login_link(request: Request) -> str:
+    """The page of the sign-in, which afterwards goes on to what was asked for."""
+    path = request.url.path + (f"?{request.url.query}" if request.url.query else "")
+    wanted = own_path(path) if request.method == "GET" else "/"
+    return "/login" if wanted == "/" else f"/login?{urlencode({'next': wanted})}"
+
+
+def own_path(path: str) -> str:
+    """A path of this dashboard's own pages; "/" for whatever else is asked for."""
+    pages = OWN_PATH.fullmatch(path) and not path.startswith(
+        ("/login", "/logout", "/scene", "/api")
+    )
+    return path if pages else "/"
+
+
+def _enter(request: Request, token: str, wanted: str = "/") -> RedirectResponse:
+    """Set the cookie and go to the page that was asked for."""
     settings = front_of(request).settings
-    answer = RedirectResponse("/", 303)
+    answer = RedirectResponse(own_path(wanted), 303)
     answer.set_cookie(
         settings.cookie,
         token,
@@ -144,15 +163,20 @@ def _enter(request: Request, token: str) -> RedirectResponse:
 
 @routes.get("/")
 def main_page(request: Request, who: SignedIn) -> HTMLResponse:
-    return render(request, "main.html", who)
+    return render(request, "main.html", who, view=front_of(request).views.of(who.name))
 
 
 @routes.get("/login")
-def login_page(request: Request) -> Response:
+def login_page(
+    request: Request, wanted: Annotated[str, Query(alias="next", max_length=1600)] = "/"
+) -> Response:
     front = front_of(request)
     if front.gate.session_of(request) is not None:
-        return RedirectResponse("/", 303)
-    return render(request, "login.html", None, name="", fault="", empty=not front.gate.users.all())
+        return RedirectResponse(own_path(wanted), 303)
+    empty = not front.gate.users.all()
+    return render(
+        request, "login.html", None, name="", fault="", empty=empty, wanted=own_path(wanted)
+    )
 
 
 @routes.post("/login")
@@ -162,14 +186,21 @@ async def login(request: Request) -> Response:
     try:
         token = await gate.sign_in(name, fields.get("password", ""), address_of(request))
         if token is not None:
-            return _enter(request, token)
+            return _enter(request, token, fields.get("next", "/"))
         fault = "Name or password is wrong."
     except WaitError as wait:
         seconds = max(1, round(wait.seconds))
         fault, status = f"Too many wrong passwords from here. Try again in {seconds} s.", 429
         headers = {"retry-after": str(seconds)}
     page = render(
-        request, "login.html", None, status, name=name[:64], fault=fault, empty=not gate.users.all()
+        request,
+        "login.html",
+        None,
+        status,
+        name=name[:64],
+        fault=fault,
+        empty=not gate.users.all(),
+        wanted=own_path(fields.get("next", "/")),
     )
     page.headers.update(headers)
     return page
@@ -229,6 +260,12 @@ def sessions_page(
     return render(
         request, "sessions.html", who, rows=rows, q=q, can_replay=can_replay, can_import=can_import
     )
+
+
+@routes.get("/words")
+def words(request: Request, who: SignedIn) -> HTMLResponse:
+    """The words that stand on the pages, and what they mean."""
+    return render(request, "words.html", who, terms=TERMS)
 
 
 @routes.get("/users")

@@ -1,9 +1,12 @@
 """What the REST interface takes and gives: SI units, times in s since 1970."""
 
+from collections.abc import Iterable
+from dataclasses import asdict
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from dashboard.data.alarms import Alarm
 from dashboard.data.device import Device
 from messages import text
 from messages.contract import gyrofree_pb2 as pb
@@ -52,6 +55,13 @@ class EstimatorOut(BaseModel):
     behind_s: float = Field(description="from the arrival of samples to their estimates, s")
 
 
+class AlarmOut(BaseModel):
+    kind: str = Field(description="axis, link, board, estimator, late, blind, contradicted ...")
+    title: str
+    text: str = Field(description="what was found and what to do")
+    page: str = Field(description="of the live page (?p=), that shows it; empty for none")
+
+
 class DeviceOut(BaseModel):
     name: str
     source: str = Field(description="hardware, simulated, emulated, played or unknown")
@@ -72,6 +82,7 @@ class DeviceOut(BaseModel):
     uid: str
     axes: int
     estimators: list[EstimatorOut]
+    alarms: list[AlarmOut] = Field(description="what is wrong, the worst first")
 
 
 class RecordingOut(BaseModel):
@@ -84,6 +95,7 @@ class RecordingOut(BaseModel):
     lost: int
     message: str
     replaying: str = Field(description="id of the session being replayed, or empty")
+    alarms: list[AlarmOut] = Field(description="what is wrong with the recorder")
 
 
 class StartRecording(Strict):
@@ -119,7 +131,12 @@ class SessionOut(BaseModel):
     downloadable: bool
 
 
-def device_out(device: Device, stale_s: float) -> DeviceOut:
+def alarms_out(found: Iterable[Alarm]) -> list[AlarmOut]:
+    """Alarms as JSON."""
+    return [AlarmOut(**asdict(alarm)) for alarm in found]
+
+
+def device_out(device: Device, stale_s: float, found: Iterable[Alarm] = ()) -> DeviceOut:
     """One device as JSON; a device that never sent a link status has zeros and says so in
     `message`. Call under the store's lock.
     """
@@ -166,6 +183,7 @@ def device_out(device: Device, stale_s: float) -> DeviceOut:
         uid=text.plain(board.uid),
         axes=board.axes,
         estimators=estimators,
+        alarms=alarms_out(found),
     )
 
 

@@ -72,6 +72,7 @@ def demo(
     plan = demonstration.Plan(
         folder.absolute(), board, device, layout, port, bus_port, record=record, time_scale=scale
     )
+    plan = replace(plan, table=source == "table")
     demonstration.run(replace(plan, estimator=demonstration.ESTIMATOR.get(source, "")))
 
 

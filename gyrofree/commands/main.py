@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from gyrofree.commands import calibrate, handover, layout, sessions, users
+from gyrofree.commands import calibrate, handover, layout, procedure, sessions, users
 from gyrofree.commands import run as logs
 from gyrofree.commands.board import board
 from gyrofree.commands.demo import demo, play
@@ -16,7 +16,14 @@ from gyrofree.commands.installation.setup import setup
 from gyrofree.commands.installation.up import up
 from gyrofree.commands.options import say
 from gyrofree.commands.replay import replay
-from gyrofree.commands.services import dashboard, estimator, gateway, record, router
+from gyrofree.commands.services import (
+    dashboard,
+    estimator,
+    gateway,
+    procedures,
+    record,
+    router,
+)
 from gyrofree.commands.simulate import simulate
 
 app = typer.Typer(
@@ -34,6 +41,7 @@ app.add_typer(users.app, name="users")
 app.add_typer(config.app, name="config")
 app.add_typer(layout.app, name="layout")
 app.add_typer(sessions.app, name="sessions")
+app.add_typer(procedure.app, name="procedure")
 handover.mount(app)
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(logs.app, name="reproduce")
@@ -47,6 +55,7 @@ for command in (
     gateway,
     estimator,
     record,
+    procedures,
     dashboard,
     simulate,
     play,

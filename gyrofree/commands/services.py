@@ -1,4 +1,6 @@
-"""`gyrofree router`, `gateway`, `estimator`, `record` and `dashboard`: one service each."""
+"""One service each: `gyrofree router`, `gateway`, `estimator`, `record`, `procedures` and
+`dashboard`.
+"""
 
 import logging
 import threading
@@ -71,6 +73,22 @@ def record(config: Config = None, verbose: Verbose = False) -> None:
         from sessions.recording import service
 
         service.run(settings.recorder, settings.bus, stop, settings.model_dump(mode="json"))
+
+    run_service(body, verbose)
+
+
+def procedures(config: Config = None, verbose: Verbose = False) -> None:
+    """Run tests as procedures, one at a time for each device: see `gyrofree procedure`."""
+    settings = settings_of(config)
+
+    def body(stop: threading.Event) -> None:
+        from sessions.procedure import service
+        from sessions.procedure.table import TableError
+
+        try:
+            service.run(settings.procedures, settings.bus, stop)
+        except TableError as error:
+            raise ConfigError(str(error)) from None
 
     run_service(body, verbose)
 

@@ -26,7 +26,13 @@ def simulate(
         int | None, typer.Option(help="Listen on this TCP port of the loopback instead of a pty.")
     ] = None,
     profile: Annotated[
-        str, typer.Option(help="Motion of the table: published (or cw-ccw), wobble, fast, still.")
+        str,
+        typer.Option(
+            help=(
+                "Motion of the table: published (or cw-ccw), wobble, fast, still; or a CSV or TOML"
+                " file of your own, see docs/procedures.md."
+            )
+        ),
     ] = "published",
     seed: Annotated[int, typer.Option(help="Seed of biases, scale errors and noise.")] = 1,
     device: Annotated[
@@ -52,6 +58,13 @@ def simulate(
         ),
     ] = False,
     fault: Fault = None,
+    table_link: Annotated[
+        Path | None,
+        typer.Option(help="Offer the table's text protocol on a pseudo-terminal under this path."),
+    ] = None,
+    table_tcp: Annotated[
+        int | None, typer.Option(help="The same on a TCP port of the loopback.")
+    ] = None,
     csv: Annotated[
         Path | None,
         typer.Option(
@@ -71,15 +84,15 @@ def simulate(
     simulated.
     """
     settings = settings_of(config)
-    from inertial.simulation.profiles import named
+    from inertial.simulation.profile_file import profile_of
 
     faults = faults_of(fault)
     try:
-        profile_name = named(profile).name
+        motion = profile_of(profile)
         if csv is not None:
             from gyrofree.running import simulate_csv
 
-            say(f"{csv}: {simulate_csv.write(csv, profile, seed, layout, half_side)} samples")
+            say(f"{csv}: {simulate_csv.write(csv, motion, seed, layout, half_side)} samples")
             return
     except (ValueError, OSError) as error:
         raise fail(error, CONFIG) from None
@@ -88,7 +101,9 @@ def simulate(
         from gyrofree.running import simulate as simulator
         from gyrofree.running import simulate_hand
 
-        options = simulator.Options(link, tcp, profile_name, seed, device, once, faults, arm or 0.0)
+        options = simulator.Options(
+            link, tcp, motion, seed, device, once, faults, arm or 0.0, table_link, table_tcp
+        )
         (simulate_hand if tilt else simulator).run(options, settings.bus, stop)
 
     run_service(body, verbose)

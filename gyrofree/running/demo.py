@@ -36,6 +36,7 @@ class Plan:
     estimator: str = ""  # further lines of [estimator]
     once: bool = False  # the board is a log that is played to its end
     command: str = "demo"  # what the person called
+    table: bool = False  # the board stands on a table that takes orders
 
 
 SIMULATED = {  # boards of `gyrofree simulate` besides the table: its arguments, device, layout
@@ -80,6 +81,10 @@ cards = "{plan.folder / "cards"}"
 root = "{plan.folder / "sessions"}"
 auto_start = {str(plan.record).lower()}
 
+[procedures]
+root = "{plan.folder / "procedures"}"
+folder = "{plan.folder / "own-procedures"}"
+{_table(plan)}
 [dashboard]
 host = "{plan.host}"
 port = {plan.port}
@@ -89,6 +94,17 @@ demo = true
 """
     )
     return path
+
+
+def _table(plan: Plan) -> str:
+    """The simulated table as one that procedures drive."""
+    if not plan.table:
+        return ""
+    return f"""[[procedures.tables]]
+device = "{plan.device}"
+port = "{plan.folder / "table"}"
+description = "simulated"
+"""
 
 
 def run(plan: Plan) -> None:
@@ -133,6 +149,7 @@ def _supervise(plan: Plan, config: Path) -> Supervisor:
     # from the start.
     name, *arguments = plan.board  # a log's name may begin with -, and comes last
     places = [f"--config={config}", f"--link={plan.folder / 'board'}"]
+    places += [f"--table-link={plan.folder / 'table'}"] if plan.table else []
     board = [name, *places, *arguments]
     supervisor.add("board", *board, waits_for=("estimator", "estimating"), once=plan.once)
     return supervisor

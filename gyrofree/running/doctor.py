@@ -21,12 +21,17 @@ from urllib.parse import urlsplit
 
 from gyrofree.config import Settings
 from messages.bus.session import BusUnavailable, open_client, subscribe
-from messages.contract.topics import ESTIMATOR, LINK, STATUS
+from messages.contract.topics import ESTIMATOR, LINK, PROCEDURE, STATUS
 
 LEAST_FREE = 1 << 30  # bytes of disk below which recording is at risk
 STA_UNSYNC = 0x0040  # linux/timex.h
 HEALTH_WAIT = 4.0  # s; the slowest sign of life comes once a second
-SIGN_OF_LIFE = {"gateway": LINK, "estimator": ESTIMATOR, "recorder": STATUS}
+SIGN_OF_LIFE = {
+    "gateway": LINK,
+    "estimator": ESTIMATOR,
+    "recorder": STATUS,
+    "procedures": PROCEDURE,
+}
 
 
 @dataclass(frozen=True)

@@ -29,8 +29,11 @@ from gateway.virtual.virtual_board import (
     Item,
     VirtualBoard,
 )
+from gyrofree.running.driven_table import TableDesk, until_it_ends
 from inertial.simulation.arm import arm_test, centre
+from inertial.simulation.driven import DrivenTable
 from inertial.simulation.faults import AxisFault, Faults
+from inertial.simulation.profiles import Profile
 from inertial.simulation.table import BLOCK, TableTest, Truth
 from messages.bus.session import BusSettings, LateSession, Publishers
 from messages.contract import gyrofree_pb2 as pb
@@ -57,7 +60,7 @@ class Options:
 
     link: Path | None
     tcp: int | None
-    profile: str
+    profile: str | Profile
     seed: int
     device: str
     once: bool
@@ -65,6 +68,8 @@ class Options:
     # the cube rides at the end of an arm of this length, with the receiver; 0: in the table's
     # centre
     arm_m: float = 0.0
+    table_link: Path | None = None  # where the table's text protocol is offered
+    table_tcp: int | None = None
 
 
 class TruthPublisher:
@@ -216,8 +221,12 @@ def _rider(test: TableTest, seed: int) -> Iterator[BoardBytes]:
         )
 
 
-def _table(test: TableTest, truths: TruthPublisher, faults: Faults) -> Iterator[Item]:
-    """Samples and pulses in time order; the truth leaves as its sample does."""
+def _table(
+    test: TableTest, truths: TruthPublisher, faults: Faults, options: Options, desk: TableDesk
+) -> Iterator[Item]:
+    """Samples and pulses in time order; the truth leaves as its sample does. Once somebody takes
+    the table over it does what it is told, and ends when it is given back.
+    """
     for number in itertools.count():
         block = faults.into(test.block(number))
         end = block.t_s[-1] + test.period_s
@@ -228,6 +237,13 @@ def _table(test: TableTest, truths: TruthPublisher, faults: Faults) -> Iterator[
             while pulse is not None and pulse.t_s <= t:
                 yield BoardPulse(pulse.t_s, pulse.direction)
                 pulse = next(pulses, None)
+            if desk.remote and not options.arm_m:
+                at = block.index + row, float(block.angle_z[row]), float(block.omega_b[row, 2])
+                driven = DrivenTable(
+                    seed=options.seed, profile=test.profile, run=test.run, start=at
+                )
+                yield from desk.items(driven, truths, faults)
+                return
             truths.put(block.index + row, t, block.truth(row))
             yield BoardAccel(t, tuple(block.counts[row].tolist()))
         for late in itertools.chain([pulse] if pulse else [], pulses):
@@ -253,17 +269,25 @@ def run(options: Options, bus: BusSettings, stop: threading.Event) -> None:
     test = _test(options, 0)  # before the link: an unknown profile is said at once
     link, port = open_link(options)
     truths = TruthPublisher(bus, options.device)
+    desk = TableDesk(_table_line(options), bus, options.device)
     log.info("simulated cube, profile %s, seed %d, on %s", test.profile.name, options.seed, port)
     first = int(time.time()) & 0xFF  # boot counters differ from those of the last process
     try:
         for run_number in itertools.count():
             test = _test(options, run_number)
-            _one_run(test, link, truths, (first + run_number) & 0xFF, options, stop)
+            _one_run(test, link, truths, (first + run_number) & 0xFF, options, stop, desk)
             if options.once or stop.is_set():
                 return
     finally:
+        desk.close()
         truths.close()
         link.close()
+
+
+def _table_line(options: Options) -> PtyLink | TcpLink | None:
+    if options.table_tcp is not None:
+        return TcpLink(options.table_tcp)
+    return PtyLink(options.table_link) if options.table_link is not None else None
 
 
 def _one_run(
@@ -273,18 +297,20 @@ def _one_run(
     epoch: int,
     options: Options,
     stop: threading.Event,
+    desk: TableDesk,
 ) -> None:
     """One test: the board boots on the still table, and the estimators begin as the published test
     did.
     """
     truths.begin(epoch)
+    desk.begin()
     board = VirtualBoard(link, SIMULATED, epoch=epoch, firmware="simulated table")
-    table = _table(test, truths, Faults(options.faults))
+    table = _table(test, truths, Faults(options.faults), options, desk)
     receiver = _rider(test, options.seed) if options.arm_m else _receiver(options.seed)
     items = heapq.merge(table, receiver, key=lambda item: item.t_s)
     started = time.monotonic()
     board.run(
-        itertools.takewhile(lambda item: item.t_s < test.profile.seconds, items),
+        until_it_ends(items, test.profile.seconds, desk),
         stop,
         wait_for_reader=True,
     )
@@ -294,4 +320,5 @@ def _one_run(
         board.built,
         board.dropped,
     )
-    stop.wait(max(0.0, started + test.profile.seconds - time.monotonic()) if board.samples else 0.0)
+    left = started + test.profile.seconds - time.monotonic()
+    stop.wait(max(0.0, left) if board.samples and not desk.given_back else 0.0)

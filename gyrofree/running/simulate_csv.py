@@ -9,13 +9,17 @@ import numpy as np
 
 from gateway.samples.tacho import Tachometer
 from inertial.layouts.catalogue import find
-from inertial.simulation.profiles import named
+from inertial.simulation.profiles import Profile, named
 from inertial.simulation.table import BLOCK, TableTest
 from logs.cube_log import TACHO, TRUE_ATTITUDE, TRUE_RATE
 
 
 def write(
-    path: Path, profile: str, seed: int, layout: str = "cube", half_side_m: float | None = None
+    path: Path,
+    profile: str | Profile,
+    seed: int,
+    layout: str = "cube",
+    half_side_m: float | None = None,
 ) -> int:
     """One run of the profile as CSV; returns the number of samples. Raises ValueError
     (GeometryError), OSError.
@@ -24,13 +28,15 @@ def write(
     rate and q_nb.
     """
     shape = find(layout, half_side_m)
-    test = TableTest(seed=seed, profile=named(profile), layout=shape)
+    profile = named(profile) if isinstance(profile, str) else profile
+    test = TableTest(seed=seed, profile=profile, layout=shape)
     n = round(test.profile.seconds / test.period_s)
     rates = _tacho(test, n)
     with Path(path).open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         file.write(
-            f"# simulated: profile {profile}, seed {seed}, layout {shape.name}, 3.9 mg per count\n"
+            f"# simulated: profile {profile.name}, seed {seed}, layout {shape.name},"
+            " 3.9 mg per count\n"
         )
         writer.writerow(
             [

@@ -11,7 +11,14 @@ from gyrofree.running.doctor import health
 from gyrofree.running.process import EXIT_FAILED, fail
 from gyrofree.running.supervisor import Supervisor
 
-SERVICES = ("router", "gateway", "estimator", "record", "dashboard")  # in the order of their start
+SERVICES = (
+    "router",
+    "gateway",
+    "estimator",
+    "record",
+    "procedures",
+    "dashboard",
+)  # in the order of their start
 TICK = 0.1  # s between two looks at the children
 DRAIN = 3.0  # s that the last samples of a played log have to reach the recording
 WAIT_FOR_PAGE = 60.0  # s; a cold compile cache needs most of it

@@ -127,6 +127,7 @@ class TableTest:
         self.sensor = sensor
         self._rate_hz = rate_hz
         self._seed = seed
+        self.run = run
         self._run = [run] if run else []
         self._tilt = tilt
         self._arms = self.layout.r_b + np.asarray(centre_b)

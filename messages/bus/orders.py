@@ -77,6 +77,14 @@ BOARD = Kind(
     8.0,  # a self-test of the sensors takes up to 4 s
     lambda prefix, device: control_key(prefix, device, "board-control"),
 )
+PROCEDURES = Kind(
+    "the procedures",
+    pb.ProcedureCommand,
+    pb.Reply,
+    "see that `gyrofree procedures` runs and reaches the router",
+    25.0,  # a recording is closed and another begun
+    lambda prefix, device: control_key(prefix, device, "procedure-control"),
+)
 REPLAY = Kind(
     "the replay",
     pb.ReplayCommand,

@@ -1112,3 +1112,159 @@ class GnssMute(_message.Message):
     until_s: float
     user: str
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., after_s: _Optional[float] = ..., until_s: _Optional[float] = ..., user: _Optional[str] = ...) -> None: ...
+
+class ProcedureCommand(_message.Message):
+    __slots__ = ("action", "device", "procedure", "unit", "user", "text", "own_session")
+    class Action(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        ACTION_NONE: _ClassVar[ProcedureCommand.Action]
+        ACTION_START: _ClassVar[ProcedureCommand.Action]
+        ACTION_NEXT: _ClassVar[ProcedureCommand.Action]
+        ACTION_REPEAT: _ClassVar[ProcedureCommand.Action]
+        ACTION_ABORT: _ClassVar[ProcedureCommand.Action]
+        ACTION_STOP: _ClassVar[ProcedureCommand.Action]
+    ACTION_NONE: ProcedureCommand.Action
+    ACTION_START: ProcedureCommand.Action
+    ACTION_NEXT: ProcedureCommand.Action
+    ACTION_REPEAT: ProcedureCommand.Action
+    ACTION_ABORT: ProcedureCommand.Action
+    ACTION_STOP: ProcedureCommand.Action
+    ACTION_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    PROCEDURE_FIELD_NUMBER: _ClassVar[int]
+    UNIT_FIELD_NUMBER: _ClassVar[int]
+    USER_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    OWN_SESSION_FIELD_NUMBER: _ClassVar[int]
+    action: ProcedureCommand.Action
+    device: str
+    procedure: str
+    unit: str
+    user: str
+    text: str
+    own_session: bool
+    def __init__(self, action: _Optional[_Union[ProcedureCommand.Action, str]] = ..., device: _Optional[str] = ..., procedure: _Optional[str] = ..., unit: _Optional[str] = ..., user: _Optional[str] = ..., text: _Optional[str] = ..., own_session: _Optional[bool] = ...) -> None: ...
+
+class ProcedureStatus(_message.Message):
+    __slots__ = ("header", "state", "run", "procedure", "title", "sha256", "toml", "unit", "operator", "session", "step", "instruction", "progress", "message", "steps", "table", "table_radps", "offered", "started_utc_ns", "up_b", "reference")
+    class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        STATE_IDLE: _ClassVar[ProcedureStatus.State]
+        STATE_RUNNING: _ClassVar[ProcedureStatus.State]
+        STATE_HELD: _ClassVar[ProcedureStatus.State]
+        STATE_DONE: _ClassVar[ProcedureStatus.State]
+        STATE_ABORTED: _ClassVar[ProcedureStatus.State]
+        STATE_STOPPED: _ClassVar[ProcedureStatus.State]
+    STATE_IDLE: ProcedureStatus.State
+    STATE_RUNNING: ProcedureStatus.State
+    STATE_HELD: ProcedureStatus.State
+    STATE_DONE: ProcedureStatus.State
+    STATE_ABORTED: ProcedureStatus.State
+    STATE_STOPPED: ProcedureStatus.State
+    class Step(_message.Message):
+        __slots__ = ("name", "kind", "target_radps", "dwell_s", "state", "reason", "attempts", "epoch", "from_us", "until_us", "from_utc_ns", "until_utc_ns", "figures", "spoilt", "confirmed_by")
+        class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+            __slots__ = ()
+            STATE_TODO: _ClassVar[ProcedureStatus.Step.State]
+            STATE_WAITING: _ClassVar[ProcedureStatus.Step.State]
+            STATE_RAMP: _ClassVar[ProcedureStatus.Step.State]
+            STATE_SETTLED: _ClassVar[ProcedureStatus.Step.State]
+            STATE_DWELL: _ClassVar[ProcedureStatus.Step.State]
+            STATE_DONE: _ClassVar[ProcedureStatus.Step.State]
+            STATE_FAILED: _ClassVar[ProcedureStatus.Step.State]
+            STATE_SKIPPED: _ClassVar[ProcedureStatus.Step.State]
+        STATE_TODO: ProcedureStatus.Step.State
+        STATE_WAITING: ProcedureStatus.Step.State
+        STATE_RAMP: ProcedureStatus.Step.State
+        STATE_SETTLED: ProcedureStatus.Step.State
+        STATE_DWELL: ProcedureStatus.Step.State
+        STATE_DONE: ProcedureStatus.Step.State
+        STATE_FAILED: ProcedureStatus.Step.State
+        STATE_SKIPPED: ProcedureStatus.Step.State
+        NAME_FIELD_NUMBER: _ClassVar[int]
+        KIND_FIELD_NUMBER: _ClassVar[int]
+        TARGET_RADPS_FIELD_NUMBER: _ClassVar[int]
+        DWELL_S_FIELD_NUMBER: _ClassVar[int]
+        STATE_FIELD_NUMBER: _ClassVar[int]
+        REASON_FIELD_NUMBER: _ClassVar[int]
+        ATTEMPTS_FIELD_NUMBER: _ClassVar[int]
+        EPOCH_FIELD_NUMBER: _ClassVar[int]
+        FROM_US_FIELD_NUMBER: _ClassVar[int]
+        UNTIL_US_FIELD_NUMBER: _ClassVar[int]
+        FROM_UTC_NS_FIELD_NUMBER: _ClassVar[int]
+        UNTIL_UTC_NS_FIELD_NUMBER: _ClassVar[int]
+        FIGURES_FIELD_NUMBER: _ClassVar[int]
+        SPOILT_FIELD_NUMBER: _ClassVar[int]
+        CONFIRMED_BY_FIELD_NUMBER: _ClassVar[int]
+        name: str
+        kind: str
+        target_radps: float
+        dwell_s: float
+        state: ProcedureStatus.Step.State
+        reason: str
+        attempts: int
+        epoch: int
+        from_us: int
+        until_us: int
+        from_utc_ns: int
+        until_utc_ns: int
+        figures: _containers.RepeatedCompositeFieldContainer[ProcedureStatus.Figure]
+        spoilt: int
+        confirmed_by: str
+        def __init__(self, name: _Optional[str] = ..., kind: _Optional[str] = ..., target_radps: _Optional[float] = ..., dwell_s: _Optional[float] = ..., state: _Optional[_Union[ProcedureStatus.Step.State, str]] = ..., reason: _Optional[str] = ..., attempts: _Optional[int] = ..., epoch: _Optional[int] = ..., from_us: _Optional[int] = ..., until_us: _Optional[int] = ..., from_utc_ns: _Optional[int] = ..., until_utc_ns: _Optional[int] = ..., figures: _Optional[_Iterable[_Union[ProcedureStatus.Figure, _Mapping]]] = ..., spoilt: _Optional[int] = ..., confirmed_by: _Optional[str] = ...) -> None: ...
+    class Figure(_message.Message):
+        __slots__ = ("name", "value", "sigma", "min", "max")
+        NAME_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        SIGMA_FIELD_NUMBER: _ClassVar[int]
+        MIN_FIELD_NUMBER: _ClassVar[int]
+        MAX_FIELD_NUMBER: _ClassVar[int]
+        name: str
+        value: float
+        sigma: float
+        min: float
+        max: float
+        def __init__(self, name: _Optional[str] = ..., value: _Optional[float] = ..., sigma: _Optional[float] = ..., min: _Optional[float] = ..., max: _Optional[float] = ...) -> None: ...
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    STATE_FIELD_NUMBER: _ClassVar[int]
+    RUN_FIELD_NUMBER: _ClassVar[int]
+    PROCEDURE_FIELD_NUMBER: _ClassVar[int]
+    TITLE_FIELD_NUMBER: _ClassVar[int]
+    SHA256_FIELD_NUMBER: _ClassVar[int]
+    TOML_FIELD_NUMBER: _ClassVar[int]
+    UNIT_FIELD_NUMBER: _ClassVar[int]
+    OPERATOR_FIELD_NUMBER: _ClassVar[int]
+    SESSION_FIELD_NUMBER: _ClassVar[int]
+    STEP_FIELD_NUMBER: _ClassVar[int]
+    INSTRUCTION_FIELD_NUMBER: _ClassVar[int]
+    PROGRESS_FIELD_NUMBER: _ClassVar[int]
+    MESSAGE_FIELD_NUMBER: _ClassVar[int]
+    STEPS_FIELD_NUMBER: _ClassVar[int]
+    TABLE_FIELD_NUMBER: _ClassVar[int]
+    TABLE_RADPS_FIELD_NUMBER: _ClassVar[int]
+    OFFERED_FIELD_NUMBER: _ClassVar[int]
+    STARTED_UTC_NS_FIELD_NUMBER: _ClassVar[int]
+    UP_B_FIELD_NUMBER: _ClassVar[int]
+    REFERENCE_FIELD_NUMBER: _ClassVar[int]
+    header: Header
+    state: ProcedureStatus.State
+    run: str
+    procedure: str
+    title: str
+    sha256: str
+    toml: str
+    unit: str
+    operator: str
+    session: str
+    step: int
+    instruction: str
+    progress: float
+    message: str
+    steps: _containers.RepeatedCompositeFieldContainer[ProcedureStatus.Step]
+    table: str
+    table_radps: float
+    offered: _containers.RepeatedScalarFieldContainer[str]
+    started_utc_ns: int
+    up_b: _containers.RepeatedScalarFieldContainer[float]
+    reference: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., state: _Optional[_Union[ProcedureStatus.State, str]] = ..., run: _Optional[str] = ..., procedure: _Optional[str] = ..., title: _Optional[str] = ..., sha256: _Optional[str] = ..., toml: _Optional[str] = ..., unit: _Optional[str] = ..., operator: _Optional[str] = ..., session: _Optional[str] = ..., step: _Optional[int] = ..., instruction: _Optional[str] = ..., progress: _Optional[float] = ..., message: _Optional[str] = ..., steps: _Optional[_Iterable[_Union[ProcedureStatus.Step, _Mapping]]] = ..., table: _Optional[str] = ..., table_radps: _Optional[float] = ..., offered: _Optional[_Iterable[str]] = ..., started_utc_ns: _Optional[int] = ..., up_b: _Optional[_Iterable[float]] = ..., reference: _Optional[_Iterable[str]] = ...) -> None: ...

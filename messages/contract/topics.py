@@ -90,6 +90,9 @@ WIRING = Topic(
 MUTE = Topic(
     "mute", pb.GnssMute, 0, "estimator", "an operator's GNSS outage: fixes that are held back"
 )
+PROCEDURE = Topic(
+    "procedure", pb.ProcedureStatus, 4, "procedures", "a test as it runs, step by step"
+)
 NOTE = Topic("note", pb.Note, 0, "any", "remarks on the data by people and programs")
 REPLAY = Topic("replay", pb.ReplayStatus, 5, "replay", "where a replay stands", recorded=False)
 STATUS = Topic("status", pb.RecorderStatus, 1, "recorder", "state of the recording", recorded=False)
@@ -114,6 +117,7 @@ TOPICS: tuple[Topic, ...] = (
     AXES,
     CALIBRATION,
     WIRING,
+    PROCEDURE,
     NOTE,
     REPLAY,
     STATUS,

@@ -14,9 +14,10 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from inertial.toml_file import parsed, text_of
+from sessions.report.limits import Limit
 from sessions.report.metrics import Metric
 
 DEFAULT = Path(__file__).parent / "acceptance.toml"
@@ -24,21 +25,6 @@ DEFAULT = Path(__file__).parent / "acceptance.toml"
 
 class SpecError(ValueError):
     """A specification that cannot be used; the text says where and why."""
-
-
-class Limit(BaseModel):
-    """Smallest and largest value that pass, in the unit of the figure's name."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-    min: float | None = None
-    max: float | None = None
-
-    @model_validator(mode="after")
-    def _one_of_them(self) -> "Limit":
-        if self.min is None and self.max is None:
-            raise ValueError("want min, max or both")
-        return self
 
 
 class Spec(BaseModel):
@@ -64,10 +50,9 @@ class Check:
     @property
     def passed(self) -> bool | None:
         """None: this session cannot tell."""
-        if self.value is None or self.value != self.value:
+        if self.minimum is None and self.maximum is None:
             return None
-        above = self.minimum is None or self.value >= self.minimum
-        return above and (self.maximum is None or self.value <= self.maximum)
+        return Limit(min=self.minimum, max=self.maximum).passed(self.value)
 
 
 def load_spec(path: Path | None) -> Spec:

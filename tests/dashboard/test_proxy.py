@@ -16,7 +16,7 @@ from support.front_door import CAMERA, Door, message, open_door, wait_for
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from dashboard.web.auth import Role
-from dashboard.web.scene_messages import (
+from dashboard.web.frame.scene_messages import (
     MAKES_INPUT,
     OPERATOR_MAY,
     VIEWER_MAY,

@@ -236,11 +236,18 @@ def test_recording_is_started_stopped_downloaded_and_replayed(anna, tmp_path):
     expect(button).to_be_enabled(timeout=PATIENCE)
     if anna.api("recording")[1]["recording"]:
         button.click()
-    expect(button).to_contain_text("Record", timeout=PATIENCE)
+        expect(button).to_contain_text("Really stop", timeout=PATIENCE)
+        assert anna.api("recording")[1]["recording"], "one click ended a recording"
+        button.click()
+    expect(button).to_have_text("Record", timeout=PATIENCE)
+    page.fill("#session", "Table, second run")
     button.click()
     expect(button).to_contain_text("Stop", timeout=PATIENCE)
     session = anna.api("recording")[1]["session"]
     until(lambda: anna.api("recording")[1]["messages"] > 2000, "the recorder counts no messages")
+    assert session.endswith("-table-second-run")
+    button.click()
+    expect(button).to_contain_text("Really stop", timeout=PATIENCE)
     button.click()
     expect(button).to_have_text("Record", timeout=PATIENCE)
 

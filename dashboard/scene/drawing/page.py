@@ -8,9 +8,22 @@ from collections.abc import Iterable
 
 from markupsafe import Markup
 
+from dashboard.terms import TERMS, glossary_link
 from messages.text import html
 
-__all__ = ["EMPTY", "Markup", "alert", "bad", "html", "joined", "note", "rows", "sub", "tag"]
+__all__ = [
+    "EMPTY",
+    "Markup",
+    "alert",
+    "bad",
+    "html",
+    "joined",
+    "note",
+    "rows",
+    "sub",
+    "tag",
+    "term",
+]
 
 EMPTY = Markup("")
 
@@ -50,6 +63,14 @@ def bad(*inside: object) -> Markup:
 def sub(letter: str, index: str) -> Markup:
     """A letter with an index below."""
     return joined([letter, tag("sub", index)])
+
+
+def term(word: str, shown: str = "") -> Markup:
+    """A word of the trade with what it means, and a link to the glossary."""
+    meaning = TERMS[word]
+    inside = tag("abbr", shown or word, title=meaning, aria_label=f"{shown or word}: {meaning}")
+    link = {"href": glossary_link(word), "target": "_blank", "rel": "noopener"}
+    return tag("a", inside, class_="gf-term", **link)
 
 
 def rows(items: Iterable[tuple[object, object]], stale: bool = False) -> Markup:

@@ -1,5 +1,5 @@
-"""One module per panel. PAGES are the pages of charts in the order of their tabs; the others stand
-on the left.
+"""One module per panel. PAGES are the pages of the workspaces in the order of their tabs; the
+others stand on the left.
 """
 
 from dashboard.scene.panels.base import Panel, Snapshot
@@ -26,22 +26,22 @@ from dashboard.scene.panels.session.timeline import Timeline
 
 PAGES: tuple[type[Panel], ...] = (
     Rates,
-    Axes,
     Acceleration,
     Angle,
+    Tilt,
+    Race,
+    Axes,
+    Health,
+    Innovations,
+    Link,
+    Board,
+    Calibration,
+    Wiring,
+    LayoutBench,
     Position,
     Navigation,
     Horizon,
     Errors,
-    Innovations,
-    Link,
-    Board,
-    Health,
-    LayoutBench,
-    Calibration,
-    Wiring,
-    Tilt,
-    Race,
 )
 
-__all__ = ["PAGES", "Devices", "Panel", "Position", "Record", "Snapshot", "Tilt", "Timeline"]
+__all__ = ["PAGES", "Devices", "Panel", "Record", "Snapshot", "Timeline"]

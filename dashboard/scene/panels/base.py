@@ -1,6 +1,7 @@
 """What every panel gets and must do."""
 
 import logging
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,6 +23,7 @@ log = logging.getLogger(__name__)
 DEG = 180.0 / np.pi
 CHARTS = 36  # of one page
 CURVES = 16  # of one chart
+NO_RATE = "no rate estimator speaks of this device: is `gyrofree estimator` running?"
 
 Input = viser.GuiInputHandle | viser.GuiButtonHandle | viser.GuiButtonGroupHandle
 
@@ -54,6 +56,7 @@ class Panel:
     """
 
     title = ""
+    workspace = ""  # key of one of dashboard.scene.workspaces.WORKSPACES
     desk: Desk  # set by the view: how a panel gives orders
     own_inputs: tuple[str, ...] = ()  # labels of inputs that change this browser's own view only
     own_scene = False  # True: the page shows something else than the device in 3-D
@@ -63,6 +66,18 @@ class Panel:
         self._charts: dict[str, Chart] = {}
         self._shown: set[str] = set()  # of them, since the last tidy
         self._place = 0.0
+
+    @classmethod
+    def key(cls) -> str:
+        """Its name in links and orders."""
+        return re.sub(r"[^a-z0-9]+", "-", cls.title.lower()).strip("-")
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        """Why there is nothing to see here of a device, for people; empty: there is. Call under
+        the store's lock.
+        """
+        return ""
 
     def order_estimator(self, title: str, command: pb.EstimatorCommand) -> None:
         """Give the order and show the person who pressed the button what came of it."""

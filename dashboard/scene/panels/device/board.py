@@ -7,6 +7,7 @@ import time
 
 import viser
 
+from dashboard.data.device import Device
 from dashboard.scene.drawing.page import Markup, joined, note, rows, tag
 from dashboard.scene.drawing.palette import age, number
 from dashboard.scene.panels.base import Input, Panel, Snapshot
@@ -64,7 +65,12 @@ class Board(Panel):
     """Faults, counters and orders of the chosen board."""
 
     title = "Board"
+    workspace = "diagnose"
     _table = None
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        return "" if device.get("board") else "the board has not said yet who it is"
 
     def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
         super().__init__(client, folder)

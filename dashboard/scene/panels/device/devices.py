@@ -3,15 +3,14 @@ looks for first.
 """
 
 import math
-import re
 import time
 
 import numpy as np
 
-from dashboard.data.device import BEHIND_STALE_S
+from dashboard.data.alarms import TURNS_RADPS, alarms, bench_alarms, counts, waits
 from dashboard.data.pose import roll_pitch
 from dashboard.scene.drawing.geometry import MODES
-from dashboard.scene.drawing.page import Markup, alert, bad, joined, note, rows, tag
+from dashboard.scene.drawing.page import Markup, alert, bad, joined, note, rows, tag, term
 from dashboard.scene.drawing.palette import (
     FIX,
     REFERENCE,
@@ -25,16 +24,8 @@ from dashboard.scene.panels.base import DEG, Panel, Snapshot
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
 
+MOVING = ("standing still", "turning")  # states that are as fast as the samples
 BEHIND_SHOWN_S = 0.5  # that an estimator is behind by less is nobody's business
-_COUNTS = re.compile(r"fixes (\w+) (\d+)")
-
-
-def counts(message: str) -> dict[str, int] | None:
-    """What an estimator counted, of a message such as 'fixes used 1315, fixes late 2'; None for any
-    other message.
-    """
-    found = [_COUNTS.fullmatch(part) for part in message.split(", ")]
-    return {match[1]: int(match[2]) for match in found} if all(found) else None
 
 
 class Devices(Panel):
@@ -97,9 +88,8 @@ class Devices(Panel):
         tiles = []
         for name in s.device.estimators("rate"):
             m = rates.row(s.device.get("rate", name).message, -1)
-            omega = m.omega_ib_b_radps[2] * DEG if len(m.omega_ib_b_radps) == 3 else None
-            sub = "still" if m.still else f"angle {number(m.angle_z_rad * DEG, 0, '°')}"
-            tiles.append(_tile(s, name, "rate", number(omega, 1), "°/s", sub))
+            omega, sub = _said_rate(s, name, m)
+            tiles.append(_tile(s, name, "rate", omega, "°/s", sub))
         tacho = s.device.get("tacho")
         if tacho is not None:
             sub = "" if tacho.message.direction_known else "magnitude only"
@@ -154,28 +144,8 @@ class Devices(Panel):
 
     @staticmethod
     def _alerts(s: Snapshot) -> Markup:
-        found = [s.device.get("link")] + [
-            s.device.get("estimator", n) for n in s.device.estimators("estimator")
-        ]
-        said = [
-            latest.message.message
-            for latest in found
-            if latest is not None and latest.message.message
-        ]
-        texts = [text for text in said if counts(text) is None]
-        behind_s = max(
-            (s.device.behind_s(n) for n in s.device.estimators("estimator")), default=0.0
-        )
-        if behind_s > BEHIND_STALE_S:
-            texts.append(
-                f"estimates are {behind_s:.0f} s behind their samples: its machine is too slow"
-                " for all that it is given; fewer estimators or boards, or a second machine"
-            )
-        board = s.device.get("board")
-        if board is not None and not s.stale("board"):
-            texts += [
-                f"{fault.name}: {fault.text}" for fault in board.message.faults if fault.active
-            ]
+        found = [*alarms(s.store, s.device, s.now), *bench_alarms(s.store)]
+        texts = [f"{alarm.title}: {alarm.text}" for alarm in found]
         if s.store.dropped:
             texts.append(f"the dashboard could not keep up: {s.store.dropped} messages not shown")
         if s.store.refused:
@@ -207,9 +177,7 @@ class Devices(Panel):
             if s.stale("estimator", name):
                 items.append((estimator_title(name), bad("silent")))
                 continue
-            state = m.state.partition(":")[
-                0
-            ]  # what a person should do stands after the colon, see _advice
+            state = _state_of(s, name)
             items.append((estimator_title(name), f"{state} · {number(m.us_per_sample, 0, 'µs')}"))
             if m.behind_s > BEHIND_SHOWN_S:
                 items.append(("", bad(f"{m.behind_s:.1f} s behind")))
@@ -229,7 +197,7 @@ class Devices(Panel):
         states = [
             s.device.get("estimator", n).message.state for n in s.device.estimators("estimator")
         ]
-        asking = (s for s in dict.fromkeys(states) if ":" in s or "stand still" in s)
+        asking = (state for state in dict.fromkeys(states) if waits(state))
         return joined(note(text) for text in asking)
 
     @staticmethod
@@ -240,6 +208,39 @@ class Devices(Panel):
             if name == s.device.name and s.now - arrived < 60
         ][-2:]
         return joined(note(text) for text in lines)
+
+
+def _state_of(s: Snapshot, name: str) -> str:
+    """What an estimator does. Whether the body is still or turns changes faster than the status
+    comes: that is taken from the message that the values are of.
+    """
+    state = s.device.get("estimator", name).message.state
+    state = state.partition(":")[0]  # what a person should do stands after it, see _advice
+    rate = s.device.get("rate", name)
+    if rate is None or state not in MOVING:
+        return state
+    return MOVING[0] if rates.row(rate.message, -1).still else MOVING[1]
+
+
+def _said_rate(s: Snapshot, name: str, m: pb.RateEstimate) -> tuple[str, Markup | str]:
+    """The rate about z as a tile shows it, and what is said below: no number where none is
+    known.
+    """
+    status = s.device.get("estimator", name)
+    if status is not None and waits(status.message.state):
+        return "–", status.message.state
+    if len(m.omega_ib_b_radps) != 3:
+        return "–", "no rate in its message"
+    omega = m.omega_ib_b_radps[2]
+    sight = m.sight[2] if len(m.sight) == 3 else pb.RateEstimate.SIGHT_VALID
+    if sight == pb.RateEstimate.SIGHT_BLIND and not m.still:
+        return "–", joined([term("blind"), f": {m.sight_reason or 'too slow to be seen'}"])
+    shown = number(omega * DEG, 1)
+    if sight == pb.RateEstimate.SIGHT_AMBIGUOUS:
+        return f"± {number(abs(omega) * DEG, 1)}", joined([term("ambiguous"), ": sign not known"])
+    if m.still and abs(omega) > TURNS_RADPS:
+        return shown, tag("span", "drifted: the body stands still", class_="gf-bad")
+    return shown, "still" if m.still else f"angle {number(m.angle_z_rad * DEG, 0, '°')}"
 
 
 def _tile(s: Snapshot, name: str, topic: str, value: str, unit: str, sub: str) -> Markup:

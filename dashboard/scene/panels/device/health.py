@@ -2,23 +2,14 @@
 does not.
 """
 
+from dashboard.data.alarms import AXIS_WORDS, axis_good
+from dashboard.data.device import Device
 from dashboard.scene.drawing.axis_arrows import BAD, residual_colour
 from dashboard.scene.drawing.page import Markup, alert, bad, joined, note, tag
 from dashboard.scene.drawing.palette import age, number
 from dashboard.scene.panels.base import Panel, Snapshot
 from messages.contract import gyrofree_pb2 as pb
 
-WORDS = {
-    pb.AxisHealth.STATE_GOOD: "good",
-    pb.AxisHealth.STATE_STUCK: "stuck",
-    pb.AxisHealth.STATE_SATURATED: "saturated",
-    pb.AxisHealth.STATE_SWAPPED: "swapped",
-    pb.AxisHealth.STATE_FLIPPED: "sign flipped",
-    pb.AxisHealth.STATE_SPIKING: "spiking",
-    pb.AxisHealth.STATE_BIASED: "biased",
-    pb.AxisHealth.STATE_STALE: "not fresh",
-    pb.AxisHealth.STATE_SUSPECT: "suspect",
-}
 MOST = 64  # axes in the table
 FULL = 2.0 * BAD  # sigmas that fill a bar
 
@@ -27,7 +18,16 @@ class Health(Panel):
     """Parity of the axes: residual of each against all others and the rigid-body field."""
 
     title = "Health"
+    workspace = "diagnose"
     _table = None
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        if device.get("axes"):
+            return ""
+        if device.is_vehicle:
+            return "one accelerometer alone has nothing to be compared with"
+        return "no estimator has judged the axes of this board yet"
 
     def update(self, s: Snapshot) -> None:
         latest = s.device.get("axes")
@@ -40,7 +40,9 @@ class Health(Panel):
             return
         m = latest.message
         bad_ones = [
-            f"{axis.name} {WORDS.get(axis.state, 'unknown')}" for axis in m.axes if not _good(axis)
+            f"{axis.name} {AXIS_WORDS.get(axis.state, 'unknown')}"
+            for axis in m.axes
+            if not axis_good(axis)
         ]
         good = ", ".join([f"{len(m.axes) - len(bad_ones)} of {len(m.axes)} good", *bad_ones])
         ratio = number(m.chi2, 1) if m.dof else "–"
@@ -52,12 +54,6 @@ class Health(Panel):
         bar = note("Bar: residual against the other axes over its σ, full at 8 σ; gate at 4 σ.")
         parts = [alert(m.message), tag("p", words, class_="gf-title"), table, more, bar]
         self._table = self.html(joined(parts), self._table)
-
-
-def _good(axis: pb.AxisHealth.Axis) -> bool:
-    """An axis that is only looked into is good."""
-    looked_into = axis.state == pb.AxisHealth.STATE_SUSPECT and not axis.excluded
-    return looked_into or axis.state == pb.AxisHealth.STATE_GOOD
 
 
 _HEAD = Markup(
@@ -73,7 +69,7 @@ def _row(axis: pb.AxisHealth.Axis, now_ns: int) -> Markup:
     filled = tag("div", style=f"width:{width}%;height:100%;background:{colour}")
     frame = "width:64px;height:8px;border:1px solid #8C8C8C;border-radius:2px"
     bar = tag("div", filled, style=frame)
-    word = WORDS.get(axis.state, "unknown")
+    word = AXIS_WORDS.get(axis.state, "unknown")
     good = axis.state == pb.AxisHealth.STATE_GOOD
     state = word if good else bad(word, ", not used" if axis.excluded else "")
     since = "" if good else age(max(0.0, (now_ns - axis.since_utc_ns) * 1e-9))

@@ -31,6 +31,7 @@ class LayoutBench(Panel):
     """One gizmo moves and turns the chosen axis, or all axes of its triad; figures follow."""
 
     title = "Layout"
+    workspace = "calibrate"
     own_inputs = ("Start from", "Sensor", "Whole triad", "Save as TOML")
     own_scene = True
 

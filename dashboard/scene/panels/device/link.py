@@ -2,6 +2,7 @@
 were bad.
 """
 
+from dashboard.data.device import Device
 from dashboard.scene.drawing.page import alert, bad, note, rows, tag
 from dashboard.scene.drawing.palette import number
 from dashboard.scene.panels.base import Panel, Snapshot
@@ -13,7 +14,12 @@ class Link(Panel):
     """The ledger of the line; its bytes add up: in = good + bad + pending."""
 
     title = "Link"
+    workspace = "diagnose"
     _table = None
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        return "" if device.get("link") else "the gateway has not spoken of this line yet"
 
     def update(self, s: Snapshot) -> None:
         latest = s.device.get("link")

@@ -5,6 +5,7 @@ for operators.
 import numpy as np
 import viser
 
+from dashboard.data.device import Device
 from dashboard.scene.drawing.page import EMPTY, Markup, joined, note, rows, tag
 from dashboard.scene.drawing.palette import AXES, GREEN, number, rgba
 from dashboard.scene.panels.base import Snapshot
@@ -37,7 +38,14 @@ class Calibration(Guided):
     """Status, picture and four buttons; what they do is done by the estimator of the device."""
 
     title = "Calibrate"
+    workspace = "calibrate"
     buttons = BUTTONS
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        if device.is_vehicle:
+            return "boards of accelerometers alone are calibrated here"
+        return "" if device.get("accel") else "no samples have come from this board yet"
 
     def update(self, s: Snapshot) -> None:
         self._device = s.device.name

@@ -6,6 +6,7 @@ import numpy as np
 import viser
 from scipy.spatial.transform import Rotation
 
+from dashboard.data.device import Device
 from dashboard.scene.drawing.page import EMPTY, Markup, joined, note, rows, tag
 from dashboard.scene.drawing.palette import AXES, GREEN, GREY, VERMILLION, number, rgba
 from dashboard.scene.panels.base import DEG, Snapshot
@@ -52,7 +53,14 @@ class Wiring(Guided):
     """
 
     title = "Wiring"
+    workspace = "calibrate"
     buttons = BUTTONS
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        if device.get("imu") is not None or device.get("adc") is not None:
+            return ""
+        return "for boards with accelerometers and gyroscopes, of any wiring"
 
     def update(self, s: Snapshot) -> None:
         self._device = s.device.name

@@ -1,14 +1,22 @@
 """Specific force of the body's centre in body axes, from the field of all sensors."""
 
+from dashboard.data.device import Device
 from dashboard.scene.drawing.chart import Curve
 from dashboard.scene.drawing.palette import AXES, truth_colour
-from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve
+from dashboard.scene.panels.base import NO_RATE, Panel, Snapshot, estimator_curve
 
 
 class Acceleration(Panel):
     """One chart per body axis; a vehicle shows its accelerometer's three axes together."""
 
     title = "Accel."
+    workspace = "watch"
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        if device.is_vehicle:
+            return "" if device.get("imu") else "no inertial samples have come from this board yet"
+        return "" if device.estimators("rate") else NO_RATE
 
     def update(self, s: Snapshot) -> None:
         if s.device.is_vehicle:

@@ -2,15 +2,24 @@
 
 import numpy as np
 
+from dashboard.data.device import Device
 from dashboard.scene.drawing.chart import Curve
 from dashboard.scene.drawing.palette import truth_colour
-from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
+from dashboard.scene.panels.base import DEG, NO_RATE, Panel, Snapshot, estimator_curve
 
 
 class Angle(Panel):
     """Angles and, where the truth is known, how far they are off."""
 
     title = "Angle"
+    workspace = "watch"
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        if device.is_vehicle:
+            why = "no navigation filter runs for this device, so there is no heading"
+            return "" if device.estimators("nav") else why
+        return "" if device.estimators("rate") else NO_RATE
 
     def update(self, s: Snapshot) -> None:
         if s.device.is_vehicle:

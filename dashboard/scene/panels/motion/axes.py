@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from dashboard.data.device import Device
 from dashboard.scene.drawing.chart import Curve
 from dashboard.scene.drawing.palette import AXES
 from dashboard.scene.panels.base import Panel, Snapshot
@@ -13,6 +14,12 @@ class Axes(Panel):
     """
 
     title = "Axes"
+    workspace = "diagnose"
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        heard = device.get("imu") if device.is_vehicle else device.get("accel")
+        return "" if heard else "no inertial samples have come from this board yet"
 
     def update(self, s: Snapshot) -> None:
         if s.device.is_vehicle:

@@ -4,6 +4,7 @@ unseen fixes.
 
 import numpy as np
 
+from dashboard.data.device import Device
 from dashboard.scene.drawing.chart import Curve
 from dashboard.scene.drawing.page import joined, note, rows, sub
 from dashboard.scene.drawing.palette import AXES, estimator_title, number
@@ -14,7 +15,16 @@ class Errors(Panel):
     """Error with the 3-sigma the filter claims for it, and its RMS over the window."""
 
     title = "Errors"
+    workspace = "navigate"
     _table = None
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        if device.is_vehicle:
+            return "" if device.estimators("innovation") else "no fix has been used yet"
+        if device.get("truth") or device.get("tacho"):
+            return ""
+        return "nothing to compare with: neither truth nor tachometer is known"
 
     def update(self, s: Snapshot) -> None:
         if s.device.is_vehicle:

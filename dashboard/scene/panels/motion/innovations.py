@@ -6,12 +6,15 @@ import numpy as np
 import viser
 from scipy.stats import chi2
 
+from dashboard.data.device import Device
 from dashboard.scene.drawing.chart import Curve
-from dashboard.scene.drawing.page import note, rows, sub
+from dashboard.scene.drawing.page import Markup, bad, joined, note, rows, sub, tag, term
 from dashboard.scene.drawing.palette import AXES, GREY, estimator_title, number
 from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve
 from inertial.layouts.layout import PRODUCTS
 
+FEWEST = 20  # values that a verdict takes
+MATTERS = 0.25  # share by which a mean may be off its degrees of freedom
 INSIDE = 0.95  # share of NIS values that an honest filter has between the two bounds
 
 
@@ -19,7 +22,15 @@ class Innovations(Panel):
     """NIS first, then the innovations; the table says how many values lie inside."""
 
     title = "NIS"
+    workspace = "diagnose"
     _table = None
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        topic = "innovation" if device.is_vehicle else "rate"
+        if device.estimators(topic):
+            return ""
+        return "no filter has corrected itself by a measurement yet"
 
     def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
         super().__init__(client, folder)
@@ -75,7 +86,10 @@ class Innovations(Panel):
         inside = float(np.mean((nis >= low) & (nis <= high)) * 100)
         return [
             (f"inside 95 % bounds, {title}", number(inside, 1, "%")),
-            (f"mean NIS, expected {dof}", number(float(np.mean(nis)), 2)),
+            (
+                joined(["mean ", term("NIS"), f", expected {dof}"]),
+                joined([number(float(np.mean(nis)), 2), " · ", verdict(nis, dof)]),
+            ),
         ]
 
     def _innovations(
@@ -105,6 +119,21 @@ class Innovations(Panel):
                     s,
                     digits=2,
                 )
+
+
+def verdict(nis: np.ndarray, dof: int) -> Markup:
+    """What values of NIS (n,) say of a filter, for people: beyond their chi-square bounds and by so
+    much that it matters.
+    """
+    count, mean = len(nis), float(np.mean(nis))
+    if count < FEWEST:
+        return tag("span", "too few to judge")
+    low, high = chi2.interval(INSIDE, count * max(dof, 1))
+    if mean > max(high / count, dof * (1.0 + MATTERS)):
+        return bad("too sure of itself")
+    if mean < min(low / count, dof * (1.0 - MATTERS)):
+        return bad("too careful")
+    return tag("span", "honest")
 
 
 # The products w_i w_j in the estimators' order.

@@ -4,9 +4,10 @@ step costs.
 
 import numpy as np
 
+from dashboard.data.device import Device
 from dashboard.scene.drawing.page import Markup, joined, note, tag
 from dashboard.scene.drawing.palette import estimator_colour, estimator_title, number
-from dashboard.scene.panels.base import DEG, Panel, Snapshot
+from dashboard.scene.panels.base import DEG, NO_RATE, Panel, Snapshot
 
 HEAD = Markup(
     "<tr><td><b>estimator</b></td><td>RMS ω<sub>z</sub>, °/s</td><td>NIS over its"
@@ -24,7 +25,16 @@ class Race(Panel):
     """
 
     title = "Race"
+    workspace = "watch"
     _table = None
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        if device.estimators("rate"):
+            return ""
+        if device.is_vehicle:
+            return "rate estimators are for boards without gyroscopes; this one measures its rate"
+        return NO_RATE
 
     def update(self, s: Snapshot) -> None:
         names = s.device.estimators("rate")

@@ -4,6 +4,7 @@ gyroscope.
 
 import numpy as np
 
+from dashboard.data.device import Device
 from dashboard.scene.drawing.chart import Curve, Shade
 from dashboard.scene.drawing.page import joined, note, sub
 from dashboard.scene.drawing.palette import (
@@ -14,7 +15,7 @@ from dashboard.scene.drawing.palette import (
     YELLOW,
     truth_colour,
 )
-from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
+from dashboard.scene.panels.base import DEG, NO_RATE, Panel, Snapshot, estimator_curve
 from messages.contract import gyrofree_pb2 as pb
 
 
@@ -24,7 +25,14 @@ class Rates(Panel):
     """
 
     title = "Rates"
+    workspace = "watch"
     _note = None
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        if device.is_vehicle:
+            return "" if device.get("imu") else "no inertial samples have come from this board yet"
+        return "" if device.estimators("rate") else NO_RATE
 
     def update(self, s: Snapshot) -> None:
         if s.device.is_vehicle:

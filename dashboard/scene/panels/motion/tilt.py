@@ -2,6 +2,7 @@
 side.
 """
 
+from dashboard.data.device import Device
 from dashboard.data.pose import roll_pitch
 from dashboard.scene.drawing.horizon import between, horizon_svg
 from dashboard.scene.drawing.page import Markup, note, rows
@@ -15,7 +16,16 @@ class Tilt(Panel):
     """A fixed-weight filter beside a modern one: what the weight costs is seen, not told."""
 
     title = "Tilt"
+    workspace = "watch"
     _top = None
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        if device.estimators("attitude"):
+            return ""
+        if device.is_vehicle:
+            return "no tilt filter runs for this board: [estimator] attitude names them"
+        return "tilt needs a board with accelerometers and gyroscopes; this one has no gyroscopes"
 
     def update(self, s: Snapshot) -> None:
         names = sorted(s.device.estimators("attitude"), key=lambda name: (name != BEST, name))

@@ -5,6 +5,7 @@ takes GNSS away.
 import numpy as np
 import viser
 
+from dashboard.data.device import Device
 from dashboard.scene.drawing.chart import Curve
 from dashboard.scene.drawing.map import map_svg
 from dashboard.scene.drawing.page import EMPTY, Markup, alert, joined, note, rows, tag
@@ -32,7 +33,17 @@ class Navigation(Panel):
     """Whoever is closest to the fixes that nobody saw leads the table."""
 
     title = "Map"
+    workspace = "navigate"
     _top = None
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        if device.estimators("nav"):
+            return ""
+        return (
+            "no navigation filter runs for this device: it needs a GNSS receiver, and a six-axis"
+            " board or a cube for which [estimator] gyro_free_navigation names filters"
+        )
 
     def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
         super().__init__(client, folder)

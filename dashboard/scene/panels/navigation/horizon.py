@@ -4,6 +4,7 @@ that.
 
 import numpy as np
 
+from dashboard.data.device import Device
 from dashboard.scene.drawing.chart import Curve
 from dashboard.scene.drawing.page import EMPTY, Markup, note, rows, tag
 from dashboard.scene.drawing.palette import AXES, estimator_title, number
@@ -42,7 +43,15 @@ class Horizon(Panel):
     """N over time; the sets as they are, with the input on them."""
 
     title = "Horizon"
+    workspace = "navigate"
     _top = None
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        names = device.estimators("nav")
+        if any(device.get("nav", name).message.HasField("horizon") for name in names):
+            return ""
+        return "no moving horizon runs: add fpe-fuzzy or mhe-robust to [estimator] navigators"
 
     def update(self, s: Snapshot) -> None:
         names = [

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from dashboard.data.device import Device
 from dashboard.scene.drawing.chart import Curve
 from dashboard.scene.drawing.geometry import MODES
 from dashboard.scene.drawing.page import Markup, note, rows
@@ -21,7 +22,16 @@ class Position(Panel):
     """
 
     title = "Position"
+    workspace = "navigate"
     _table = None
+
+    @classmethod
+    def missing(cls, device: Device) -> str:
+        if device.navigates or any(
+            len(device.get("rate", name).message.p_n_m) for name in device.estimators("rate")
+        ):
+            return ""
+        return "no estimator says where this device is"
 
     def update(self, s: Snapshot) -> None:
         vehicle = s.device.navigates

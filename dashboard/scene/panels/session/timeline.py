@@ -1,5 +1,5 @@
-"""The panel at the bottom left: where the recording or the replay stands, the replay's controls,
-notes and marks.
+"""Below the summary: where the recording or the replay stands, notes and marks, and the replay's
+controls.
 """
 
 import logging
@@ -22,6 +22,8 @@ log = logging.getLogger(__name__)
 SPEEDS = ("0.1×", "0.25×", "0.5×", "1×", "2×", "5×", "10×", "50×", "100×")
 STALE_S = 2.0
 SHOWN_MARKS = 6
+MOVES = ("start", "−10 s", "◂ step", "play / pause", "step ▸", "+10 s")
+KEYS = {"play": "play / pause", "back": "◂ step", "on": "step ▸"}
 HOLD_S = 1.0  # after a person's hand on the slider, the replay's position does not move it
 
 
@@ -36,46 +38,36 @@ class Timeline:
         desk: Desk,
         store: Store,
         chosen: Callable[[], str],
-        dock: bool = True,
     ) -> None:
         """`chosen` names the device that this browser shows, which a note is about."""
         self._client, self._desk, self._store, self._chosen = client, desk, store, chosen
         self._touched = 0.0
         gui = client.gui
-        panel = gui.add_panel()
-        with panel.add_tab("Timeline", viser.Icon.PLAYER_PLAY):
-            self._state = gui.add_html("")
-            self._slider = gui.add_slider(
-                "Position, s",
-                0.0,
-                1.0,
-                0.1,
-                0.0,
-                visible=False,
-                hint="Seconds since the recording began",
-            )
-            self._slider.on_update(lambda event: self._slid(event))
-            moves = ("start", "−10 s", "◂ step", "play / pause", "step ▸", "+10 s")
-            self._buttons = gui.add_button_group("Replay", moves)
-            self._buttons.on_click(lambda _: self._press(self._buttons.value))
-            self._speed = gui.add_dropdown("Speed", SPEEDS, initial_value="1×")
-            self._speed.on_update(lambda event: self._set_speed(event))
-            self._loop = gui.add_button_group("Loop", ("from here", "until here", "off"))
-            self._loop.on_click(lambda _: self._set_loop(self._loop.value))
-            self._note = gui.add_text("Note", "", hint="What should be remembered of this moment")
-            self._keep = gui.add_button_group("Keep", ("note", "mark"))
-            self._keep.on_click(lambda _: self._remember(self._keep.value == "mark"))
-        if dock:
-            panel.dock_below(gui.main_panel)  # viser has no bar over the whole width
-            panel.set_height(300)
+        self._state = gui.add_html("")
+        self._slider = gui.add_slider(
+            "Position, s",
+            0.0,
+            1.0,
+            0.1,
+            0.0,
+            visible=False,
+            hint="Seconds since the recording began",
+        )
+        self._slider.on_update(lambda event: self._slid(event))
+        self._buttons = gui.add_button_group("Replay", MOVES, visible=False)
+        self._buttons.on_click(lambda _: self._press(self._buttons.value))
+        self._speed = gui.add_dropdown("Speed", SPEEDS, initial_value="1×", visible=False)
+        self._speed.on_update(lambda event: self._set_speed(event))
+        loops = ("from here", "until here", "off")
+        self._loop = gui.add_button_group("Loop", loops, visible=False)
+        self._loop.on_click(lambda _: self._set_loop(self._loop.value))
         self._replay_inputs = (self._slider, self._buttons, self._speed, self._loop)
         self._showing: bool | None = None
-        self._commands()
 
     @property
     def orders(self) -> tuple[Input, ...]:
-        """The elements a viewer may not use: they order, or write into the recording."""
-        return *self._replay_inputs, self._note, self._keep
+        """The elements a viewer may not use."""
+        return self._replay_inputs
 
     def update(self, now: float) -> None:
         """Show the newest state. Call under the store's lock."""
@@ -136,20 +128,21 @@ class Timeline:
         device = self._store.device(self._chosen())
         if device is None or not device.marks:
             return EMPTY
-        shown = [f"{clock(at)} {text or 'mark'}" for at, text in device.marks[-SHOWN_MARKS:]]
-        return note(joined(shown, " · "))
+        begun = self._store.recorded_s(device.name)
+        shown = []
+        for at, text in device.marks[-SHOWN_MARKS:]:
+            s = None if begun is None else begun - (device.t_newest - at)
+            utc = time.gmtime(device.utc0_ns * 1e-9 + at)
+            when = time.strftime("%H:%M:%S UTC", utc) if s is None or s < 0.0 else clock(s)
+            shown.append(tag("li", tag("b", when), " ", text or "mark"))
+        return tag("ul", *shown, class_="gf-note gf-marks")
 
     # --- what a person does
 
-    def _commands(self) -> None:
-        add = self._client.gui.add_command
-        for label, key, press in (
-            ("Replay: play or pause", "K", "play / pause"),
-            ("Replay: a step back", "J", "◂ step"),
-            ("Replay: a step on", "L", "step ▸"),
-        ):
-            add(label, hotkey=key).on_trigger(lambda _, press=press: self._press(press))
-        add("Set a mark", hotkey="M").on_trigger(lambda _: self._remember(True))
+    def do(self, what: str) -> None:
+        """What a key of the page asks: play (or pause), back or on by a step."""
+        if what in KEYS and not self._buttons.disabled:
+            self._press(KEYS[what])
 
     def _order(self, action: int, value: float = 0.0, until: float = 0.0) -> None:
         if not self._showing:
@@ -194,32 +187,6 @@ class Timeline:
             self._order(pb.ReplayCommand.ACTION_LOOP, m.position_s, max(m.loop_until_s, m.length_s))
         elif m.position_s > m.loop_from_s:
             self._order(pb.ReplayCommand.ACTION_LOOP, m.loop_from_s, m.position_s)
-
-    def _remember(self, mark: bool) -> None:
-        name, text = self._chosen(), self._note.value.strip()
-        if not name or not (text or mark):
-            return
-        with self._store.lock:
-            device = self._store.device(name)
-            at_ns = (
-                device.utc0_ns + int(device.t_newest * 1e9)
-                if device is not None
-                else time.time_ns()
-            )
-        kind = pb.Note.KIND_MARK if mark else pb.Note.KIND_NOTE
-        note = pb.Note(
-            header=pb.Header(device=name, utc_ns=at_ns),
-            text=text[:2000],
-            kind=kind,
-            at_utc_ns=at_ns,
-        )
-        try:
-            self._desk.note(name, note)
-            self._note.value = ""
-        except OrderError as error:
-            self._client.add_notification(
-                "The note was not kept", plain(error), color="red", auto_close_seconds=6.0
-            )
 
 
 def clock(seconds: float, digits: int = 1) -> str:

@@ -18,6 +18,7 @@ from dashboard.web.auth import Role
 
 log = logging.getLogger(__name__)
 
+ROLE = "Role"  # label of the input by which the scene is told who looks; nobody else writes there
 TEXT_LENGTH = 2000  # characters of an input
 NAME_LENGTH = 300  # of an identifier or a node's name
 FAR = 1e9  # of a number without a bound of its own
@@ -122,6 +123,12 @@ def message_type(data: bytes) -> tuple[str, dict]:
     return kind, fields
 
 
+def update(uuid: str, value: str) -> bytes:
+    """The message by which a browser gives an input a value."""
+    fields = {"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}}
+    return msgspec.msgpack.encode(fields)
+
+
 def may_send(role: Role, kind: str, fields: dict, widgets: "Widgets") -> bool:
     """True when this role may send this message, and it holds what such a message holds.
 
@@ -138,6 +145,8 @@ def may_send(role: Role, kind: str, fields: dict, widgets: "Widgets") -> bool:
     if kind != "GuiUpdateMessage":
         return True
     uuid, updates = fields["uuid"], fields["updates"]
+    if uuid == widgets.role:
+        return False
     if role < Role.operator and uuid not in widgets.open:
         return False
     return set(updates) == {"value"} and widgets.takes(uuid, updates["value"])
@@ -191,6 +200,7 @@ class Widgets:
         self._zstd = zstandard.ZstdDecompressor()
         self._known: dict[str, Widget] = {}
         self.open: set[str] = set()  # identifiers
+        self.role = ""  # identifier of the input labelled ROLE
 
     def takes(self, uuid: str, value: object) -> bool:
         """Is there such a widget, and can it have this value?"""
@@ -212,7 +222,9 @@ class Widgets:
         if message.type in MAKES_INPUT:
             props = _decode.decode(message.props)
             self._known[uuid] = Widget(message.type, props)
-            if props.get("label") in self._labels:
+            if props.get("label") == ROLE:
+                self.role = uuid
+            elif props.get("label") in self._labels:
                 self.open.add(uuid)
         elif message.type == "GuiUpdateMessage" and uuid in self._known:
             changed = _decode.decode(message.updates)

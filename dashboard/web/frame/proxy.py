@@ -19,14 +19,15 @@ from starlette.websockets import WebSocketDisconnect
 
 from dashboard.settings import DashboardSettings
 from dashboard.web.auth import Gate, Role
-from dashboard.web.scene_messages import (
+from dashboard.web.frame.scene_messages import (
     DROPPED_QUIETLY,
     BadMessage,
     Widgets,
     may_send,
     message_type,
+    update,
 )
-from dashboard.web.scene_page import policy, scene_page, script_hashes
+from dashboard.web.frame.scene_page import policy, scene_page, script_hashes
 from messages.text import plain
 
 log = logging.getLogger(__name__)
@@ -123,6 +124,7 @@ class Relay:
         self._rate = Rate(settings.message_rate)
         self._refused: set[str] = set()  # names said already
         self._who = "nobody"
+        self._told = ""  # role that the scene knows of
 
     async def run(self, port: int) -> None:
         """Until either side ends."""
@@ -155,7 +157,7 @@ class Relay:
         tasks = [
             asyncio.create_task(self._to_browser(scene)),
             asyncio.create_task(self._to_scene(scene)),
-            asyncio.create_task(self._watch()),
+            asyncio.create_task(self._watch(scene)),
         ]
         done, pending = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         for task in pending:
@@ -180,6 +182,7 @@ class Relay:
         async for message in scene:
             if isinstance(message, bytes):
                 self._widgets.learn(message)
+                await self._tell_role(scene)
             try:
                 async with asyncio.timeout(self._settings.stall_s):
                     await self._socket.send_bytes(
@@ -229,11 +232,20 @@ class Relay:
             self._refused.add(name)
             log.warning("refused %s of %s (%s) to the scene", plain(name, 64), self._who, role.name)
 
-    async def _watch(self) -> tuple[int, str]:
+    async def _tell_role(self, scene: websockets.ClientConnection) -> None:
+        """Let the scene know whose orders are his, so that it greys the others'."""
+        found = self._gate.look_up(self._key)
+        role = "" if found is None else found[1].role.name
+        if role and self._widgets.role and role != self._told:
+            self._told = role
+            await scene.send(update(self._widgets.role, role))
+
+    async def _watch(self, scene: websockets.ClientConnection) -> tuple[int, str]:
         """Ends the connection of a browser that was signed out, also when it sends nothing."""
         while True:
             found = self._gate.look_up(self._key)
             if found is None:
                 return 1008, "signed out"
             self._who = found[1].name
+            await self._tell_role(scene)
             await asyncio.sleep(2.0)

@@ -1,0 +1,163 @@
+"""What is wrong with a device or the bench, and on which page that is seen: one list for the bar,
+the summary and the REST interface, so that all three say the same.
+"""
+
+import re
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from dashboard.data.device import BEHIND_STALE_S, Device
+from dashboard.data.store import Store
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract import rates
+from messages.text import plain
+
+AXIS_WORDS = {
+    pb.AxisHealth.STATE_GOOD: "good",
+    pb.AxisHealth.STATE_STUCK: "stuck",
+    pb.AxisHealth.STATE_SATURATED: "saturated",
+    pb.AxisHealth.STATE_SWAPPED: "swapped",
+    pb.AxisHealth.STATE_FLIPPED: "sign flipped",
+    pb.AxisHealth.STATE_SPIKING: "spiking",
+    pb.AxisHealth.STATE_BIASED: "biased",
+    pb.AxisHealth.STATE_STALE: "not fresh",
+    pb.AxisHealth.STATE_SUSPECT: "suspect",
+}
+MOST = 12  # of one device
+TURNS_RADPS = 0.035  # 2 deg/s: beyond it a rate is no standstill
+RECORDER_STALE_S = 5.0  # s without a word of the recorder while it records
+_COUNTS = re.compile(r"fixes (\w+) (\d+)")
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """One thing that is wrong."""
+
+    kind: str  # of a kind: "axis", "link", "board", "estimator", "late", "blind", ...
+    title: str  # in a few words
+    text: str  # what was found and what to do
+    page: str  # key of the page that shows it; "" for none
+
+
+def counts(message: str) -> dict[str, int] | None:
+    """What an estimator counted, of a message such as 'fixes used 1315, fixes late 2'; None for any
+    other message.
+    """
+    found = [_COUNTS.fullmatch(part) for part in message.split(", ")]
+    return {match[1]: int(match[2]) for match in found} if all(found) else None
+
+
+def axis_good(axis: pb.AxisHealth.Axis) -> bool:
+    """An axis that is only looked into is good."""
+    looked_into = axis.state == pb.AxisHealth.STATE_SUSPECT and not axis.excluded
+    return looked_into or axis.state == pb.AxisHealth.STATE_GOOD
+
+
+def waits(state: str) -> bool:
+    """Whether an estimator says that it has nothing to say yet, as 'finding biases: keep still'."""
+    return ":" in state or "keep still" in state or "stand still" in state
+
+
+def alarms(store: Store, device: Device, now: float | None = None) -> list[Alarm]:
+    """What is wrong with a device, the worst first. Call under the store's lock; now:
+    time.monotonic(), s, of a replay that is paused, when it was.
+    """
+    now = time.monotonic() if now is None else now
+    if store.replay.state(device.name, time.monotonic()) == "ended":
+        return []
+    found = [*_link(device, now), *_board(device, now), *_axes(device, now)]
+    found += [*_estimators(device, now), *_sight(device, now)]
+    return found[:MOST]
+
+
+def bench_alarms(store: Store, now: float | None = None) -> list[Alarm]:
+    """What is wrong with the recorder. Call under the store's lock."""
+    heard = store.recorder
+    if heard is None:
+        return []
+    if heard.message.recording and heard.age(now) > RECORDER_STALE_S:
+        silent = f"silent for {heard.age(now):.0f} s in the middle of a recording"
+        return [Alarm("recorder", "recorder silent", silent, "")]
+    text = plain(heard.message.message)
+    if not text:
+        return []
+    full = "no space" in text.lower() or "full" in text.lower()
+    return [Alarm("recorder", "disk full" if full else "recording failed", text, "")]
+
+
+def _link(device: Device, now: float) -> Iterator[Alarm]:
+    heard = device.get("link")
+    if heard is None:
+        return
+    m = heard.message
+    if device.stale("link", now=now):
+        text = f"its gateway has been silent for {heard.age(now):.0f} s: does it still run?"
+        yield Alarm("link", "gateway silent", text, "link")
+    elif not m.connected:
+        yield Alarm("link", "link lost", plain(m.message) or "the board is not connected", "link")
+    elif m.message:
+        yield Alarm("link", "link", plain(m.message), "link")
+
+
+def _board(device: Device, now: float) -> Iterator[Alarm]:
+    heard = device.get("board")
+    if heard is None or device.stale("board", now=now):
+        return
+    for fault in heard.message.faults:
+        if fault.active or fault.name == "reboot":  # over as soon as it is known
+            yield Alarm("board", plain(fault.name), plain(fault.text), "board")
+
+
+def _axes(device: Device, now: float) -> Iterator[Alarm]:
+    heard = device.get("axes")
+    if heard is None or device.stale("axes", now=now):
+        return
+    for axis in heard.message.axes:
+        if axis_good(axis):
+            continue
+        title = f"axis {plain(axis.name, 16)} {AXIS_WORDS.get(axis.state, 'unknown')}"
+        text = plain(axis.text) or "it does not fit the other axes"
+        yield Alarm("axis", title, text + (", not used" if axis.excluded else ""), "health")
+
+
+def _estimators(device: Device, now: float) -> Iterator[Alarm]:
+    page = {"nav": "position", "attitude": "tilt", "rate": "rates"}[device.body]
+    for name in device.estimators("estimator"):
+        heard = device.get("estimator", name)
+        m, called = heard.message, plain(name, 40)
+        if device.stale("estimator", name, now):
+            text = f"nothing from it for {heard.age(now):.0f} s: does its process still run?"
+            yield Alarm("estimator", f"{called} silent", text, page)
+            continue
+        if m.message and counts(m.message) is None:
+            yield Alarm("estimator", called, plain(m.message), page)
+    behind_s = max((device.behind_s(n) for n in device.estimators("estimator")), default=0.0)
+    if behind_s > BEHIND_STALE_S:
+        text = (
+            f"estimates are {behind_s:.0f} s behind their samples: its machine is too slow for all"
+            " that it is given; fewer estimators or boards, or a second machine"
+        )
+        yield Alarm("late", "estimates are late", text, page)
+
+
+def _sight(device: Device, now: float) -> Iterator[Alarm]:
+    """What the leading rate filter does not see, or what contradicts it."""
+    names = device.estimators("rate")
+    if not names or device.stale("rate", names[0], now):
+        return
+    name = names[0]
+    m = rates.row(device.get("rate", name).message, -1)
+    status = device.get("estimator", name)
+    if status is not None and waits(status.message.state):
+        return
+    reason, called = plain(m.sight_reason), plain(name, 40)
+    if "contradict" in reason:
+        yield Alarm("contradicted", f"{called} contradicted", reason, "nis")
+    blind = len(m.sight) == 3 and all(s == pb.RateEstimate.SIGHT_BLIND for s in m.sight)
+    if blind and not m.still:
+        yield Alarm("blind", f"{called} blind", reason or "no component is seen now", "rates")
+    omega = m.omega_ib_b_radps
+    if m.still and len(omega) == 3 and max(map(abs, omega)) > TURNS_RADPS:
+        text = "the accelerometers say that it stands still, the filter says that it turns"
+        yield Alarm("contradicted", f"{called} contradicted", text, "rates")

@@ -1,0 +1,95 @@
+"""REST of the live page: a person's notes on a device, and what he last had on the page."""
+
+import time
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, HTTPException, Request
+from pydantic import BaseModel, Field
+
+from dashboard.data.store import Store
+from dashboard.web.auth import Role
+from dashboard.web.front import Asker, asker, front_of, needs
+from dashboard.web.schemas import Lines, Strict
+from messages.bus.orders import OrderError
+from messages.contract import gyrofree_pb2 as pb
+
+routes = APIRouter(prefix="/api")
+
+SignedIn = Annotated[Asker, Depends(asker)]
+Same = Annotated[Asker, Depends(needs(Role.viewer))]
+Operator = Annotated[Asker, Depends(needs(Role.operator))]
+
+
+class NoteIn(Strict):
+    text: Lines = Field(default="", max_length=2000)
+    mark: bool = Field(default=False, description="a moment, which may have no text")
+
+
+class NoteOut(BaseModel):
+    at_s: float | None = Field(
+        description="s since the recording or the replay began; none without one"
+    )
+    message: str
+
+
+class ViewIn(Strict):
+    view: str = Field(max_length=500, description="the live page's link after the question mark")
+
+
+class ViewOut(BaseModel):
+    view: str
+
+
+@routes.post("/devices/{device}/notes", summary="Keep a note or a mark of this moment (operator)")
+def note(request: Request, device: str, body: NoteIn, who: Operator) -> NoteOut:
+    front = front_of(request)
+    if not body.mark and not body.text.strip():
+        raise HTTPException(422, "a note wants words; a mark may be without")
+    if front.store is None or front.desk is None:
+        raise HTTPException(503, "this dashboard has no connection to the bus")
+    with front.store.lock:
+        found = front.store.device(device)
+        if found is None:
+            raise HTTPException(404, "nothing has been heard of such a device")
+        at_ns = found.utc0_ns + int(found.t_newest * 1e9) if found.rings else time.time_ns()
+        at_s = front.store.recorded_s(device)
+        recorded = recording(front.store)
+    kind = pb.Note.KIND_MARK if body.mark else pb.Note.KIND_NOTE
+    said = pb.Note(
+        header=pb.Header(device=device, utc_ns=at_ns),
+        text=body.text.strip(),
+        author=who.name,
+        kind=kind,
+        at_utc_ns=at_ns,
+    )
+    try:
+        front.desk.note(device, said)
+    except OrderError as error:
+        raise HTTPException(503, f"it was not kept: {error}") from None
+    what = "Mark" if body.mark else "Note"
+    if at_s is None:
+        return NoteOut(at_s=None, message=f"{what} shown; not kept: nothing is being recorded")
+    kept = "kept" if recorded else "shown; a replay is not recorded"
+    return NoteOut(at_s=at_s, message=f"{what} at {at_s:.1f} s: {kept}")
+
+
+def recording(store: Store) -> bool:
+    """Is a recording going on, as last heard?"""
+    return store.recorder is not None and store.recorder.message.recording
+
+
+@routes.get("/me/view", summary="What you last had on the live page")
+def view(request: Request, who: SignedIn) -> ViewOut:
+    return ViewOut(view=front_of(request).views.of(who.name))
+
+
+@routes.post("/me/view", summary="Remember what you have on the live page")
+def keep_view(request: Request, body: ViewIn, who: Same) -> ViewOut:
+    views = front_of(request).views
+    try:
+        views.keep(who.name, body.view)
+    except ValueError as error:
+        raise HTTPException(422, str(error)) from None
+    except OSError as error:
+        raise HTTPException(503, f"your view could not be kept: {error.strerror}") from None
+    return ViewOut(view=views.of(who.name))

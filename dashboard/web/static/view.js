@@ -1,0 +1,66 @@
+// The view inside the frame: what it states of itself, and how it is asked for something else. See scene/workspaces.py.
+const frame = document.getElementById("scene");
+const SPACING_MS = 150; // the scene takes an input's newest value only
+const AGAIN_MS = 2000;
+
+export let state = null;
+const wish = {}; // what the person chose; a view that begins anew is asked again
+let pending = {}, count = 0, sent = 0, last = "";
+const listeners = [];
+
+export const whenStated = (listener) => listeners.push(listener);
+
+// Ask once.
+export function ask(fields) {
+  Object.assign(pending, fields);
+}
+
+// Ask, and hold to it when the connection is made anew.
+export function choose(fields) {
+  Object.assign(wish, fields);
+  if ("w" in fields && !("p" in fields)) delete wish.p;
+  ask(fields);
+}
+
+const stated = (now) => ({
+  w: now.workspace, p: now.page, device: now.device, window: now.window,
+  layers: now.layers.join("."), follow: now.follow ? "1" : "0", dark: now.dark ? "1" : "0", pause: now.paused ? "1" : "0",
+});
+
+export function link(now) {
+  const of = stated(now);
+  const fields = new URLSearchParams({ w: of.w, p: of.p });
+  if (of.device) fields.set("device", of.device);
+  fields.set("window", of.window);
+  if (of.layers !== "truth.estimates.sensors.rate.trajectory.fixes.ellipsoid.grid") fields.set("layers", of.layers);
+  return fields.toString();
+}
+
+function flush() {
+  const doc = frame.contentDocument;
+  const input = doc?.querySelector("div:has(> .gf-state) + div input");
+  if (!input || Date.now() - sent < SPACING_MS || !Object.keys(pending).length) return;
+  sent = Date.now();
+  const line = new URLSearchParams({ ...pending, n: String(++count) }).toString();
+  pending = {};
+  const kind = frame.contentWindow;
+  Object.getOwnPropertyDescriptor(kind.HTMLInputElement.prototype, "value").set.call(input, line);
+  input.dispatchEvent(new kind.Event("input", { bubbles: true }));
+}
+
+function look() {
+  const text = frame.contentDocument?.querySelector(".gf-state")?.dataset.state;
+  if (text && text !== last) {
+    last = text;
+    state = JSON.parse(text);
+    for (const listener of listeners) listener(state);
+  }
+  if (state && Date.now() - sent > AGAIN_MS) {
+    const now = stated(state);
+    for (const [key, value] of Object.entries(wish)) {
+      if (key in now && now[key] !== value && (key !== "device" || state.devices.includes(value))) ask({ [key]: value });
+    }
+  }
+  flush();
+}
+setInterval(look, 100);

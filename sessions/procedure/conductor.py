@@ -1,0 +1,290 @@
+"""Goes from step to step: commands the table or tells the person, begins a watch, takes what comes
+of it. One for each device; the service gives it data and orders on one thread, and `emergency` from
+any.
+"""
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+
+from sessions.procedure.model import DEG, Step
+from sessions.procedure.run import ABORTED, DONE, HELD, RUNNING, STOPPED, Journal
+from sessions.procedure.seen import Line, Samples, Seen, TableSays
+from sessions.procedure.table import RateTable, TableError
+from sessions.procedure.watch import State, Watch
+
+log = logging.getLogger(__name__)
+
+SILENT_S = 5.0  # s without a sample: a driven table is stopped
+ASK_S = 1.0  # s between two questions to the table
+PATIENCE_S = 20.0  # s beyond the ramp that a driven table may need to get there
+STANDS = 1.0 * DEG  # rad/s
+CLOSING_S = 30.0  # s that a table may need to stand
+
+Say = Callable[[str, int, float], None]  # remark, its moment by the data's clock, its length in s
+
+
+class Conductor:
+    """Of one run. `journal` has its state; `record` begins (True) and ends a recording."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        table: RateTable | None,
+        say: Say,
+        record: Callable[[bool], str],
+    ) -> None:
+        """record(on): begin or end the recording of this run; what could not be done, or empty."""
+        self.journal, self.run = journal, journal.run
+        self.table, self.table_rate, self._taken = table, 0.0, False
+        self._say, self._record = say, record
+        first = self.run.plan.steps[0]
+        self.watch = Watch(first, 0.0, self.run.plan.vibration_max)
+        self._heard = self._asked = time.monotonic()
+        self._stopped = threading.Event()
+        self._driving = threading.Lock()
+        self._closing_since: float | None = None
+
+    # --- orders
+
+    def begin(self) -> None:
+        """Take the table and go to the first step, or on with the one that was being done."""
+        problem = self._take_table()
+        if self.run.over or self.run.state == HELD:
+            return  # killed while it ended, or while a person was asked
+        if problem:
+            self._hold(problem)
+            return
+        if self.run.at < 0:
+            self._go(0)
+        else:
+            self._say("the service was restarted: the step begins anew", 0, 0.0)
+            self._go(self.run.at)
+
+    def _take_table(self) -> str:
+        """What is wrong with the table, or empty."""
+        if self.table is None or self._taken:
+            return ""
+        try:
+            self.table.take()
+        except TableError as error:
+            return str(error)
+        self._taken = True
+        return ""
+
+    def next(self, by: str, text: str) -> str:
+        """An open step is done, or a failed one is left out; empty, or why not."""
+        step = self._step
+        if self.run.state == HELD:
+            self.journal.add("skipped", k=self.run.at, by=by)
+            self._go(self.run.at + 1)
+            return ""
+        if step is None or step.kind != "open":
+            return "this step goes on by itself; repeat or abort are the orders for it"
+        if step.ask and not text.strip():
+            return f"what was read is not given: {step.ask}"
+        said = f"{step.ask}: {text.strip()}" if step.ask else text.strip()
+        self.journal.add("done", k=self.run.at, by=by, text=said)
+        self._say(f"{step.name}: confirmed by {by or 'somebody'} {said}".rstrip(), 0, 0.0)
+        self._go(self.run.at + 1)
+        return ""
+
+    def repeat(self, by: str) -> str:
+        """Begin the present step anew; empty, or why not."""
+        if self.run.over:
+            return "the run has ended"
+        if problem := self._take_table():
+            return problem
+        self._say(f"step {self.run.at + 1} is repeated by {by or 'somebody'}", 0, 0.0)
+        self._go(max(self.run.at, 0))
+        return ""
+
+    def abort(self, by: str) -> str:
+        """End the run; the table goes to rest by its ramp."""
+        if self.run.over:
+            return "the run has ended"
+        self._end(ABORTED, f"aborted by {by or 'somebody'}")
+        return ""
+
+    def emergency(self) -> str:
+        """Stop the table at once, from any thread; what went wrong, or empty."""
+        self._stopped.set()
+        with self._driving:
+            try:
+                if self.table is not None:
+                    self.table.stop()
+            except TableError as error:
+                log.error("emergency stop: %s", error)
+                return f"THE TABLE DID NOT TAKE THE STOP, switch it off: {error}"
+        return ""
+
+    def stopped(self, by: str) -> None:
+        """After `emergency`: the run has ended."""
+        if not self.run.over:
+            self._end(STOPPED, f"emergency stop by {by or 'somebody'}")
+
+    # --- data and time
+
+    def take(self, seen: Seen) -> None:
+        """Something was seen on the bus."""
+        if isinstance(seen, Samples):
+            self._heard = time.monotonic()
+            if not self.run.started_utc_ns:
+                self.journal.add("began", utc_ns=seen.utc_ns)
+        self.watch.take(seen)
+        if self.watch.over and self.run.state == RUNNING and self._watched:
+            self._judge()
+
+    def tick(self) -> None:
+        """A few times a second: ask the table, notice silence, close what has ended."""
+        now = time.monotonic()
+        if self.run.over:
+            self._close(now)
+            return
+        if self.table is not None and now - self._asked > ASK_S:
+            self._asked = now
+            try:
+                self.table_rate = self.table.rate()
+                self.watch.take(TableSays(self.table_rate))
+            except TableError as error:
+                if self.run.state == RUNNING:
+                    self._hold(str(error))
+        if self._watched and now - self._heard > SILENT_S and self.run.state == RUNNING:
+            why = f"no samples for {now - self._heard:.0f} s"
+            self.watch.take(Line(False, why))
+            if self.watch.over:
+                self._judge()
+            elif self.table is not None and abs(self.table_rate) > STANDS:
+                self._hold(f"{why}: the table is stopped")
+
+    @property
+    def silent_s(self) -> float:
+        """s since the last sample."""
+        return time.monotonic() - self._heard
+
+    @property
+    def _step(self) -> Step | None:
+        steps = self.run.plan.steps
+        return steps[self.run.at] if 0 <= self.run.at < len(steps) else None
+
+    @property
+    def _watched(self) -> bool:
+        step = self._step
+        return step is not None and step.kind in ("still", "rate", "pose")
+
+    # --- the way
+
+    def _go(self, k: int) -> None:
+        """Begin step k, or end after the last."""
+        steps = self.run.plan.steps
+        while k < len(steps) and steps[k].kind == "record":
+            self.journal.add("step", k=k)
+            self.journal.add("done", k=k, text=self._record(steps[k].on))
+            k += 1
+        if k >= len(steps):
+            self._end(DONE, "")
+            return
+        step = steps[k]
+        self.journal.add("step", k=k)
+        procedure, plan = self.run.plan.procedure, self.run.plan
+        patience = float("inf")
+        if self.table is not None and step.kind in ("rate", "still"):
+            patience = step.ramp_s + procedure.settle_s + PATIENCE_S
+        before = self.watch
+        self.watch = before.then(step, procedure.settle_s, plan.vibration_max, patience)
+        target = step.target if step.kind == "rate" else 0.0
+        try:
+            self._drive(target, step.ramp_s)
+        except TableError as error:
+            self._hold(str(error))
+
+    def _drive(self, omega: float, ramp_s: float) -> None:
+        """Command the table, unless it was stopped meanwhile; raises TableError."""
+        with self._driving:
+            if self.table is None or self._stopped.is_set():
+                return
+            change = abs(omega - self.table_rate)
+            self.table.set_rate(omega, max(change / ramp_s, 5.0 * DEG) if ramp_s else None)
+            self.table_rate = omega
+
+    def _judge(self) -> None:
+        """What the watch came to."""
+        watch, k, step = self.watch, self.run.at, self.watch.step
+        if watch.state is State.FULL:
+            estimator = self.run.plan.procedure.estimator
+            figures = [
+                {"name": f.name, "value": _known(f.value), "sigma": _known(f.sigma)}
+                for f in watch.live.figures(step, estimator)
+            ]
+            begin, until = watch.utc_ns(watch.begin), watch.utc_ns(watch.until)
+            window = {
+                "epoch": watch.epoch,
+                "from_us": round(watch.begin * 1e6),
+                "until_us": round(watch.until * 1e6),
+                "from_utc_ns": begin,
+                "until_utc_ns": until,
+            }
+            source = watch.reference.source if watch.reference is not None else ""
+            self.journal.add("done", k=k, window=window, figures=figures, reference=source)
+            self._say(f"step {k + 1}, {step.name}: measured", begin, step.dwell_s)
+            self._go(k + 1)
+            return
+        self.journal.add("spoilt", k=k, reason=watch.reason)
+        self._say(f"step {k + 1}, {step.name}: spoilt: {watch.reason}", 0, 0.0)
+        record = self.run.steps[k]
+        if record.spoilt > self.run.plan.procedure.repeats:
+            self._hold(watch.reason)
+        else:
+            self._go(k)
+
+    def _hold(self, why: str) -> None:
+        """A person is needed; the table stands meanwhile."""
+        k = max(self.run.at, 0)
+        if self.run.at < 0:
+            self.journal.add("step", k=0)
+        self.journal.add("failed", k=k, reason=why)
+        self._say(f"step {k + 1} is held: {why}", 0, 0.0)
+        try:
+            self._drive(0.0, 0.0)
+        except TableError as error:
+            log.error("the table did not take the order to stand: %s", error)
+
+    def _end(self, state: str, message: str) -> None:
+        self.journal.add("end", state=state, message=message)
+        self._say(f"procedure {self.run.plan.name}: {state} {message}".rstrip(), 0, 0.0)
+        try:
+            self._drive(0.0, 2.0)
+        except TableError as error:
+            log.error("the table did not take the order to stand: %s", error)
+
+    def _close(self, now: float) -> None:
+        """Once the table stands, let it go, then end the recording."""
+        if self.run.closed:
+            return
+        if self._closing_since is None:
+            self._closing_since = now
+            return  # one more status goes out, and into the recording
+        if now - self._closing_since < 1.0:
+            return
+        if self.table is not None and not self._let_go(now):
+            return
+        problem = self._record(False)
+        if problem:
+            log.error("%s", problem)
+        self.journal.add("closed")
+
+    def _let_go(self, now: float) -> bool:
+        late = self._closing_since is not None and now - self._closing_since > CLOSING_S
+        try:
+            self.table_rate = self.table.rate()
+            if abs(self.table_rate) > STANDS and not late:
+                return False
+            self.table.release()
+        except TableError as error:
+            log.error("%s", error)
+        return True
+
+
+def _known(value: float) -> float | None:
+    return value if value == value else None

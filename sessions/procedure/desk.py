@@ -1,0 +1,98 @@
+"""What begins a run and keeps its recording: checks of an order to start, and orders to the
+recorder.
+"""
+
+import logging
+import re
+import time
+
+import zenoh
+
+from messages import text
+from messages.bus import orders
+from messages.contract import gyrofree_pb2 as pb
+from sessions.procedure import library
+from sessions.procedure.run import Journal
+from sessions.procedure.settings import ProcedureSettings
+
+log = logging.getLogger(__name__)
+
+ACTION = pb.RecorderCommand
+
+
+class ProcedureDesk:
+    """For one device."""
+
+    def __init__(
+        self, session: zenoh.Session, prefix: str, settings: ProcedureSettings, device: str
+    ) -> None:
+        self._session, self._prefix = session, prefix
+        self._settings, self._device = settings, device
+
+    def begin(self, command: pb.ProcedureCommand, life: int) -> Journal:
+        """A new run with its recording; raises ProcedureError, OrderError, OSError."""
+        for what, value in (("serial number", command.unit), ("operator", command.user)):
+            if fault := text.check(value):
+                raise library.ProcedureError(f"{what}: {fault}")
+        plan = library.find(command.procedure, self._settings.folder)
+        stamp = time.strftime("%Y%m%dT%H%M%S", time.gmtime())
+        start = {
+            "run": f"{stamp}-{time.time_ns() // 1000 % 1_000_000:06d}",
+            "procedure": plan.name,
+            "toml": plan.toml,
+            "device": self._device,
+            "unit": command.unit.strip(),
+            "operator": command.user,
+            "own_session": command.own_session,
+        }
+        own = command.own_session and all(step.kind != "record" for step in plan.steps)
+        before = self._give(ACTION.ACTION_STATUS) if own or not command.own_session else None
+        journal = Journal.begin(self._settings.root, start)
+        if own:
+            problem = self._open(journal, before)
+            if problem:
+                journal.add("end", state="aborted", message=problem)
+                journal.add("closed")
+                raise library.ProcedureError(problem)
+        elif before is not None and before.recording:
+            journal.add("session", id=before.session, was_recording=True)
+        return journal
+
+    def record(self, on: bool, journal: Journal) -> str:
+        """Begin or end the recording of a run, as its procedure says; what could not be done, or
+        empty.
+        """
+        run = journal.run
+        if not run.own_session:
+            return "recorded in the session that runs"
+        try:
+            if on:
+                return self._open(journal, self._give(ACTION.ACTION_STATUS))
+            now = self._give(ACTION.ACTION_STATUS)
+            if now.recording and now.session.startswith(run.session) and run.session:
+                self._give(ACTION.ACTION_STOP)
+                if run.was_recording:
+                    self._give(ACTION.ACTION_START)
+        except orders.OrderError as error:
+            return str(error)
+        return ""
+
+    def _open(self, journal: Journal, before: pb.RecorderStatus) -> str:
+        """A session of its own for the run; what is wrong, or empty."""
+        run = journal.run
+        if before.recording:
+            self._give(ACTION.ACTION_STOP)
+        name = re.sub(r"[^A-Za-z0-9_-]+", "-", f"{run.plan.name}-{run.unit}").strip("-")
+        said = [run.plan.procedure.title, f"unit {run.unit}" if run.unit else ""]
+        note = "; ".join(part for part in said if part)
+        after = self._give(ACTION.ACTION_START, name=name[:64], note=note, user=run.operator)
+        if not after.recording:
+            return f"the recorder does not record: {after.message}"
+        was = before.recording or run.was_recording
+        journal.add("session", id=after.session, was_recording=was)
+        return ""
+
+    def _give(self, action: int, **more: str) -> pb.RecorderStatus:
+        """Raises OrderError."""
+        command = ACTION(action=action, **more)
+        return orders.give(self._session, self._prefix, orders.RECORDER, command)

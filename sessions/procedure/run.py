@@ -1,0 +1,184 @@
+"""One run of a procedure, as the list of what happened: an append-only file, from which a process
+that was killed goes on.
+
+Every line is a JSON object with `e`, its kind. A line that a crash cut off is left out.
+"""
+
+import json
+import logging
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sessions.procedure.library import ProcedureError, of_text
+from sessions.procedure.model import Plan
+
+log = logging.getLogger(__name__)
+
+RUNNING, HELD, DONE, ABORTED, STOPPED = "running", "held", "done", "aborted", "stopped"
+OVER = (DONE, ABORTED, STOPPED)
+
+
+@dataclass
+class StepRecord:
+    """What is known of one step."""
+
+    attempts: int = 0
+    spoilt: int = 0
+    state: str = "todo"  # todo, active, done, failed, skipped
+    reason: str = ""
+    confirmed_by: str = ""
+    window: dict[str, int] = field(default_factory=dict)  # epoch, from_us, until_us, *_utc_ns
+    figures: list[dict[str, Any]] = field(default_factory=list)
+    reference: str = ""
+
+
+@dataclass
+class Run:
+    """Its state, made of events alone: the same events give the same state."""
+
+    id: str
+    device: str
+    plan: Plan
+    unit: str
+    operator: str
+    own_session: bool
+    session: str = ""
+    was_recording: bool = False
+    state: str = RUNNING
+    at: int = -1  # present step
+    started_utc_ns: int = 0
+    closed: bool = False
+    message: str = ""
+    steps: list[StepRecord] = field(default_factory=list)
+
+    @property
+    def over(self) -> bool:
+        """It has ended, one way or another."""
+        return self.state in OVER
+
+    def apply(self, event: dict[str, Any]) -> None:
+        """One thing that happened."""
+        kind, k = event["e"], event.get("k", self.at)
+        step = self.steps[k] if 0 <= k < len(self.steps) else StepRecord()
+        match kind:
+            case "session":
+                self.session, self.was_recording = event["id"], event["was_recording"]
+            case "began":
+                self.started_utc_ns = event["utc_ns"]
+            case "step":
+                self.at, self.state = k, RUNNING
+                step.state, step.attempts, step.reason = "active", step.attempts + 1, ""
+            case "spoilt":
+                step.spoilt, step.reason = step.spoilt + 1, event["reason"]
+                self.message = f"{self.plan.steps[k].name}: spoilt: {event['reason']}"
+            case "failed":
+                step.state, step.reason, self.state = "failed", event["reason"], HELD
+                self.message = f"{self.plan.steps[k].name}: {event['reason']}"
+            case "done":
+                step.state, step.reason = "done", event.get("text", "")
+                step.window, step.figures = event.get("window", {}), event.get("figures", [])
+                step.confirmed_by = event.get("by", "")
+                step.reference, self.message = event.get("reference", ""), ""
+            case "skipped":
+                step.state, step.confirmed_by = "skipped", event["by"]
+                self.state = RUNNING
+            case "end":
+                self.state, self.message = event["state"], event.get("message", "")
+                if step.state == "active":
+                    step.state, step.reason = "failed", self.message
+            case "closed":
+                self.closed = True
+
+
+class Journal:
+    """The file of one run; `run` is what its events come to."""
+
+    def __init__(self, path: Path, run: Run) -> None:
+        self.path, self.run = path, run
+
+    @classmethod
+    def begin(cls, root: Path, start: dict[str, Any]) -> "Journal":
+        """A new run; raises OSError, ProcedureError."""
+        folder = root / start["device"]
+        folder.mkdir(parents=True, exist_ok=True)
+        journal = cls(folder / f"{start['run']}.jsonl", _run_of(start))
+        journal._write({"e": "start"} | start)
+        _sync_folder(folder)
+        return journal
+
+    @classmethod
+    def read(cls, path: Path) -> "Journal":
+        """A run that was begun before; raises ProcedureError for a file that is none, OSError."""
+        whole, _, rest = path.read_bytes().rpartition(b"\n")
+        events = []
+        for line in whole.split(b"\n"):
+            try:
+                event = json.loads(line)
+            except ValueError:
+                event = None
+            if not isinstance(event, dict) or "e" not in event:
+                log.warning("%s: a damaged line is left out", path)
+                continue
+            events.append(event)
+        if not events or events[0]["e"] != "start":
+            raise ProcedureError(f"{path}: no beginning of a run")
+        try:
+            run = _run_of(events[0])
+            for event in events[1:]:
+                run.apply(event)
+        except (KeyError, TypeError, ValueError) as error:
+            raise ProcedureError(f"{path}: damaged ({type(error).__name__}: {error})") from None
+        if rest:  # what a crash cut off must not become the beginning of the next line
+            with path.open("r+b") as file:
+                file.truncate(len(whole) + 1)
+        return cls(path, run)
+
+    def add(self, kind: str, **more: Any) -> None:
+        """Something happened: on the disk first, then in the state. Raises OSError."""
+        event = {"e": kind} | more
+        self._write(event)
+        self.run.apply(event)
+
+    def _write(self, event: dict[str, Any]) -> None:
+        line = json.dumps(event, ensure_ascii=False, separators=(",", ":")).encode() + b"\n"
+        with self.path.open("ab") as file:
+            file.write(line)
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def _run_of(start: dict[str, Any]) -> Run:
+    plan = of_text(start["toml"], start["procedure"])
+    fields = {name: start[name] for name in ("device", "unit", "operator", "own_session")}
+    run = Run(id=start["run"], plan=plan, **fields)
+    run.steps = [StepRecord() for _ in plan.steps]
+    return run
+
+
+def _sync_folder(folder: Path) -> None:
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def unfinished(root: Path) -> dict[str, Journal]:
+    """Of each device the newest run, where it is not closed; damaged files are named and passed
+    over.
+    """
+    found = {}
+    for folder in sorted(root.glob("*")) if root.is_dir() else []:
+        paths = sorted(folder.glob("*.jsonl"))
+        if not paths:
+            continue
+        try:
+            journal = Journal.read(paths[-1])
+        except (ProcedureError, OSError) as error:
+            log.error("%s", error)
+            continue
+        if not journal.run.closed:
+            found[folder.name] = journal
+    return found

@@ -1,0 +1,224 @@
+"""`gyrofree procedures`: runs procedures, one at a time for each device. Orders, data and status go
+over the bus; what happens is kept in [procedures] root, so that a killed service goes on.
+"""
+
+import logging
+import threading
+import time
+from collections import deque
+
+import zenoh
+
+from messages.bus import orders
+from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client, subscribe
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import ACCEL, AXES, IMU, LINK, NOTE, PROCEDURE, RATE, TACHO, parse
+from sessions.procedure import library, seen
+from sessions.procedure.conductor import Conductor
+from sessions.procedure.desk import ProcedureDesk
+from sessions.procedure.run import Journal, unfinished
+from sessions.procedure.settings import ProcedureSettings
+from sessions.procedure.status import status_of
+from sessions.procedure.table import RateTable, TableError, TextTable, described
+
+log = logging.getLogger(__name__)
+
+TICK_S = 0.05
+STATUS_S = 0.25
+IDLE_S = 2.0
+DATA = (ACCEL, IMU, TACHO, RATE, AXES, LINK)
+WAITING = 20_000  # messages of a device; more are dropped, which the watch takes for lost data
+COMMAND = pb.ProcedureCommand
+
+
+class Tables(dict[str, RateTable]):
+    """By device, of the settings; a description that cannot be read is said at once."""
+
+    def __init__(self, settings: ProcedureSettings) -> None:
+        """Raises TableError."""
+        super().__init__()
+        for one in settings.tables:
+            self[one.device] = TextTable(described(one.description), one.port)
+
+
+class Service:
+    """All conductors. Zenoh's threads only put things into queues, and stop tables."""
+
+    def __init__(self, settings: ProcedureSettings, session: zenoh.Session, prefix: str) -> None:
+        """Raises TableError."""
+        self._settings, self._session, self._prefix = settings, session, prefix
+        self._tables = Tables(settings)
+        self._publishers = Publishers(session, prefix)
+        self._since = time.time_ns()
+        self._devices: dict[str, float] = {}  # heard, and when its idle status is due
+        self._conductors: dict[str, Conductor] = {}
+        self._ended: dict[str, Conductor] = {}
+        self._queues: dict[str, deque] = {}
+        self._listening: dict[str, list[zenoh.Subscriber]] = {}
+        self._orders: deque[orders.Order[COMMAND, pb.Reply]] = deque()
+        self._due: dict[str, float] = {}
+        self._links = subscribe(session, LINK, prefix, self._on_link)
+        self._taking = orders.take(session, prefix, orders.PROCEDURES, self._on_order, "*")
+
+    # --- on Zenoh's threads
+
+    def _on_link(self, key: str, _: pb.LinkStatus) -> None:
+        self._devices.setdefault(parse(key).device, 0.0)
+
+    def _on_order(self, order: orders.Order[COMMAND, pb.Reply]) -> None:
+        conductor = self._conductors.get(order.device)
+        if order.command.action == COMMAND.ACTION_STOP and conductor is not None:
+            problem = conductor.emergency()
+            order.answer(pb.Reply(ok=not problem, message=problem or "stopped"))
+        elif len(self._orders) > 100:
+            order.refuse("too many orders wait")
+            return
+        self._orders.append(order)
+
+    def _on_data(self, device: str, message: object) -> None:
+        queue = self._queues.get(device)
+        if queue is not None and len(queue) < WAITING:
+            queue.append(message)
+
+    # --- on the service's own thread
+
+    def resume(self) -> None:
+        """Go on with what a crash cut off."""
+        for device, journal in unfinished(self._settings.root).items():
+            log.info("%s: going on with %s", device, journal.run.id)
+            self._start(journal)
+
+    def step(self) -> None:
+        """Orders, data, status; call it every TICK_S."""
+        while self._orders:
+            self._obey(self._orders.popleft())
+        now = time.monotonic()
+        for device, conductor in list(self._conductors.items()):
+            queue = self._queues[device]
+            for _ in range(len(queue)):
+                one = seen.of(queue.popleft())
+                if one is not None:
+                    conductor.take(one)
+            conductor.tick()
+            if now >= self._due.get(device, 0.0):
+                self._due[device] = now + STATUS_S
+                self._publish(device, status_of(conductor))
+            if conductor.run.closed:
+                self._finish(device, conductor, now)
+        for device, due in list(self._devices.items()):
+            if device not in self._conductors and now >= due:
+                self._idle(device, now)
+
+    def close(self) -> None:
+        """Stop listening; runs go on with the next life. Driven tables stand meanwhile."""
+        self._taking.undeclare()
+        self._links.undeclare()
+        for device, conductor in self._conductors.items():
+            self._silence(device)
+            conductor.emergency()
+
+    def _obey(self, order: orders.Order[COMMAND, pb.Reply]) -> None:
+        command, device = order.command, order.device
+        conductor = self._conductors.get(device)
+        if command.action == COMMAND.ACTION_STOP and conductor is not None:
+            conductor.stopped(command.user)  # the table was stopped, and the order answered
+            return
+        try:
+            problem = self._do(command, device, conductor)
+        except (library.ProcedureError, TableError, orders.OrderError, OSError) as error:
+            problem = str(error)
+        log.info("%s: order %d of %s: %s", device, command.action, command.user, problem or "done")
+        order.answer(pb.Reply(ok=not problem, message=problem or "done"))
+
+    def _do(self, command: COMMAND, device: str, conductor: Conductor | None) -> str:
+        if command.action == COMMAND.ACTION_START:
+            if conductor is not None:
+                return f"{conductor.run.plan.name} runs on {device}: end or abort it first"
+            journal = self._desk(device).begin(command, self._since)
+            self._start(journal)
+            return ""
+        if conductor is None:
+            return f"no procedure runs on {device}"
+        match command.action:
+            case COMMAND.ACTION_NEXT:
+                return conductor.next(command.user, command.text)
+            case COMMAND.ACTION_REPEAT:
+                return conductor.repeat(command.user)
+            case COMMAND.ACTION_ABORT:
+                return conductor.abort(command.user)
+        return "no such order"
+
+    def _desk(self, device: str) -> ProcedureDesk:
+        return ProcedureDesk(self._session, self._prefix, self._settings, device)
+
+    def _start(self, journal: Journal) -> None:
+        device, desk = journal.run.device, self._desk(journal.run.device)
+
+        def say(text: str, at_utc_ns: int, seconds: float) -> None:
+            note = pb.Note(text=text[:500], author="procedure", kind=pb.Note.KIND_EVENT)
+            note.at_utc_ns, note.seconds = at_utc_ns, seconds
+            note.header.device, note.header.run = device, self._since
+            note.header.utc_ns = at_utc_ns or time.time_ns()
+            self._publishers.put(NOTE, device, note)
+
+        record = lambda on: desk.record(on, journal)  # noqa: E731
+        conductor = Conductor(journal, self._tables.get(device), say, record)
+        self._ended.pop(device, None)
+        self._queues[device] = deque()
+        self._conductors[device] = conductor
+        self._listening[device] = [
+            subscribe(
+                self._session,
+                topic,
+                self._prefix,
+                lambda _, message: self._on_data(device, message),
+                device,
+            )
+            for topic in DATA
+        ]
+        conductor.begin()
+
+    def _finish(self, device: str, conductor: Conductor, now: float) -> None:
+        self._publish(device, status_of(conductor))
+        self._silence(device)
+        del self._conductors[device], self._queues[device]
+        self._ended[device] = conductor
+        self._devices[device] = now + STATUS_S
+
+    def _silence(self, device: str) -> None:
+        for subscriber in self._listening.pop(device, []):
+            subscriber.undeclare()
+
+    def _idle(self, device: str, now: float) -> None:
+        """What may be started, and how the last run of this life ended."""
+        self._devices[device] = now + IDLE_S
+        message = pb.ProcedureStatus(state=pb.ProcedureStatus.STATE_IDLE)
+        if device in self._ended:
+            message = status_of(self._ended[device])
+        table = self._tables.get(device)
+        message.table = table.name if table is not None else ""
+        message.offered[:] = library.names(self._settings.folder)
+        self._publish(device, message)
+
+    def _publish(self, device: str, message: pb.ProcedureStatus) -> None:
+        message.header.device, message.header.run = device, self._since
+        message.header.utc_ns = message.header.utc_ns or time.time_ns()
+        self._publishers.put(PROCEDURE, device, message)
+
+
+def run(settings: ProcedureSettings, bus: BusSettings, stop: threading.Event) -> None:
+    """Run procedures until `stop` is set. Raises TableError for a table's description."""
+    try:
+        session = open_client(bus, stop)
+    except BusUnavailable:
+        if stop.is_set():
+            return
+        raise
+    with session:
+        service = Service(settings, session, bus.prefix)
+        try:
+            service.resume()
+            while not stop.wait(TICK_S):
+                service.step()
+        finally:
+            service.close()
