@@ -32,6 +32,8 @@ class Timeline:
     and a loop.
     """
 
+    short = False  # on a phone: the line of a recording is in the bar
+
     def __init__(
         self,
         client: viser.ClientHandle,
@@ -77,7 +79,8 @@ class Timeline:
             self._showing = running
             for handle in self._replay_inputs:
                 handle.visible = running
-        content = self._replay_html(replay.status) if running else self._live_html(now)
+        live = EMPTY if self.short else self._live_html(now)
+        content = self._replay_html(replay.status) if running else live
         content += self._marks_html()
         if self._state.content != content:
             self._state.content = str(content)
