@@ -207,6 +207,7 @@ def test_every_command_that_takes_a_file_is_tried():
         "calibrate simulate",
         "config default",
         "config reference",
+        "completion",
     }
 
 
