@@ -23,7 +23,7 @@ from inertial.rate.estimators import ESTIMATORS, ProductsRate, leave_out
 from inertial.rate.names import LEADER
 from inertial.rate.sight import BLIND, VALID
 from inertial.rate.tachometer import SUFFIX
-from logs.cube_axes import agreement, axes_of, moving
+from logs.cube_axes import agreement, axes_of, doubts_of_settings, moving
 from logs.cube_log import CubeLog, centre_force, read_log, squared_rate
 from logs.cube_parts import Monitored, Part, cut, monitored
 from logs.cube_run import EstimatorRun, reference
@@ -92,6 +92,7 @@ def run_cube(
     square = squared_rate(data.f_axis, shape)
     if square is not None and (doubt := doubt_of_sense(square)):
         doubtful.append(doubt.text)
+    doubtful += doubts_of_settings(data, shape, _lsb(data))
     if tacho_aid and data.tacho is None:
         raise LogError(f"--tacho-aid: {log} has no column tacho_rad_s")
     lean = plot is None and out is None and not resolve
