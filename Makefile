@@ -105,6 +105,7 @@ fuzz: setup dev system-packages
 docs: setup
 	$(BIN)/python -m firmware_protocol.document > docs/protocol.md
 	$(BIN)/python -m messages.contract.document > docs/topics.md
+	$(BIN)/gyrofree config reference > docs/configuration.md
 
 # Its packages want versions of their own, so they have an environment of their own.
 .make/site: requirements/site.txt | .make/venv

@@ -25,6 +25,8 @@ from logs.sheet_form import (
     FIRST_LOOK,
     LINE,
     MISSING,
+    OWN,
+    OWN_NAMES,
     SEPARATORS,
     Lines,
     LogError,
@@ -117,6 +119,7 @@ class Sheet:
     decimal: str
     header: tuple[str, ...]
     header_line: int  # of the file, from 1
+    own: bool = False  # an export of ours: its columns are named as those of logs
 
     def want(self, names: Sequence[str], purpose: str = "") -> None:
         """Raises LogError for a column that is not there."""
@@ -279,6 +282,9 @@ def open_sheet(path: Path) -> Sheet:
     separator = max(SEPARATORS, key=lambda s: count(line, s))
     names = next(csv.reader([line], delimiter=separator))
     header = tuple(name.strip().strip('"') for name in names)
+    own = set(OWN) <= set(header)
+    if own:
+        header = tuple(OWN_NAMES.get(name, name) for name in header)
     if len(header) > MOST_COLUMNS:
         raise LogError(
             f"{path}:{number}: {len(header)} columns; this program reads up to {MOST_COLUMNS}"
@@ -295,7 +301,7 @@ def open_sheet(path: Path) -> Sheet:
             " remove one"
         )
     decimal = decimal_of(lines[number:], separator)
-    return Sheet(path, size, encoding, separator, decimal, header, number)
+    return Sheet(path, size, encoding, separator, decimal, header, number, own)
 
 
 def _or(names) -> str:
