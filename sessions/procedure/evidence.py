@@ -126,14 +126,7 @@ class Evidence:
         if window is None:
             return None
         times, rows = window
-        s = times - t
-        columns = [np.ones_like(s), s, s**2]
-        omega = 0.0 if reference is None else reference.omega
-        if abs(omega) > 10.0 * DEG:  # slower ones are in the parabola
-            columns += [np.cos(omega * s), np.sin(omega * s)]
-        design = np.column_stack(columns)
-        rest = rows - design @ np.linalg.lstsq(design, rows, rcond=None)[0]
-        return float(np.sqrt((rest**2).sum() / max(1, len(s) - len(columns)) / rows.shape[1]))
+        return shaking(times - t, rows, 0.0 if reference is None else reference.omega)
 
     def force(self, t: float) -> Array | None:
         """Mean specific force, (3,) m/s^2 in b; None where the axes' directions are not known."""
@@ -158,3 +151,15 @@ class Evidence:
         if at.sum() < 10 or times[at][-1] - times[at][0] < 0.6 * WINDOW:
             return None
         return times[at], np.concatenate([rows for _, rows in self.samples])[at]
+
+
+def shaking(t: Array, rows: Array, omega: float) -> float:
+    """RMS over the axes of readings (n, k), m/s^2 at times (n,) s, without what is slow, and
+    without gravity as it goes round on a tilted table that turns at omega, rad/s.
+    """
+    columns = [np.ones_like(t), t, t**2]
+    if abs(omega) > 10.0 * DEG:  # slower ones are in the parabola
+        columns += [np.cos(omega * t), np.sin(omega * t)]
+    design = np.column_stack(columns)
+    rest = rows - design @ np.linalg.lstsq(design, rows, rcond=None)[0]
+    return float(np.sqrt((rest**2).sum() / max(1, len(t) - len(columns)) / rows.shape[1]))
