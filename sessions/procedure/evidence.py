@@ -19,6 +19,7 @@ KEPT = 1.5  # s
 THIN = 0.01  # s, one estimate in so long is kept
 MEAN = 0.3  # s, over which pulses are averaged
 SILENCE = 0.6  # s without a pulse: the table stands, as in the report
+OVERDUE, LATE_S = 3.0, 0.05  # times the usual interval, and s: a pulse should have come
 FRESH = 1.0  # s that an estimate is believed
 TABLE_FRESH = 2.5  # s that a table's own word is
 WINDOW = 0.5  # s, of vibration and of the direction of gravity
@@ -49,7 +50,7 @@ class Estimate(NamedTuple):
 class Evidence:
     """Of one boot; `forget` begins with another."""
 
-    axes: Axes | None = None
+    health: deque[Axes] = field(default_factory=deque)
     pulses_seen: bool = False  # in this boot or an earlier one: there is a tachometer
     pulses: deque[Pulse] = field(default_factory=deque)
     estimates: deque[Estimate] = field(default_factory=deque)
@@ -63,7 +64,12 @@ class Evidence:
         self.pulses.clear()
         self.estimates.clear()
         self.samples.clear()
+        self.health.clear()
         self.table = None
+
+    def axes(self, t: float) -> Axes | None:
+        """The newest word on the axes up to a moment."""
+        return next((one for one in reversed(self.health) if one.t <= t), None)
 
     def add_pulse(self, seen: Pulse) -> None:
         """One rate of the tachometer."""
@@ -92,6 +98,8 @@ class Evidence:
             self.samples.popleft()
         while self.pulses and self.pulses[0].t < old:
             self.pulses.popleft()
+        while len(self.health) > 1 and self.health[1].t < old:
+            self.health.popleft()
         while self.estimates and self.estimates[0].t < old:
             self.estimates.popleft()
 
@@ -103,7 +111,7 @@ class Evidence:
                 near = [p for p in self.pulses if t - SILENCE < p.t <= t][-1:]
             if not near:
                 return Reference(0.0, True, "tachometer")
-            mean = float(np.mean([p.omega for p in near]))
+            mean = float(np.mean([p.omega for p in near])) * self._slowed(t)
             return Reference(mean, all(p.signed for p in near), "tachometer")
         if self.table is not None and abs(t - self.table[0]) < TABLE_FRESH:
             return Reference(self.table[1], True, "table")
@@ -111,6 +119,15 @@ class Evidence:
             if one.still or one.valid:
                 return Reference(0.0 if one.still else one.omega, True, one.estimator)
         return None
+
+    def _slowed(self, t: float) -> float:
+        """At most this share of the rate is left where pulses are overdue: 0 to 1."""
+        times = [p.t for p in self.pulses if p.t <= t][-6:]
+        if len(times) < 2:
+            return 1.0
+        usual = max(b - a for a, b in zip(times, times[1:], strict=False))
+        since = t - times[-1]
+        return usual / since if since > OVERDUE * usual + LATE_S else 1.0
 
     def newest(self, t: float) -> Iterator[Estimate]:
         """The newest estimate of each estimator up to a moment, if it is fresh."""
@@ -136,9 +153,10 @@ class Evidence:
         mean = window[1].mean(axis=0)
         if not self.own_axes:
             return mean
-        if self.axes is None or len(self.axes.direction_b) != len(mean):
+        axes = self.axes(t)
+        if axes is None or len(axes.direction_b) != len(mean):
             return None
-        return np.linalg.lstsq(self.axes.direction_b, mean, rcond=None)[0]
+        return np.linalg.lstsq(axes.direction_b, mean, rcond=None)[0]
 
     def _window(self, t: float) -> tuple[Array, Array] | None:
         if not self.samples:
