@@ -104,6 +104,7 @@ fuzz: setup dev system-packages
 docs: setup
 	$(BIN)/python -m firmware_protocol.document > docs/protocol.md
 	$(BIN)/python -m messages.contract.document > docs/topics.md
+	$(BIN)/gyrofree config reference > docs/configuration.md
 
 messages: dev
 	$(BIN)/python -m grpc_tools.protoc -Imessages/contract --python_out=messages/contract --pyi_out=messages/contract messages/contract/gyrofree.proto

@@ -85,12 +85,12 @@ class Pipeline:
         return self._six_axes[device]
 
     def on_tacho(self, message: pb.TachoRate) -> list[Output]:
-        """A report of the tachometer: table runs of a guided calibration need it, and the rate
-        where it aids.
+        """A report of the tachometer: table runs of a guided calibration need it, what watches the
+        settings, and the rate where it aids.
         """
         self._calibrations.tacho(message)
         cube = self._cubes.get(message.header.device)
-        if self._settings.tacho_aid and cube is not None:
+        if cube is not None:
             cube.tacho(message)
         return []
 

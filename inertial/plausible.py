@@ -73,12 +73,13 @@ def quiet_mean(values: Array, window: int = WINDOW) -> Array:
     return parts[order].mean(axis=1)
 
 
-def doubt_of_gravity(f_b: Array, lsb_mg: float | None = None) -> Doubt | None:
+def doubt_of_gravity(f_b: Array, lsb_mg: float | None = None, live: bool = False) -> Doubt | None:
     """Does a body at rest read one g? f_b (n, 3) is the specific force of its centre, m/s^2.
 
-    lsb_mg is what a count was taken for, where the log has counts.
+    lsb_mg is what a count was taken for, where the log has counts. live: of a board, whose scale is
+    to be mended and not a log's columns.
     """
-    size = float(np.median(np.linalg.norm(quiet_mean(f_b), axis=1)))
+    size = float(np.median(np.linalg.norm(f_b if live else quiet_mean(f_b), axis=1)))
     ratio = size / GRAVITY
     if abs(ratio - 1.0) <= FAR:
         return None
@@ -91,13 +92,33 @@ def doubt_of_gravity(f_b: Array, lsb_mg: float | None = None) -> Doubt | None:
         return Doubt(
             "gravity", f"{found}: {fits:.3g} mg per count would fit{named}; say --lsb-mg {fits:.3g}"
         )
+    g, mps2, mg = _REMEDIES[live]
     if abs(ratio * GRAVITY - 1.0) <= FAR:
-        return Doubt("gravity", f"{found}: these are g, not m/s^2; name the columns _g")
+        return Doubt("gravity", f"{found}: {g}")
     if abs(ratio / GRAVITY - 1.0) <= FAR:
-        return Doubt("gravity", f"{found}: m/s^2 was taken for g; name the columns _mps2")
+        return Doubt("gravity", f"{found}: {mps2}")
     if abs(ratio * 1e-3 - 1.0) <= FAR or abs(ratio * 1e-3 * GRAVITY - 1.0) <= FAR:
-        return Doubt("gravity", f"{found}: these look like mg; name the columns _mg")
+        return Doubt("gravity", f"{found}: {mg}")
+    if live and ratio > 0.0:
+        return Doubt(
+            "gravity", f"{found}: counts or g? {1.0 / ratio:.3g} times the scale would fit"
+        )
     return Doubt("gravity", f"{found}: check the unit and the scale of the axes")
+
+
+# By whether it is a board: what to do about g for m/s^2, m/s^2 for g, mg.
+_REMEDIES = {
+    False: (
+        "these are g, not m/s^2; name the columns _g",
+        "m/s^2 was taken for g; name the columns _mps2",
+        "these look like mg; name the columns _mg",
+    ),
+    True: (
+        "counts or g? the board sends g as m/s^2; 9.81 times its scale would fit",
+        "counts or g? the board's m/s^2 are taken for g; its scale over 9.81 would fit",
+        "counts or g? the board sends mg; a thousandth of its scale would fit",
+    ),
+}
 
 
 def doubt_of_frozen(values: Array) -> Doubt | None:

@@ -10,6 +10,9 @@ compete on its longest stretch without a hole:
 `gappy` is believed only where it explains the stamps much better, and not where the stamps are too
 coarse to show single steps: 800 Hz in whole milliseconds looks like 1 kHz with every fifth sample
 lost, but no loss is that regular.
+
+Before that, `straight` mends what is a property of the clock and not of the samples: counters that
+began anew at their end, and samples that were read in a burst and share one stamp.
 """
 
 from dataclasses import dataclass
@@ -27,6 +30,16 @@ BETTER = 0.6  # of the even reading's residual: the gappy one must be this good 
 DIGITS = 10.0 ** np.arange(-3, -10, -1)  # s, last digits that clocks have; 10 ms is a period
 MOST = 0.75  # share of a stretch that may be missing; more is a burst, not a loss
 ENOUGH = 8  # steps; fewer tell nothing of a pattern
+WRAPS = {  # s, after which counters begin anew
+    **{
+        bits_units * unit: f"a counter of {bits} bits in {name}"
+        for bits, bits_units in ((16, 2**16), (24, 2**24), (32, 2**32))
+        for unit, name in ((1e-9, "ns"), (1e-6, "us"), (1e-3, "ms"))
+    },
+    86_400.0: "the time of day",
+    604_800.0: "the time of the GPS week",
+}
+WRAP_STEPS = 8.0  # usual steps that may lie between the samples around a counter's end
 
 
 class TimingError(ValueError):
@@ -56,11 +69,77 @@ class Timing:
     jitter_s: float  # RMS of the stamps about even times, between holes
     resolution_s: float  # last digit of the stamps; 0 where none is seen
     holes: tuple[Hole, ...]
+    mended: tuple[str, ...] = ()  # for people: what `straight` made of the stamps
 
     @property
     def missing(self) -> int:
         """Samples between the first and the last that are not there."""
         return int(self.index[-1]) + 1 - len(self.index)
+
+
+def straight(t_s: Array, same: NDArray[np.bool_] | None = None) -> tuple[Array, tuple[str, ...]]:
+    """Stamps t_s (n,), s, without the ends of their counter and with bursts spread, and in words
+    what was done. same (n,): rows that repeat the one before in all that was measured.
+
+    Raises TimingError for samples that stand there twice.
+    """
+    t, said = _unwrapped(np.asarray(t_s, dtype=np.float64))
+    equal = np.concatenate([[False], np.diff(t) == 0.0])
+    if not equal.any() or (np.diff(t) < 0.0).any() or t[0] == t[-1]:
+        return t, said
+    rows, twice = int(equal.sum()), 0 if same is None else int((equal & same).sum())
+    if 2 * twice > rows:
+        row = int(np.argmax(equal))
+        raise TimingError(
+            row,
+            f"time {t[row]:.6f} s after {t[row - 1]:.6f} s does not rise ({rows} such rows), and"
+            f" {twice} of them repeat the row before in every column: remove repeated samples",
+        )
+    between = float(np.median(np.diff(t)[~equal[1:]]))
+    if between < COARSE * max(_resolution(t), _digit(t)):
+        return t, said  # too few digits, no bursts: sample_timing says so
+    spread, most = _spread(t, equal)
+    return spread, (
+        *said,
+        f"{rows} samples have the time of the one before, up to {most} in a row: they are spread"
+        " evenly, as read in bursts at the time of the last",
+    )
+
+
+def _unwrapped(t: Array) -> tuple[Array, tuple[str, ...]]:
+    """Stamps that fall where a counter begins anew, made to rise; as they are where no counter
+    explains every fall.
+    """
+    step = np.diff(t)
+    fallen = step < 0.0
+    if not fallen.any() or fallen.all():
+        return t, ()
+    usual = float(np.median(step[step > 0.0])) if (step > 0.0).any() else 0.0
+    width = float(t.max() - t.min())
+    for after, name in WRAPS.items():
+        across = step[fallen] + after
+        if width > 1.001 * after or not (across > 0.0).all():
+            continue
+        if (across <= min(WRAP_STEPS * usual, 0.5 * after)).all():
+            count = int(fallen.sum())
+            times = "once" if count == 1 else f"{count} times"
+            mended = t + after * np.concatenate([[0.0], np.cumsum(fallen)])
+            return mended, (f"{name} began anew {times}: times are taken as going on",)
+    return t, ()
+
+
+def _spread(t: Array, equal: NDArray[np.bool_]) -> tuple[Array, int]:
+    """Stamps (n,) that do not fall, those of a burst spread back from the last of it, and how many
+    the longest burst has.
+    """
+    starts = np.nonzero(~equal)[0]
+    lengths = np.diff(np.concatenate([starts, [len(t)]]))
+    steps = np.diff(t[starts]) / lengths[1:]  # of one sample, where none is missing
+    usual = float(np.median(steps))
+    steps = np.where(steps < 1.5 * usual, steps, usual)  # a longer one has lost samples before it
+    of_sample = np.repeat(np.concatenate([[usual], steps]), lengths)
+    place = np.arange(len(t)) - np.repeat(starts, lengths)
+    return t - (np.repeat(lengths, lengths) - 1 - place) * of_sample, int(lengths.max())
 
 
 def sample_timing(t_s: Array) -> Timing:
@@ -69,13 +148,19 @@ def sample_timing(t_s: Array) -> Timing:
     if len(t) < 2:
         raise TimingError(0, f"{len(t)} samples; want at least two")
     step = np.diff(t)
-    fallen = np.nonzero(~(step > 0.0))[0]
+    fallen = np.nonzero(~(step > 0.0))[0]  # `straight` has spread equal ones
     if len(fallen):
         row = int(fallen[0]) + 1
+        many = f"({len(fallen)} such row{'s' if len(fallen) > 1 else ''})"
+        advice = "sort the rows by time"
+        if not (step < 0.0).any():
+            advice = (
+                "write times with more digits, or from the sample's number and the rate; where"
+                " samples stand there twice, remove the second (all others are needed)"
+            )
         raise TimingError(
             row,
-            f"time {t[row]:.6f} s after {t[row - 1]:.6f} s does not rise ({len(fallen)} such"
-            f" row{'s' if len(fallen) > 1 else ''}); sort by time and remove repeated samples",
+            f"time {t[row]:.6f} s after {t[row - 1]:.6f} s does not rise {many}; {advice}",
         )
     resolution = _resolution(t)
     usual = _usual_step(step)
@@ -95,6 +180,14 @@ def sample_timing(t_s: Array) -> Timing:
         for k in np.nonzero(jump > 1)[0]
     )
     return Timing(period, index, _jitter(t, index, starts, period), resolution, holes)
+
+
+def _digit(t: Array) -> float:
+    """The last digit of stamps that have few: 1 s, 0.1 s or 0.01 s; 0 for finer ones."""
+    for digit in (1.0, 0.1, 0.01):
+        if np.allclose(t / digit, np.rint(t / digit), rtol=0.0, atol=1e-6):
+            return digit
+    return 0.0
 
 
 def _resolution(t: Array) -> float:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from inertial.attitude.filters import ATTITUDES
 from inertial.timing import Timing
 from logs.attitude_log import Trial, read_trials
+from logs.series import check_form, of_attitude, write
 from logs.sheet import LogError
 from messages.text import drawn
 
@@ -28,13 +29,15 @@ def run_attitude(
     filters: list[str] | None = None,
     plot: Path | None = None,
     units_as_named: bool = False,
+    out: Path | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Run filters over one log, or every log of a folder, and score their inclination where the
     reference is good.
 
     filters: names of ATTITUDES; None: all. plot: an image file (.png, .svg, .pdf) of the errors
-    along time. Returns {"filters": {name: figures}, "default": name, "logs": {log: {"rate_hz",
+    along time. out: CSV or Parquet file of every filter's attitude. Returns
+    {"filters": {name: figures}, "default": name, "logs": {log: {"rate_hz",
     "samples", "scored", "filters": {name: figures}}}}; figures are inclination_rms_rad,
     inclination_max_rad and us_per_sample, at the top the mean over the logs (the largest of the
     maxima). Raises LogError, a ValueError.
@@ -45,14 +48,19 @@ def run_attitude(
             raise LogError(f"no attitude filter {name!r}; want some of {', '.join(ATTITUDES)}")
     if not names:
         raise LogError(f"no attitude filter named; want some of {', '.join(ATTITUDES)}")
+    check_form(out)
     trials = read_trials(Path(log), units_as_named)
-    logs, errors = {}, {}
+    logs, errors, series = {}, {}, {}
     for k, trial in enumerate(trials):
         figures = {}
         for j, name in enumerate(names):
             if progress:
                 progress((k + j / len(names)) / len(trials), f"{trial.name}: {name}")
-            error, cost = run_filter(trial, name)
+            q_nb, cost = attitude_of(trial, name)
+            error = inclination_error(q_nb, trial.up_b)
+            if out is not None:
+                said = of_attitude(trial.t, q_nb, error, trial.scored, trial.name)
+                series.setdefault(name, []).append(said)
             errors[trial.name, name] = error
             figures[name] = _figures(error[trial.scored], cost)
         logs[trial.name] = {
@@ -65,17 +73,28 @@ def run_attitude(
         progress(1.0, "done")
     if plot is not None:
         _draw(Path(plot), trials, names, errors)
-    return {
+    result = {
         "filters": {name: _mean(logs, name) for name in names},
         "default": next(iter(ATTITUDES)),
         "logs": logs,
         "notes": [note for trial in trials for note in trial.notes],
     }
+    if out is not None:
+        result["written"] = write(Path(out), series, "filter")
+    return result
 
 
 def run_filter(trial: Trial, name: str) -> tuple[Array, float]:
     """Inclination error (n,) rad of one filter, nan without a reference, and its time per sample,
-    us. As live, a hole of up to BRIDGED_S is bridged; after a longer one it starts anew.
+    us.
+    """
+    q_nb, cost = attitude_of(trial, name)
+    return inclination_error(q_nb, trial.up_b), cost
+
+
+def attitude_of(trial: Trial, name: str) -> tuple[Array, float]:
+    """Attitude q_nb (n, 4) by one filter, and its time per sample, us. As live, a hole of up to
+    BRIDGED_S is bridged; after a longer one it starts anew.
     """
     ATTITUDES[name](trial.period).batch(
         trial.f_b[:2], trial.omega_b[:2]
@@ -87,7 +106,7 @@ def run_filter(trial: Trial, name: str) -> tuple[Array, float]:
         even = [_even(index, values[rows]) for values in (trial.f_b, trial.omega_b)]
         q_nb[rows] = ATTITUDES[name](trial.period).batch(*even)[index]
     cost = (time.perf_counter_ns() - started) / 1000.0 / len(trial.t)
-    return inclination_error(q_nb, trial.up_b), cost
+    return q_nb, cost
 
 
 def _stretches(timing: Timing) -> list[slice]:

@@ -26,7 +26,7 @@ from inertial.navigation.fix import Fix
 from inertial.plausible import doubt_of_frozen, doubt_of_gravity, doubt_of_rate, doubt_of_sense
 from inertial.timing import Timing
 from logs.cube_log import LSB_MG, centre_force, read_log, squared_rate
-from logs.drive_log import IMU, read_fixes
+from logs.drive_log import IMU, epoch_file, read_fixes, sample_file
 from logs.quantities import read_si, refuse, said_of, timing_of
 from logs.sheet import LogError, Sheet, open_sheet
 
@@ -68,12 +68,13 @@ def read_board_log(
     """
     path = Path(path)
     if path.is_dir():
-        path = path / "imu.csv"
+        path = path / sample_file(path)
     sheet = open_sheet(path)
     if any(f"a11_{unit}" in sheet.header for unit in ("counts", "mps2", "g", "mg")):
         return _cube(path, units_as_named, lsb_mg)
-    if gnss is None and (path.parent / "gnss.csv").is_file():
-        gnss = path.parent / "gnss.csv"
+    beside = path.parent / epoch_file(path.name)
+    if gnss is None and beside.is_file():
+        gnss = beside
     return _imu(path, sheet, gnss, units_as_named)
 
 

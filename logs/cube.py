@@ -21,14 +21,15 @@ from inertial.rate.batch import RateColumns
 from inertial.rate.beliefs import make
 from inertial.rate.estimators import ESTIMATORS, ProductsRate, leave_out
 from inertial.rate.names import LEADER
-from inertial.rate.sight import BLIND
+from inertial.rate.sight import BLIND, VALID
 from inertial.rate.tachometer import SUFFIX
-from logs.cube_axes import agreement, axes_of, moving
+from logs.cube_axes import agreement, axes_of, doubts_of_settings, moving
 from logs.cube_log import CubeLog, centre_force, read_log, squared_rate
 from logs.cube_parts import Monitored, Part, cut, monitored
 from logs.cube_run import EstimatorRun, reference
 from logs.cube_score import bound_of, notes_of, score
 from logs.quantities import refuse, said_of
+from logs.series import check_form, of_cube, write
 from logs.sheet import LogError
 
 Array = NDArray[np.float64]
@@ -36,8 +37,8 @@ Progress = Callable[[float, str], None]
 
 SHOW_GAPS = 20
 BLOCK = 8192  # samples that an estimator is given at once
-SAID = ("omega_b", "P", "q_nb", "angle_z", "alpha_b", "f_b", "still", "p_n")  # what is kept
-SCORED = ("omega_b", "P", "angle_z")  # ... where nothing is drawn
+SAID = ("omega_b", "P", "q_nb", "angle_z", "alpha_b", "f_b", "still", "p_n", "sight", "started")
+SCORED = ("omega_b", "P", "angle_z", "sight", "started")  # ... where nothing is drawn
 TACHO_SIGMA = (
     0.03  # rad/s; a log says neither how well its tachometer measured nor when its pulses came
 )
@@ -60,13 +61,15 @@ def run_cube(
     resolve: bool = False,
     units_as_named: bool = False,
     plot: Path | None = None,
+    out: Path | None = None,
     progress: Progress = nothing,
 ) -> dict[str, Any]:
     """Run the log; the JSON object of `gyrofree run`: estimators, default, gaps, axes, and notes
     for people.
 
     resolve: where a log begins while turning, correct what came before the sign was decided; such a
-    track is named so. A value that cannot be known (no truth for x and y, say) is None. Raises
+    track is named so. A value that cannot be known (no truth for x and y, say) is None. out: CSV or
+    Parquet file of what every estimator said of every sample. Raises
     LogError, GeometryError, CardError (all ValueError) and OSError.
     """
     if not half_side_m > 0.0:
@@ -74,6 +77,7 @@ def run_cube(
             f"--half-side {half_side_m}: want more than 0 m, from the centre to a face"
         )
     shape = find(layout, half_side_m)
+    check_form(out)
     progress(0.0, "reading")
     data = read_log(log, shape.axis_names, lsb_mg)
     used = read_card(card) if card is not None else None
@@ -88,9 +92,10 @@ def run_cube(
     square = squared_rate(data.f_axis, shape)
     if square is not None and (doubt := doubt_of_sense(square)):
         doubtful.append(doubt.text)
+    doubtful += doubts_of_settings(data, shape, _lsb(data))
     if tacho_aid and data.tacho is None:
         raise LogError(f"--tacho-aid: {log} has no column tacho_rad_s")
-    lean = plot is None and not resolve
+    lean = plot is None and out is None and not resolve
     tracks, watched, notes = run_log(
         data, shape, used, estimators, progress, tacho_aid, resolve, lean
     )
@@ -146,6 +151,9 @@ def run_cube(
 
         progress(0.95, "drawing")
         draw(plot, data, tracks, truth, result)
+    if out is not None:
+        parts = {name: of_cube(data, track, truth) for name, track in tracks.items()}
+        result["written"] = write(out, parts, "estimator")
     progress(1.0, "done")
     return result
 
@@ -294,6 +302,8 @@ def _resolved(run: EstimatorRun, fresh: ProductsRate, data: CubeLog, f_axis: Arr
     if not past:
         return run
     past.into(run.omega_b, run.P, run.angle_z, run.q_nb)
+    n = len(past.omega_b)
+    run.sight[:n], run.started[:n] = VALID, True
     return replace(run, name=run.name + resolved.SUFFIX, blind="")
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.doubts.watch import SettingsWatch
 from inertial.layouts.layout import RANK_TOLERANCE, Layout
 from inertial.rate.observed import axis_noise
 from logs.cube_log import CubeLog
@@ -24,6 +25,7 @@ NOISELESS = 1e-3  # m/s^2; no accelerometer is quieter
 MOVING = (
     0.5  # m/s^2, standard deviation of the other axes over a stretch that tells turning from rest
 )
+REPORT_S = 0.05  # between reports of a gateway's tachometer
 DISAGREE = 2.0  # times the noise; less is what a good calibration leaves
 
 
@@ -130,3 +132,16 @@ def agreement(shape: Layout, f_axis: Array, turning: NDArray[np.bool_]) -> Agree
     square = np.mean(apart**2, axis=1)
     still = float(np.sqrt(square[~turning].mean())) if (~turning).any() else 0.0
     return Agreement(axis_noise(shape), still, float(np.sqrt(square[turning].mean())))
+
+
+def doubts_of_settings(data: CubeLog, shape: Layout, lsb_mg: float | None) -> list[str]:
+    """What a board with this log's data would be told live, in words; not of the scale: a log's
+    units are judged before.
+    """
+    watch = SettingsWatch(shape, lsb_mg, live=False)
+    f_axis, size = data.f_axis * np.array(shape.gain), max(1, round(REPORT_S / data.period_s))
+    for k in range(0, len(f_axis), size):
+        if data.tacho is not None:
+            watch.tacho(float(data.t_s[k]), float(data.tacho[k]))
+        watch.feed(data.t_s[k : k + size], f_axis[k : k + size])
+    return [f"is a setting wrong? {d.text}" for d in watch.doubts() if d.subject != "gravity"]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.rate.sight import VALID
 from logs.cube_log import CubeLog
 
 Array = NDArray[np.float64]
@@ -23,9 +24,16 @@ class EstimatorRun:
     f_b: Array  # (n, 3) m/s^2
     still: NDArray[np.bool_]  # (n,)
     p_n: Array  # (n, 3) m
+    sight: NDArray[np.uint8]  # (n, 3), of sight.VALID, AMBIGUOUS, BLIND, by component of omega
+    started: NDArray[np.bool_]  # (n,), whether anything was known of the rate
     us_per_sample: float
     blind: str = ""  # why omega was not known in more than half of the samples; empty: it was
     kept: str = ""  # why it knew nothing for a while; empty: it went on
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """Components of omega that the estimator vouches for, (n, 3)."""
+        return (self.sight == VALID) & self.started[:, None]
 
 
 @dataclass(frozen=True)

@@ -19,30 +19,45 @@ from logs.cube_run import EstimatorRun, Reference
 Array = NDArray[np.float64]
 
 SURE = 5.0  # rad/s; an estimate less certain than that says "I do not know yet" and has no NEES
+MOSTLY = 0.5  # share of the samples in which a rate is known, without which its integral is none
 AT_REST = 2e-3  # rad/s; a truth below it stands for rest
 
 
 def score(track: EstimatorRun | None, truth: Reference, bound: Array | None) -> dict[str, Any]:
-    """RMS of the rate error per axis (rad/s), of the angle about z at the end, NEES (3 degrees, so
-    3 is right).
+    """RMS of the rate error per axis (rad/s) and NEES (3 degrees, so 3 is right) over what the
+    estimator calls valid, the share of the samples that this is, and the error of the angle about z
+    at the end, where that rate was known: at the end and over most of the log. Beside it the RMS of
+    all that was said, also where the estimator itself called it unknown.
     """
     if track is None:
         nothing_known = dict.fromkeys(
-            ("rate_rms_radps", "angle_error_final_rad", "bound_rate_rms_radps")
+            ("rate_rms_radps", "valid_share", "rate_rms_all_radps", "angle_error_final_rad")
         )
-        return {**nothing_known, "nees_mean": None, "us_per_sample": None}
+        more = dict.fromkeys(("bound_rate_rms_radps", "nees_mean", "us_per_sample"))
+        return nothing_known | more
     circular = track.name.endswith(SUFFIX) and truth.name == "tachometer"
-    error = track.omega_b - truth.omega_b + (np.nan if circular else 0.0)
-    rms = np.sqrt(np.mean(error**2, axis=0))
+    valid = track.valid
+    share = valid.mean(axis=0)
+    said = track.omega_b - truth.omega_b + (np.nan if circular else 0.0)
+    error = np.where(valid, said, np.nan)
+    turned = valid[-1, 2] and share[2] >= MOSTLY and not circular
     return {
-        "rate_rms_radps": [_known(value) for value in rms],
+        "rate_rms_radps": [rms_known(column) for column in error.T],
+        "valid_share": share.tolist(),
+        "rate_rms_all_radps": [rms_known(column) for column in said[track.started].T],
         "angle_error_final_rad": (
-            None if circular else _known(abs(track.angle_z[-1] - truth.angle_z[-1]))
+            _known(abs(track.angle_z[-1] - truth.angle_z[-1])) if turned else None
         ),
         "bound_rate_rms_radps": [None] * 3 if bound is None else [_known(value) for value in bound],
         "nees_mean": nees_mean(error, track.P),
         "us_per_sample": track.us_per_sample,
     }
+
+
+def rms_known(values: Array) -> float | None:
+    """RMS of what is known of values (n,); None where nothing is."""
+    there = values[np.isfinite(values)]
+    return _known(np.sqrt(np.mean(there**2))) if len(there) else None
 
 
 def nees_mean(error: Array, P: Array) -> float | None:

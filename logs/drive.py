@@ -28,6 +28,7 @@ from inertial.rotation import rotation_vector, to_matrix
 from logs.drive_log import DriveLog, DriveTruth, read_drive_log
 from logs.drive_result import SETTLED, Result, of_filter, of_smoother
 from logs.quantities import said_of
+from logs.series import check_form, of_drive, write
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
@@ -59,12 +60,14 @@ def run_drive(
     units_as_named: bool = False,
     alignment: AlignmentSettings = AlignmentSettings(),
     plot: Path | None = None,
+    out: Path | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Run filters over a drive and score them; gives {"filters": {NAME: scores}, "default": NAME}.
 
     One fix in `every` is given; outages (start, length in s from the first fix) are a second run
     each filter makes. Lengths in m, speeds in m/s, angles in rad; None where nothing is known.
+    out: CSV or Parquet file of what every filter said at every epoch.
     Raises LogError for files that cannot be used, UnknownFilter for a name, OSError.
     """
     names = list(filters) if filters else list(USUAL)
@@ -73,6 +76,7 @@ def run_drive(
             raise UnknownFilter(
                 f"no navigation filter {name!r}; want one of {', '.join([*FILTERS, *SMOOTHERS])}"
             )
+    check_form(out)
     tell = progress or (lambda done, what: None)
     tell(0.0, "reading")
     log = read_drive_log(folder, imu, gnss, truth, units_as_named)
@@ -105,12 +109,16 @@ def run_drive(
 
         tell(0.97, "drawing")
         draw(plot, log, {name: r for name, r in results.items() if r is not None}, scores)
-    tell(1.0, "")
-    return {
+    result = {
         "filters": {name: scores[name] for name in names},
         "default": DEFAULT,
         "notes": [*log.notes, *said_of(folder / imu, log.timing, False), *said],
     }
+    if out is not None:
+        parts = {name: of_drive(one) for name, one in results.items() if one is not None}
+        result["written"] = write(out, parts, "filter")
+    tell(1.0, "")
+    return result
 
 
 def run_all(

@@ -31,6 +31,12 @@ Array = NDArray[np.float64]
 
 # RTKLIB's solution quality (1 fixed, 2 float, 3 SBAS, 4 differential, 5 single) to the bus's
 QUALITY = {1: RTK_FIXED, 2: RTK_FLOAT, 3: DIFFERENTIAL, 4: DIFFERENTIAL, 5: AUTONOMOUS}
+OWN_QUALITY = {
+    4: RTK_FIXED,
+    3: RTK_FLOAT,
+    2: DIFFERENTIAL,
+    1: AUTONOMOUS,
+}  # of GnssFix, as exported
 UNKNOWN_QUALITY = 0  # no solution, or none that is known here: not used
 IMU = ("t", "fx", "fy", "fz", "wx", "wy", "wz")
 TRUE_POSITION = ("true_lat", "true_lon", "true_height")
@@ -77,6 +83,8 @@ def read_drive_log(
     is one, tells the lever arm: lever_arm_b_m = [forward, right, down]. Numbers that look like
     another unit are refused unless they are meant as they are named.
     """
+    imu = sample_file(folder, imu)
+    gnss = epoch_file(imu, gnss)
     path = folder / imu
     sheet = open_sheet(path)
     optional = (*TRUE_POSITION, *TRUE_VELOCITY, *TRUE_ATTITUDE)
@@ -98,6 +106,19 @@ def read_drive_log(
     )
 
 
+def sample_file(folder: Path, usual: str = "imu.csv") -> str:
+    """Name of the file of inertial samples in a folder: the usual one, or an export's."""
+    exported = sorted(folder.glob("*.imu.csv"))
+    alone = len(exported) == 1 and not (folder / usual).is_file()
+    return exported[0].name if alone else usual
+
+
+def epoch_file(samples: str, usual: str = "gnss.csv") -> str:
+    """Name of the file of epochs that belongs to one of samples."""
+    stem = samples.removesuffix(".imu.csv")
+    return f"{stem}.gnss.csv" if stem != samples else usual
+
+
 def read_fixes(path: Path) -> tuple[list[Fix], list[str]]:
     """GNSS epochs, and in words what is missing of them; sigmas where the file has them, else what
     is typical of the quality. A height or velocity that the file does not have is unknown. Raises
@@ -105,10 +126,15 @@ def read_fixes(path: Path) -> tuple[list[Fix], list[str]]:
     """
     sheet = open_sheet(path)
     c = read_si(sheet, ("t", *PLACE), EPOCH, (*PLACE, *EPOCH))
+    if sheet.own:  # an export of ours has when a fix came, and when it was of
+        of_s = sheet.read(["fix_utc_ns"])["fix_utc_ns"] * 1e-9
+        c.columns["arrival"] = c["t"]
+        c.columns["t"] = np.where(of_s > 0.0, of_s, c["t"])
     rising(sheet, c)
     quality = c["quality"] if "quality" in c else np.full(len(c), 5.0)
+    numbered = OWN_QUALITY if sheet.own else QUALITY
     kinds = [
-        QUALITY.get(int(q), UNKNOWN_QUALITY) if math.isfinite(q) else UNKNOWN_QUALITY
+        numbered.get(int(q), UNKNOWN_QUALITY) if math.isfinite(q) else UNKNOWN_QUALITY
         for q in quality.tolist()
     ]
     placed = np.isfinite(c["lat"]) & np.isfinite(c["lon"]) & ((c["lat"] != 0) | (c["lon"] != 0))

@@ -5,6 +5,7 @@ t_s, t_ms, fx_mps2, fx_g, wx_radps, wx_degps, lat_deg, height_m, vn_mps ...
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from inertial.constants import GRAVITY
 from inertial.plausible import Doubt, doubt_of_time
-from inertial.timing import Timing, TimingError, sample_timing
+from inertial.timing import Timing, TimingError, sample_timing, straight
 from logs.sheet import LogError, Sheet, Table
 
 Array = NDArray[np.float64]
@@ -100,14 +101,15 @@ def in_range(sheet: Sheet, table: Table, name: str, values: Array, quantity: str
 
 
 def timing_of(sheet: Sheet, table: Table) -> Timing:
-    """Timing of a table's column "t" (s). Raises LogError for times that do not rise or are no
-    seconds.
+    """Timing of a table's column "t" (s), which is mended where its counter began anew or samples
+    came in bursts. Raises LogError for times that do not rise or are no seconds.
     """
     if len(table) < 2:
         raise LogError(f"{sheet.path}: {len(table)} samples; want at least two below the header")
     name = (column_of(sheet, "t") or ("t_s", 1.0))[0]
     try:
-        timing = sample_timing(table["t"])
+        table.columns["t"], mended = straight(table["t"], _same(table))
+        timing = replace(sample_timing(table["t"]), mended=mended)
     except TimingError as error:
         line = table.lines[error.row]
         raise LogError(f"{sheet.path}:{line}: column {name!r}: {error}") from None
@@ -115,6 +117,15 @@ def timing_of(sheet: Sheet, table: Table) -> Timing:
         raise LogError(f"{sheet.path}: {doubt.text}")
     rising(sheet, table)
     return timing
+
+
+def _same(table: Table) -> NDArray[np.bool_]:
+    """Rows (n,) that repeat the one before in every column."""
+    same = np.ones(len(table), dtype=bool)
+    same[0] = False
+    for column in table.columns.values():
+        same[1:] &= (np.diff(column) == 0.0) | (np.isnan(column[1:]) & np.isnan(column[:-1]))
+    return same
 
 
 def rising(sheet: Sheet, table: Table) -> None:
@@ -148,7 +159,7 @@ def refuse(path: Path, doubts: Sequence[Doubt | None], as_named: bool) -> list[s
 
 def said_of(path: Path, timing: Timing, cut_off: bool) -> list[str]:
     """What of a log's times a person should know."""
-    said = []
+    said = [f"{path}: {text}" for text in timing.mended]
     if timing.missing:
         longest = max(timing.holes, key=lambda hole: hole.missing)
         said.append(

@@ -17,14 +17,16 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.csv
 from numpy.typing import NDArray
 
+from logs.sheet_blocks import blocks, parsed, without_lines
 from logs.sheet_form import (
     COMMENTS,
     FIRST_LOOK,
     LINE,
     MISSING,
+    OWN,
+    OWN_NAMES,
     SEPARATORS,
     Lines,
     LogError,
@@ -34,8 +36,6 @@ from logs.sheet_form import (
     first_bytes,
     header_line,
     is_number,
-    long_line,
-    opened,
     printable,
 )
 
@@ -69,15 +69,16 @@ class _Rows:
     first: int  # number that the parser gives to the first row below the header
     skipped: array = field(default_factory=lambda: array("q"))  # comments and empty lines
     wrong: list[tuple[int, int, str]] = field(default_factory=list)  # row, cells, text: two at most
+    count: int = 0  # rows that the parser left out
 
-    def judge(self, row: pa.csv.InvalidRow) -> str:
-        """What to do with a row of a wrong number of cells."""
-        text = row.text.strip()
+    def judge(self, number: int, cells: int, text: str) -> None:
+        """Note a row of a wrong number of cells."""
+        self.count += 1
+        text = text.strip()
         if not text.strip(",;|\t ") or text.startswith(COMMENTS):
-            self.skipped.append(row.number)
+            self.skipped.append(number)
         elif len(self.wrong) < 2:
-            self.wrong.append((row.number, row.actual_columns, printable(text)))
-        return "skip"
+            self.wrong.append((number, cells, printable(text)))
 
     def lines(self, index: NDArray[np.int64]) -> NDArray[np.int64]:
         """Lines of the file of rows that were kept, by their order."""
@@ -118,6 +119,7 @@ class Sheet:
     decimal: str
     header: tuple[str, ...]
     header_line: int  # of the file, from 1
+    own: bool = False  # an export of ours: its columns are named as those of logs
 
     def want(self, names: Sequence[str], purpose: str = "") -> None:
         """Raises LogError for a column that is not there."""
@@ -164,49 +166,33 @@ class Sheet:
         columns = {name: column.whole() for name, column in kept.items()}
         return Table(columns, rows.lines(np.arange(done)), cut_off)
 
-    def _batches(self, names: list[str], rows: _Rows) -> Iterator[pa.RecordBatch]:
-        try:
-            with opened(self.path, self.size) as stream, self._open(stream, names, rows) as reader:
-                yield from reader
-        except UnicodeDecodeError as error:
-            raise LogError(f"{self.path}: no text in {self.encoding}: {error.reason}") from None
-        except pa.ArrowInvalid as error:
-            if "straddling" in str(error):
-                line = long_line(self.path, self.size)
-                raise LogError(
-                    f"{self.path}:{line}: a line of more than {LINE >> 20} MB; want one sample"
-                    " a line"
-                ) from None
-            raise LogError(
-                self._no_number(names) or f"{self.path}: {printable(str(error))}"
-            ) from None
-
-    def _open(self, stream, names: list[str], rows: _Rows) -> pa.csv.CSVStreamingReader:
+    def _batches(self, names: list[str], rows: _Rows) -> Iterator[pa.Table]:
         # names are ours: a column that stands twice, or has none, must not stop the reader
         unique = [f"{k}:{name}" for k, name in enumerate(self.header)]
         chosen = [unique[self.header.index(name)] for name in names]
-        return pa.csv.open_csv(
-            stream,
-            pa.csv.ReadOptions(
-                use_threads=False,
-                block_size=LINE,
-                skip_rows=self.header_line,
-                column_names=unique,
-                # numbers are ASCII; bytes that Windows-1252 does not know must not end the reading
-                encoding="latin-1" if self.encoding == "cp1252" else self.encoding,
-            ),
-            pa.csv.ParseOptions(
-                delimiter=self.separator,
-                ignore_empty_lines=False,
-                invalid_row_handler=rows.judge,
-            ),
-            pa.csv.ConvertOptions(
-                column_types=dict.fromkeys(chosen, pa.float64()),
-                include_columns=chosen,
-                null_values=MISSING,
-                decimal_point=self.decimal,
-            ),
-        )
+        # numbers are ASCII; bytes that Windows-1252 does not know must not end the reading
+        encoding = "latin-1" if self.encoding == "cp1252" else self.encoding
+        done, above = self.header_line, self.header_line
+        try:
+            for block in blocks(self.path, self.size, encoding):
+                if above:
+                    block, above = without_lines(block, above), 0
+                if not block:
+                    continue
+                left_out = rows.count
+
+                def judge(row: int, cells: int, text: str, before: int = done) -> None:
+                    rows.judge(before + row, cells, text)
+
+                table = parsed(block, unique, chosen, self.separator, self.decimal, judge)
+                done += len(table) + rows.count - left_out
+                yield table
+        except UnicodeDecodeError as error:
+            raise LogError(f"{self.path}: no text in {self.encoding}: {error.reason}") from None
+        except pa.ArrowInvalid as error:
+            raise LogError(
+                self._no_number(names) or f"{self.path}: {printable(str(error))}"
+            ) from None
 
     def _empty(
         self, table: dict[str, Array], rows: _Rows, done: int, text: Lines
@@ -296,6 +282,9 @@ def open_sheet(path: Path) -> Sheet:
     separator = max(SEPARATORS, key=lambda s: count(line, s))
     names = next(csv.reader([line], delimiter=separator))
     header = tuple(name.strip().strip('"') for name in names)
+    own = set(OWN) <= set(header)
+    if own:
+        header = tuple(OWN_NAMES.get(name, name) for name in header)
     if len(header) > MOST_COLUMNS:
         raise LogError(
             f"{path}:{number}: {len(header)} columns; this program reads up to {MOST_COLUMNS}"
@@ -312,7 +301,7 @@ def open_sheet(path: Path) -> Sheet:
             " remove one"
         )
     decimal = decimal_of(lines[number:], separator)
-    return Sheet(path, size, encoding, separator, decimal, header, number)
+    return Sheet(path, size, encoding, separator, decimal, header, number, own)
 
 
 def _or(names) -> str:

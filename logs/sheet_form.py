@@ -36,6 +36,19 @@ FORMS = (  # how other files begin, and what to do about them
 )
 
 
+OWN = ("utc_s", "sequence", "device_us")  # columns that tell an export of ours
+OWN_NAMES = {  # of our exports, as logs name them
+    "utc_s": "t_s",
+    "latitude_deg": "lat_deg",
+    "longitude_deg": "lon_deg",
+    "omega_radps": "tacho_rad_s",
+    **{f"f_b_mps2_{axis}": f"f{axis}_mps2" for axis in "xyz"},
+    **{f"omega_ib_b_radps_{axis}": f"w{axis}_radps" for axis in "xyz"},
+    **{f"v_n_mps_{axis}": f"v{axis}_mps" for axis in "ned"},
+    **{f"position_sigma_ned_m_{a}": f"sd_{b}_m" for a, b in zip("ned", "neu", strict=True)},
+}
+
+
 class LogError(ValueError):
     """A log that cannot be used; names file, line and column, and says what was wanted."""
 

@@ -131,7 +131,9 @@ def _estimators(device: Device, now: float) -> Iterator[Alarm]:
             yield Alarm("estimator", f"{called} silent", text, page)
             continue
         if m.message and counts(m.message) is None:
-            yield Alarm("estimator", called, plain(m.message), page)
+            doubted = m.message.startswith("settings: ")
+            title = "is a setting wrong?" if doubted else called
+            yield Alarm("settings" if doubted else "estimator", title, plain(m.message), page)
     behind_s = max((device.behind_s(n) for n in device.estimators("estimator")), default=0.0)
     if behind_s > BEHIND_STALE_S:
         text = (

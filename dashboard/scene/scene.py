@@ -10,7 +10,7 @@ in metres (the cube: half sides).
                                                     simulated devices only
     /world/truth/edges
     /world/estimate/<estimator>/body                body frame of one estimator
-    /world/estimate/<estimator>/body/{edges,faces,label}
+    /world/estimate/<estimator>/body/{edges,faces,label}  faces: main estimator only
     /world/estimate/<estimator>/body/axes           the twelve sensors; main estimator only
     /world/estimate/<estimator>/body/rate           arrow of omega_ib_b; main estimator only
     /world/estimate/<estimator>/body/rate_label
@@ -36,6 +36,7 @@ from dashboard.data.device import Device
 from dashboard.scene.drawing import bodies, camera
 from dashboard.scene.drawing import geometry as geo
 from dashboard.scene.drawing.axis_arrows import AxisArrows
+from dashboard.scene.drawing.labels import Placed, declutter
 from dashboard.scene.drawing.palette import estimator_colour, number, rgb, truth_colour
 from dashboard.scene.drawing.trails import Trails
 from dashboard.scene.workspaces import LAYERS
@@ -52,6 +53,7 @@ class Choice:
 
     dark: bool = True
     follow: bool = True
+    axis_names: bool = False  # of all axes; those left out are named always
     layers: dict[str, bool] = field(default_factory=lambda: dict.fromkeys(LAYERS, True))
 
 
@@ -119,6 +121,7 @@ class SceneView:
             visible = self._choice.layers[layer] and (layer != "rate" or self._turning)
             if node.visible != visible:
                 node.visible = visible
+        declutter(self._client.camera, self._labels(estimators))
 
     # --- building
 
@@ -140,7 +143,7 @@ class SceneView:
             body = f"/world/estimate/{name}/body"
             self._nodes[body] = scene.add_frame(body, show_axes=False)
             if vehicle:
-                bodies.vehicle(scene, self._nodes, body, colour, name)
+                bodies.vehicle(scene, self._nodes, body, colour, name, index)
                 path = f"/world/estimate/{name}/ellipsoid"
                 self._nodes[path] = scene.add_icosphere(
                     path,
@@ -151,7 +154,7 @@ class SceneView:
                     visible=False,
                 )
             elif kind == "attitude":
-                bodies.board(scene, body, colour, name, index)
+                bodies.board(scene, self._nodes, body, colour, name, index)
             else:
                 bodies.cube(scene, self._nodes, body, colour, name, index)
                 if index == 0:
@@ -260,12 +263,35 @@ class SceneView:
                     shift = -rotate(geo.Q_DISPLAY_N, p)
                     self._set("/world", p=tuple(float(v) for v in shift))
 
+    def _labels(self, estimators: list[str]) -> list[Placed]:
+        """All labels and where they are, the weightier first."""
+        layers = self._choice.layers
+        shift = np.asarray(self._sent.get("/world#p", (0.0, 0.0, 0.0)))
+        found: list[Placed] = []
+
+        def add(body: str, handle: object, shown: bool) -> None:
+            q, p = self._sent.get(f"{body}#q"), self._sent.get(f"{body}#p", (0.0, 0.0, 0.0))
+            if handle is not None and q is not None:
+                point = rotate(q, np.asarray(handle.position, dtype=float)) + np.asarray(p)
+                found.append(Placed(handle, rotate(geo.Q_DISPLAY_N, point) + shift, shown))
+
+        bodies_of = [f"/world/estimate/{name}/body" for name in estimators]
+        for body in bodies_of[:1]:
+            rate = layers["rate"] and self._turning
+            add(body, self._nodes.get(f"{body}/rate_label"), rate)
+        for body in bodies_of:
+            add(body, self._nodes.get(f"{body}/label"), layers["estimates"])
+        if self._arrows is not None and bodies_of:
+            for handle, out in self._arrows.labels():
+                add(bodies_of[0], handle, layers["sensors"] and (out or self._choice.axis_names))
+        return found
+
     def _layers(self):
         for path, node in self._nodes.items():
             tail = path.rsplit("/", 1)[1]
             if path == "/world/truth":
                 yield node, "truth"
-            elif tail in ("rate", "rate_label"):
+            elif tail == "rate":
                 yield node, "rate"
             elif "/trajectory/" in path:
                 yield node, "trajectory"

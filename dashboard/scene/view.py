@@ -14,18 +14,21 @@ from dashboard.scene.drawing.page import alert, tag
 from dashboard.scene.panels import PAGES, Devices, Record, Snapshot, Timeline
 from dashboard.scene.panels.base import Input
 from dashboard.scene.scene import Choice, SceneView
+from dashboard.scene.style import LEFT_WIDTH
 from dashboard.scene.workspaces import LAYERS, WINDOWS, WORKSPACES, Wish, offered, stated
 
 TRACK_S = 0.2  # trajectories grow five times a second
 # a replay that begins this near to the opening of a page was asked for by the person at it
 ASKED_FOR_S = 60.0
 ASK, ROLE = "Show", "Role"  # labels of what the page and the relay write into
-VIEWER = "viewer"
+VIEWER, OPERATORS = "viewer", ("operator", "admin")  # what the relay says
 FIRST = {"nav": "position", "attitude": "tilt", "rate": "rates"}  # page, by what moves a body
 # Labels of the inputs that change this browser's own view only; anybody may use them, and an order
 # may not have a label that stands here.
 OWN_INPUTS = frozenset([ASK, *(label for page in PAGES for label in page.own_inputs)])
 KEYS = [page.key() for page in PAGES]
+NAMING = ("diagnose", "calibrate")  # workspaces in which every axis has its name in the scene
+WIDTHS = {"s": (300.0, 470.0), "m": (270.0, 380.0), "l": (LEFT_WIDTH, 470.0)}  # px, by the page's
 
 
 class View:
@@ -44,7 +47,7 @@ class View:
         self._device_chosen = False  # by the person, or by the replay that it began
         self._opened_at = time.monotonic()
         self._generation = -1
-        self._window = "30"
+        self._window, self._size = "30", "l"
         self._paused_at: float | None = None
         self._tracks_at = 0.0
         self._lock = threading.RLock()  # callbacks of the browser against the loops
@@ -127,7 +130,7 @@ class View:
 
     def _build_right(self) -> None:
         gui = self._client.gui
-        panel = gui.add_panel()
+        panel = self._panel = gui.add_panel()
         with panel.add_tab("Charts", viser.Icon.CHART_LINE):
             self._rights = gui.add_html("", visible=False)
             self._folders = [gui.add_folder(None, visible=False) for _ in PAGES]
@@ -158,6 +161,7 @@ class View:
             paused=self._paused_at is not None,
             dark=self._choice.dark,
             follow=self._choice.follow,
+            size=self._size,
             layers=[layer for layer in LAYERS if self._choice.layers[layer]],
         )
         content = str(tag("span", class_="gf-state", data_state=text))
@@ -182,11 +186,14 @@ class View:
                 self._choice.follow = wish.follow
             if wish.layers is not None:
                 self._choice.layers.update({layer: layer in wish.layers for layer in LAYERS})
+            if wish.size in WIDTHS:
+                self._fit(wish.size)
             self._turn_to(wish)
             for what in wish.do:
                 if what == "camera":
                     self._reset_camera()
-                self._timeline.do(what)
+                if self._role.value in OPERATORS:  # an order, by an input that is anybody's
+                    self._timeline.do(what)
             self._say_state(self._device())
 
     def _turn_to(self, wish: Wish) -> None:
@@ -200,6 +207,18 @@ class View:
             last = self._last.get(wish.workspace)
             if of_it:
                 self._choose_page(last if last in there else (there or of_it)[0])
+
+    def _fit(self, size: str) -> None:
+        """Panels for the width of the page; a phone has one sheet, in which the charts are to be
+        near.
+        """
+        self._size = size
+        left, right = WIDTHS[size]
+        self._client.gui.main_panel.set_width(left)
+        self._panel.set_width(right)
+        self._devices.short = self._record.short = self._timeline.short = size == "s"
+        if size == "s":
+            self._panel.expand()
 
     def _theme(self) -> None:
         self._client.gui.configure_theme(
@@ -218,8 +237,9 @@ class View:
         """A viewer sees the orders, and that and why they are not his."""
         with self._lock:
             barred = self._role.value == VIEWER
+            self._timeline.bar(barred)
             for handle in self.orders:
-                if handle is not self._role:
+                if handle is not self._role and not isinstance(handle, viser.GuiButtonGroupHandle):
                     handle.disabled = barred
             self._say_rights()
 
@@ -263,6 +283,7 @@ class View:
             self._page = index
             self._last[PAGES[index].workspace] = index
             self.scene.show(not self._pages[index].own_scene)
+            self._choice.axis_names = PAGES[index].workspace in NAMING
             self._say_rights()
             for k, folder in enumerate(self._folders):
                 if folder.visible != (k == index):

@@ -73,6 +73,7 @@ class Wish:
     device: str | None = None
     prefer: str | None = None  # the device to begin with, unless a replay was just asked for
     window: str | None = None
+    size: str | None = None  # of the page: s, m, l
     dark: bool | None = None
     pause: bool | None = None
     follow: bool | None = None
@@ -94,6 +95,7 @@ class Wish:
             page=given.get("p"),
             device=given.get("device"),
             prefer=given.get("prefer"),
+            size=given.get("size"),
             window=given["window"] if given.get("window") in WINDOWS else None,
             dark=switch.get(given.get("dark", "")),
             pause=switch.get(given.get("pause", "")),

@@ -8,12 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.stream import Stream, every, worth_a_line
+from inertial.doubts.watch import SettingsWatch
 from inertial.rate.batch import RateColumns, RateState
 from inertial.rate.beliefs import Beliefs, make
 
 log = logging.getLogger(__name__)
 
 Array = NDArray[np.float64]
+
+DOUBT_S = 2.0  # of data, between two looks at the settings
 
 
 class WrongAxes(ValueError):
@@ -64,6 +67,8 @@ class RateBoard:
         self._period_s = 0.01
         self.health: Any = None  # inertial.rate.health.HealthMonitor
         self._trust = 0, 0.0  # axes that the estimators were told to leave out, and the scale
+        self._watch = SettingsWatch(self.layout)
+        self._doubts, self._doubted_s = "", 0.0
 
     def _start(self, reason: str) -> None:
         from inertial.rate.health import HealthMonitor  # here: loads only where it is needed
@@ -124,6 +129,7 @@ class RateBoard:
         if self._last_t is not None and not t_s[0] > self._last_t:
             self._start(f"board clock went from {self._last_t:.6f} s to {t_s[0]:.6f} s")
         self._last_t = float(t_s[-1])
+        self._watch.feed(t_s, f_axis)
         f_axis = np.ascontiguousarray(f_axis, dtype=np.float64)
         out, begin = [], 0
         for end, mask, scale in self.health.feed(t_s, f_axis, stale):
@@ -160,6 +166,20 @@ class RateBoard:
         """A tachometer's report to all estimators (RateEstimator.tacho)."""
         for estimator in self._estimators.values():
             estimator.tacho(t_s, rate, sigma, signed)
+
+    def heard_tacho(self, t_s: float, rate: float, pulses: int) -> None:
+        """A tachometer's report to what watches the settings, rad/s, with pulses since boot."""
+        self._watch.tacho(t_s, rate, pulses)
+
+    def doubts(self, t_s: float) -> str:
+        """What the data say of wrong settings, looked at every DOUBT_S of data; empty for none."""
+        if abs(t_s - self._doubted_s) >= DOUBT_S:
+            self._doubted_s, before = t_s, self._doubts
+            found = self._watch.doubts(spoilt=self._trust[0] != 0)
+            self._doubts = "; ".join(doubt.text for doubt in found)
+            if self._doubts and not before:
+                log.warning("%s: is a setting wrong? %s", self.device, self._doubts)
+        return self._doubts
 
     def cost_us(self, name: str) -> float:
         """Time of one sample in this estimator, us, since it was last asked for."""

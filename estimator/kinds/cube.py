@@ -8,11 +8,18 @@ Out: RateBatch, pose, AxisHealth, CalibrationStatus, EstimatorStatus, and the me
 kinds/navigation.py.
 """
 
+import math
 from typing import Any
 
 from estimator.choice import beliefs, load_card, make_layout
 from estimator.convert.header import moment, sample_header
-from estimator.convert.samples import BadMessage, Samples, accel_samples, tacho_report
+from estimator.convert.samples import (
+    MICRO,
+    BadMessage,
+    Samples,
+    accel_samples,
+    tacho_report,
+)
 from estimator.convert.status import rate_state
 from estimator.devices.gyro_free import GyroFreeNavigation
 from estimator.devices.navigation import NavBoard
@@ -28,6 +35,7 @@ from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import AXES, CALIBRATION, ESTIMATOR, POSE, RATE
 
 POSE_HZ = 20.0
+SETTINGS = "settings: "  # begins the message of a status that doubts one
 
 
 class Cube:
@@ -68,9 +76,16 @@ class Cube:
         return out
 
     def tacho(self, message: pb.TachoRate) -> None:
-        """Correct the rate by the tachometer; raises convert.samples.BadMessage."""
-        if self._board is not None:
+        """Watch the settings by the tachometer and, where it aids, correct the rate by it; raises
+        convert.samples.BadMessage.
+        """
+        if self._board is None:
+            return
+        if self._common.settings.tacho_aid:
             self._board.tacho(*tacho_report(message))
+        if math.isfinite(message.omega_radps):
+            t_s = message.header.device_us * MICRO
+            self._board.heard_tacho(t_s, message.omega_radps, message.pulses)
 
     def expect_fixes(self) -> None:
         """The device has GNSS: navigate on its own rate from now on, where that is asked for."""
@@ -155,8 +170,11 @@ class Cube:
         if axes_due:
             out.append(Output(AXES, device, "", messages.axes(header, board.health, last_s)))
         if due:
-            for name in common.settings.rate:
-                out.append(Output(ESTIMATOR, device, name, self._status(header, board, name)))
+            doubts = board.doubts(last_s)
+            for k, name in enumerate(common.settings.rate):
+                status = self._status(header, board, name)
+                status.message = f"{SETTINGS}{doubts}" if doubts and k == 0 else ""
+                out.append(Output(ESTIMATOR, device, name, status))
         return out
 
     def _status(self, header: pb.Header, board: RateBoard, name: str) -> pb.EstimatorStatus:

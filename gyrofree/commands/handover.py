@@ -122,6 +122,10 @@ def import_log(
     name: Annotated[
         str, typer.Option(help="Added to the session's id.", callback=session_name)
     ] = "import",
+    start: Annotated[
+        str,
+        typer.Option(help="When it was recorded, UTC, as 2026-11-29T10:00:00; a log has no date."),
+    ] = "",
     units_as_named: UnitsAsNamed = False,
     as_json: AsJson = False,
     config: Config = None,
@@ -136,14 +140,15 @@ def import_log(
     settings = settings_of(config)
     try:
         check_name(device)
+        start_s = importer.start_of(start)
         source = read_board_log(log, gnss, units_as_named)
         for note in source.notes:
             say(f"note: {note}", file=sys.stderr)
-        rows = importer.rows_of(source, settings.bus.prefix, device)
+        rows = importer.rows_of(source, settings.bus.prefix, device, start_s)
         folder, axes = _estimated(
             settings,
             rows,
-            f"20240101-000000-{slug(name) or 'import'}",
+            f"{importer.stamp(source, start_s)}-{slug(name) or 'import'}",
             f"made of {log.name}",
             settings.recorder.root,
         )

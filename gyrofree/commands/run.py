@@ -9,9 +9,9 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
-from gyrofree.commands.options import AsJson, UnitsAsNamed, say, show_table
+from gyrofree.commands.options import AsJson, UnitsAsNamed, say
+from gyrofree.commands.run_tables import kind_of, known, show
 from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
 
 Report = Callable[[float, str], None]
@@ -92,6 +92,12 @@ def run(
     ] = 10.0,
     units_as_named: UnitsAsNamed = False,
     plot: Plot = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write what every estimator said along the log to this .csv or .parquet file."
+        ),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Run a log through the estimators and score them: a cube's, a drive's or an attitude log's.
@@ -108,7 +114,12 @@ def run(
                 from logs.attitude import run_attitude
 
                 result = run_attitude(
-                    log, filters=names, plot=plot, units_as_named=units_as_named, progress=progress
+                    log,
+                    filters=names,
+                    plot=plot,
+                    out=out,
+                    units_as_named=units_as_named,
+                    progress=progress,
                 )
             elif log.is_dir():
                 from inertial.navigation.standstill import AlignmentSettings
@@ -127,6 +138,7 @@ def run(
                         standstill=align_standstill, course_speed=align_speed
                     ),
                     plot=plot,
+                    out=out,
                     progress=progress,
                 )
             else:
@@ -143,6 +155,7 @@ def run(
                     resolve=resolve,
                     units_as_named=units_as_named,
                     plot=plot,
+                    out=out,
                     progress=progress,
                 )
     except (ValueError, OSError) as error:
@@ -150,20 +163,6 @@ def run(
     show(result, as_json)
     if not any(known(row) for row in result[kind_of(result)].values()):
         raise fail("no result: the notes above say why", EXIT_FAILED)
-
-
-def kind_of(result: dict[str, Any]) -> str:
-    """What the rows of a result are: "estimators" or "filters"."""
-    return "estimators" if "estimators" in result else "filters"
-
-
-def known(row: dict[str, Any]) -> bool:
-    """Did this estimator say anything that was scored?"""
-    return any(
-        value is not None and value != [] and not (isinstance(value, list) and not any(value))
-        for name, value in row.items()
-        if name not in ("us_per_sample", "us_per_epoch", "bound_rate_rms_radps")
-    )
 
 
 def parse_outages(text: str) -> list[tuple[float, float]]:
@@ -180,49 +179,6 @@ def parse_outages(text: str) -> list[tuple[float, float]]:
             f"--outages {text!r}: want starts and one length in s, like 120,200,280:30"
         )
     return found
-
-
-def show(result: dict[str, Any], as_json: bool) -> None:
-    """One JSON object, or a table with a row per filter."""
-    if as_json:
-        say(json.dumps(result, indent=2))
-        return
-    kind = kind_of(result)
-    rows: dict[str, dict[str, Any]] = result[kind]
-    columns = list(dict.fromkeys(key for row in rows.values() for key in row))
-    table = Table(kind[:-1], *columns)
-    for name, row in rows.items():
-        mark = " (default)" if name == result.get("default") else ""
-        table.add_row(name + mark, *(cell(row.get(key)) for key in columns))
-    show_table(table, 200)
-    for key, value in result.items():
-        if key == "axes" and isinstance(value, dict):
-            say(f"axes: {axes(value)}")
-        elif key == "notes":
-            say(*(f"note: {note}" for note in value), sep="\n")
-        elif key == "gaps" and isinstance(value, dict):
-            say(f"gaps: {value['count']}, missing samples: {value['missing_samples']}")
-        elif key not in (kind, "default") and value not in (None, [], {}, ""):
-            say(f"{key}: {json.dumps(value)}")
-
-
-def axes(found: dict[str, Any]) -> str:
-    """How many axes are good, and what is wrong with each of the others."""
-    states = {name: one["state"] if isinstance(one, dict) else one for name, one in found.items()}
-    from inertial.rate.axis_verdicts import good_of  # here: not every command needs the core
-
-    return good_of(states)
-
-
-def cell(value: Any) -> str:
-    """A result as a person reads it; nothing where it is not known."""
-    if value is None:
-        return "-"
-    if isinstance(value, float):
-        return f"{value:.4g}"
-    if isinstance(value, list):
-        return " ".join(cell(item) for item in value)
-    return str(value)
 
 
 Out = Annotated[

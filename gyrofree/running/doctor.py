@@ -4,6 +4,7 @@ Each check returns one Finding; none changes anything. `health` asks a running s
 life and is what the containers' health checks call.
 """
 
+import contextlib
 import ctypes
 import grp
 import importlib.metadata
@@ -12,6 +13,7 @@ import shutil
 import socket
 import struct
 import sys
+import time
 import urllib.error
 import urllib.request
 from dataclasses import asdict, dataclass
@@ -19,12 +21,18 @@ from pathlib import Path
 from queue import Empty, Queue
 from urllib.parse import urlsplit
 
+from google.protobuf.message import DecodeError
+
 from gyrofree.config import Settings
 from messages.bus.session import BusUnavailable, open_client, subscribe
+from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ESTIMATOR, LINK, PROCEDURE, STATUS
+from messages.text import plain
 
 LEAST_FREE = 1 << 30  # bytes of disk below which recording is at risk
 STA_UNSYNC = 0x0040  # linux/timex.h
+LISTEN_S = 2.5  # to running estimators, which speak once a second
+DOUBTED = "settings: "  # begins an estimator's message of a setting that the data contradict
 HEALTH_WAIT = 4.0  # s; the slowest sign of life comes once a second
 SIGN_OF_LIFE = {
     "gateway": LINK,
@@ -58,6 +66,40 @@ def examine(settings: Settings) -> list[Finding]:
         ),
         _folder("journal folder", Path(settings.gateway.journal)),
         _folder("recordings folder", Path(settings.recorder.root)),
+        *_settings(settings),
+    ]
+
+
+def _settings(settings: Settings) -> list[Finding]:
+    """What running estimators say of settings that their data contradict; nothing where no bus
+    runs.
+    """
+    host, _, port = settings.bus.listen[0].removeprefix("tcp/").rpartition(":")
+    if not port_taken(host.strip("[]"), int(port)):
+        return []
+    try:
+        session = open_client(settings.bus, timeout_s=HEALTH_WAIT)
+    except BusUnavailable:
+        return []
+    heard: Queue[tuple[str, bytes]] = Queue()
+    with session:
+        subscription = subscribe(
+            session, ESTIMATOR, settings.bus.prefix, lambda key, payload: heard.put((key, payload))
+        )
+        time.sleep(LISTEN_S)
+        subscription.undeclare()
+    said: dict[str, str] = {}
+    while not heard.empty():
+        key, payload = heard.get()
+        device = key.removeprefix(f"{settings.bus.prefix}/").partition("/")[0]
+        with contextlib.suppress(DecodeError):
+            message = pb.EstimatorStatus.FromString(bytes(payload)).message
+            said[device] = max(said.get(device, ""), message.partition(DOUBTED)[2], key=len)
+    return [
+        Finding(f"settings of {device}", "warn", plain(text), "change the setting, start it anew")
+        if text
+        else Finding(f"settings of {device}", "ok", "nothing in the data contradicts them")
+        for device, text in sorted(said.items())
     ]
 
 

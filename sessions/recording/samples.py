@@ -226,13 +226,24 @@ def _values(field: FieldDescriptor, messages: Sequence[Message]) -> Column:
     out = np.empty(len(messages), dtype=object)
     for k, message in enumerate(messages):
         value = getattr(message, field.name)
-        out[k] = value if isinstance(value, str) else _text(message, field)
+        out[k] = value if isinstance(value, str) else text_of(message, field)
     return out
 
 
-def _text(message: Message, field: FieldDescriptor) -> str:
-    whole: dict[str, Any] = MessageToDict(message, preserving_proto_field_name=True)
+def text_of(message: Message, field: FieldDescriptor) -> str:
+    """A structure as JSON, its zeros spelt out; empty where it is not there."""
+    if field.message_type is not None and not field.is_repeated:
+        if not message.HasField(field.name):
+            return ""
+        return json.dumps(_plain(getattr(message, field.name)), sort_keys=True)
+    whole = _plain(message)
     return json.dumps(whole[field.name], sort_keys=True) if field.name in whole else ""
+
+
+def _plain(message: Message) -> Any:
+    return MessageToDict(
+        message, preserving_proto_field_name=True, always_print_fields_with_no_presence=True
+    )
 
 
 def _vectors(

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inertial.timing import TimingError, sample_timing
+from inertial.timing import TimingError, sample_timing, straight
 
 DRAWS = st.integers(0, 2**31)
 
@@ -76,3 +76,54 @@ def test_times_that_do_not_rise_are_named_by_row():
     assert caught.value.row == 2
     with pytest.raises(TimingError, match="at least two"):
         sample_timing(np.array([1.0]))
+
+
+@pytest.mark.parametrize("bits", [16, 24, 32])
+@pytest.mark.parametrize("unit_s", [1e-6, 1e-3])
+@pytest.mark.parametrize("rate", [100.0, 800.0, 1600.0])
+@pytest.mark.parametrize("start", [0.1, 0.97])
+def test_a_counter_that_begins_anew_changes_no_time(bits, unit_s, rate, start):
+    n = np.arange(3000)
+    count = np.rint((n + 1) / rate / unit_s) + start * 2**bits
+    whole = count * unit_s
+    t, said = straight(np.mod(count, 2**bits) * unit_s)
+    ends = int(count[-1] // 2**bits) - int(count[0] // 2**bits)
+    if np.min(np.diff(whole)) <= 0.0:
+        return  # more samples than the counter has steps: another test
+    np.testing.assert_allclose(np.diff(t), np.diff(whole), atol=1e-5)
+    assert bool(said) == bool(ends)
+    if ends:
+        assert f"{bits} bits" in said[0] and sample_timing(t).missing == 0
+
+
+@pytest.mark.parametrize("burst", [2, 8, 32])
+@pytest.mark.parametrize("jitter", [0.0, 0.02])
+def test_bursts_of_one_stamp_are_spread_evenly(burst, jitter):
+    rng, period = np.random.default_rng(burst), 1.0 / 800.0
+    read = (np.arange(200) + rng.normal(0.0, jitter, 200) + 1.0) * burst * period + 7.123456789
+    true = 7.123456789 + (np.arange(200 * burst) + 1) * period
+    t, said = straight(np.repeat(read, burst))
+    assert f"up to {burst} in a row" in said[0]
+    assert np.abs(t - true).max() < (1e-9 if jitter == 0.0 else 5.0 * jitter * burst * period)
+    timing = sample_timing(t)
+    assert timing.period_s == pytest.approx(period, rel=0.01) and timing.missing == 0
+    lost = np.delete(np.repeat(read, burst), slice(10 * burst, 30 * burst))
+    assert sample_timing(straight(lost)[0]).missing == pytest.approx(20 * burst, abs=burst / 4)
+
+
+def test_rows_that_repeat_rows_are_named_and_others_are_never_thrown_away():
+    t = np.sort(np.concatenate([np.arange(500) * 0.01 + 1e-7 * np.arange(500), [2.00002, 3.00003]]))
+    equal = np.concatenate([[False], np.diff(t) == 0.0])
+    assert equal.sum() == 2
+    with pytest.raises(TimingError, match="repeat the row before in every column: remove"):
+        straight(t, equal)
+    spread, said = straight(t, np.zeros(len(t), bool))
+    assert "2 samples have the time of the one before" in said[0] and (np.diff(spread) > 0.0).all()
+
+
+@pytest.mark.parametrize("rows", [5000, 6000, 7000])
+def test_a_log_set_behind_another_is_no_counter_that_begins_anew(rows):
+    t = np.concatenate([np.arange(rows), np.arange(5000)]) * 0.01
+    assert straight(t)[1] == ()
+    with pytest.raises(TimingError, match="sort the rows by time"):
+        sample_timing(straight(t)[0])

@@ -2,6 +2,8 @@
 
 import gzip
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -175,3 +177,21 @@ def test_bytes_that_windows_1252_does_not_know_end_nothing(tmp_path):
     path = tmp_path / "log.csv"
     path.write_bytes(b"t_s,a\n# \x81\x8d\xff\n" + b"0,1\n" * 40_000 + b"1,2\n")
     assert len(read(path)) == 40_001
+
+
+def test_a_refused_log_ends_the_process_in_peace(tmp_path):
+    """What still reads when the interpreter ends stops the process in the middle of nothing."""
+    log = tmp_path / "twice.csv"
+    row = ",".join(["0"] * 12)
+    head = ",".join(f"a{s}{a}_counts" for s in range(1, 5) for a in range(1, 4))
+    log.write_text(f"t_s,{head}\n" + "".join(f"{k // 2},{row}\n" for k in range(20_000)))
+    code = (
+        "import sys\n"
+        "from logs.cube_log import read_log\n"
+        "names = [f'a{s}{a}' for s in range(1, 5) for a in range(1, 4)]\n"
+        "try: read_log(sys.argv[1], names)\n"
+        "except ValueError as error: print(error)\n"
+    )
+    for _ in range(5):  # it went wrong in two of nine
+        done = subprocess.run([sys.executable, "-c", code, log], capture_output=True, text=True)
+        assert done.returncode == 0 and "does not rise" in done.stdout, done.stderr

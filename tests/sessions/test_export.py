@@ -19,7 +19,9 @@ from support.table_session import table_recording
 
 from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
+from gyrofree.running.importer import rows_of
 from inertial.simulation.table import TableTest
+from logs.board_log import read_board_log
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
 from messages.contract.topics import ACCEL, GNSS, NAV, NOTE, RATE
@@ -29,6 +31,7 @@ from sessions.export.table import Selection, tables
 from sessions.recording.mcap_append import McapLog
 from sessions.recording.mcap_log import read
 
+DATA = Path(__file__).parent / "data"
 KEY = "gyrofree/cube/rate/products-ekf"
 
 
@@ -275,3 +278,38 @@ def test_no_cell_of_a_csv_begins_a_formula(tmp_path):
         assert row["text"] == cell(word)
         assert row["text"][:1] not in ("=", "+", "-", "@", "\t", "\r", "\n")
         assert float(row["utc_s"]) > 1.6e9 and not {"\x1b", "\u202e"} & set(row["text"])
+
+
+@pytest.mark.parametrize("session", ["table", "drive"])
+def test_no_cell_holds_a_structure_and_zeros_are_spelt_out(tmp_path, session):
+    path = DATA / f"20240101-000000-{session}" / "recording.mcap"
+    for file in export(path, "csv", tmp_path):
+        rows = list(csv.reader(file.open(newline="", encoding="utf-8")))
+        assert not any(set("{[") & set(cell) for row in rows for cell in row), file.name
+        assert len(set(rows[0])) == len(rows[0])
+        if ".pose." in file.name:
+            place = rows[0].index("rotation_x")
+            assert all(row[place] != "" for row in rows[1:])
+
+
+@pytest.mark.parametrize("session", ["table", "drive"])
+def test_an_export_is_read_again_as_the_log_it_was(tmp_path, session):
+    path = DATA / f"20240101-000000-{session}" / "recording.mcap"
+    out = tmp_path
+    files = {file.name: file for file in export(path, "csv", out)}
+    log = read_board_log(files["cube.accel.csv"] if session == "table" else out)
+    found = tables(path)
+    key = "gyrofree/cube/accel" if session == "table" else "gyrofree/car/imu"
+    np.testing.assert_allclose(log.t_s, found[key].data["utc_s"], atol=1e-6)
+    if session == "table":
+        np.testing.assert_array_equal(log.counts[:, 0], found[key].data["a11_counts"])
+        return
+    np.testing.assert_array_equal(log.f_b[:, 1], found[key].data["f_b_mps2_y"])
+    fixes = found["gyrofree/car/gnss"].data
+    assert len(log.fixes) == len(fixes["utc_s"])
+    last = log.fixes[-1]
+    assert np.degrees(last.latitude) == pytest.approx(fixes["latitude_deg"][-1], abs=1e-12)
+    assert last.v_n[2] == fixes["v_n_mps_d"][-1] and last.sigma_p[2] == 3.2
+    assert last.quality == 1 == fixes["quality"][-1]  # the bus's own numbers, not RTKLIB's
+    again = list(rows_of(log, "gyrofree", "car"))
+    assert again[0][0] == pytest.approx(round(found[key].data["utc_s"][0] * 1e9), abs=1000)

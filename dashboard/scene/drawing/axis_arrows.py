@@ -14,6 +14,7 @@ from messages.text import plain
 
 MOST = 64  # axes drawn
 LENGTH, LABEL_AT = 0.42, 0.5  # half sides
+GONE = " ✕"  # after the name of an axis that is left out
 DOUBTFUL, BAD = 2.0, 4.0  # |residual| over its sigma
 CUBE_NAMES = tuple(f"a{i // 3 + 1}{i % 3 + 1}" for i in range(12))
 
@@ -48,6 +49,11 @@ class AxisArrows:
             [AXES[i % 3] for i in range(12)],
             (False,) * 12,
         )
+
+    def labels(self) -> list[tuple[object, bool]]:
+        """The labels, and whether their axis is left out; those first."""
+        found = [(handle, handle.text.endswith(GONE)) for handle in self._labels.values()]
+        return sorted(found, key=lambda one: not one[1])
 
     def update(self, health: pb.AxisHealth | None) -> None:
         """The newest AxisHealth of the device; None leaves the arrows in the colours of x, y and
@@ -126,7 +132,7 @@ class AxisArrows:
                 for i, name in enumerate(names)
             }
         for name, gone in zip(names, out, strict=True):
-            text = f"{name} ✕" if gone else name
+            text = f"{name}{GONE}" if gone else name
             if self._labels[name].text != text:
                 self._labels[name].text = text
 

@@ -83,16 +83,17 @@ def cube(scene: SceneApi, nodes: Nodes, body: str, colour: str, name: str, index
         thickness=3.0,
         thickness_units="screen",
     )
-    scene.add_box(
-        f"{body}/faces",
-        color=rgb(colour),
-        dimensions=(2.0, 2.0, 2.0),
-        opacity=0.22 if main else 0.07,
-        side="double",
-        cast_shadow=False,
-        receive_shadow=False,
-    )
-    scene.add_label(
+    if main:
+        scene.add_box(
+            f"{body}/faces",
+            color=rgb(colour),
+            dimensions=(2.0, 2.0, 2.0),
+            opacity=0.3,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+    nodes[f"{body}/label"] = scene.add_label(
         f"{body}/label",
         estimator_title(name),
         position=LABEL_CORNERS[index % len(LABEL_CORNERS)],
@@ -103,7 +104,7 @@ def cube(scene: SceneApi, nodes: Nodes, body: str, colour: str, name: str, index
         _rate_arrow(scene, nodes, body)
 
 
-def board(scene: SceneApi, body: str, colour: str, name: str, index: int) -> None:
+def board(scene: SceneApi, nodes: Nodes, body: str, colour: str, name: str, index: int) -> None:
     """One filter's tilt board below the frame `body`, forward-right-down; number 0 is filled and
     shows its nose.
     """
@@ -128,7 +129,7 @@ def board(scene: SceneApi, body: str, colour: str, name: str, index: int) -> Non
             head_length=0.3,
         )
     x, y, z = LABEL_CORNERS[index % len(LABEL_CORNERS)]
-    scene.add_label(
+    nodes[f"{body}/label"] = scene.add_label(
         f"{body}/label",
         estimator_title(name),
         position=(x * BOARD[0], y * BOARD[1], -z * 0.6),
@@ -149,20 +150,23 @@ def _rate_arrow(scene: SceneApi, nodes: Nodes, body: str) -> None:
     )
 
 
-def vehicle(scene: SceneApi, nodes: Nodes, body: str, colour: str, name: str) -> None:
-    """A car, its heading and its estimator's name below the frame `body`, forward-right-down, m."""
+def vehicle(scene: SceneApi, nodes: Nodes, body: str, colour: str, name: str, index: int) -> None:
+    """A car, its heading and its estimator's name below the frame `body`, forward-right-down, m;
+    number 0 is filled.
+    """
     scene.add_line_segments(
         f"{body}/edges", geo.vehicle_edges(), rgb(colour), thickness=3.0, thickness_units="screen"
     )
-    scene.add_box(
-        f"{body}/faces",
-        color=rgb(colour),
-        dimensions=(4.4, 1.8, 0.6),
-        position=(0.0, 0.0, -0.6),
-        opacity=0.9,
-        cast_shadow=False,
-        receive_shadow=False,
-    )
+    if index == 0:
+        scene.add_box(
+            f"{body}/faces",
+            color=rgb(colour),
+            dimensions=(4.4, 1.8, 0.6),
+            position=(0.0, 0.0, -0.6),
+            opacity=0.9,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
     nodes[f"{body}/heading"] = scene.add_arrows(
         f"{body}/heading",
         np.array([[[2.2, 0, -0.6], [12.0, 0, -0.6]]], dtype=np.float32),
@@ -171,7 +175,7 @@ def vehicle(scene: SceneApi, nodes: Nodes, body: str, colour: str, name: str) ->
         head_radius=1.1,
         head_length=3.0,
     )
-    scene.add_label(
+    nodes[f"{body}/label"] = scene.add_label(
         f"{body}/label",
         estimator_title(name),
         position=(0.0, 0.0, -5.0),

@@ -9,7 +9,9 @@ event handler, a script element) does not run. What has to stay open, and why:
     style-src 'unsafe-inline'     the page's libraries write style elements and attributes
     script-src 'wasm-unsafe-eval' it decompresses by WebAssembly. Texts are not evaluated: that is
                                   wanted by a part for splats, which we do not draw, and by
-                                  viser's run_javascript, which we do not call
+                                  viser's run_javascript, which we do not call. That part asks as
+                                  soon as the page is there, and would leave an error in the console
+                                  of every visitor: NO_TEXTS answers it before the policy has to
     blob: of script and worker    its workers are made of texts within the program
     img-src data: blob:           pictures and textures within its messages
 """
@@ -27,6 +29,10 @@ import zstandard
 
 log = logging.getLogger(__name__)
 
+NO_TEXTS = (
+    b"<script>window.Function=new Proxy(Function,{apply:()=>()=>()=>{throw new Error("
+    b'"texts are not evaluated here")}})</script>'
+)
 LARGEST = 64 * 1024**2  # bytes of the program
 SCRIPT = re.compile(r"<script([^>]*)>(.*?)</script>", re.DOTALL)
 PACKED = re.compile(r'data-p="([^"]*)".*?data-ss="(\d+)".*?data-cs="(\d+)"', re.DOTALL)
@@ -43,9 +49,9 @@ POLICY = (
 
 @cache
 def scene_page() -> tuple[bytes, str]:
-    """The page and its version tag; one file, read once."""
+    """The page and its version tag; one file, read once, with NO_TEXTS before its own scripts."""
     page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_bytes()
-    return page, viser.__version__
+    return page.replace(b"<head>", b"<head>" + NO_TEXTS, 1), viser.__version__
 
 
 def policy(host: str) -> str:

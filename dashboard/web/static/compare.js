@@ -46,6 +46,14 @@ function showTables(answer) {
     `${d.session}: ${d.track.split("/").slice(1).join(" ")}`, "track: north / east / down, m",
     ...d.rms_ned_m.map((v) => v === null ? "–" : v.toPrecision(3)), `${d.seconds.toFixed(1)} s`,
   ])));
+  const provisional = answer.state === "reading"; // part of a recording: its figures will change
+  for (const table of document.querySelectorAll("main table")) {
+    table.classList.toggle("provisional", provisional);
+    table.setAttribute("aria-busy", String(provisional));
+  }
+  document.getElementById("provisional").hidden = !provisional;
+  document.getElementById("provisional").textContent = provisional
+    ? `Provisional: ${Math.floor(100 * answer.done)} % of the recordings is read, these figures will change.` : "";
   document.body.dataset.plotted = answer.state;
 }
 

@@ -142,5 +142,11 @@ listen({
 }, byId("scene"));
 moveByArrows(rooms);
 moveByArrows(pages);
+// The scene's panels fit the page: of a phone, a tablet, a desk.
+const sizeOf = () => (innerWidth < 600 ? "s" : innerWidth < 1200 ? "m" : "l");
+const fit = () => choose({ size: sizeOf() });
+addEventListener("resize", () => sizeOf() !== size && fit(size = sizeOf()));
+let size = sizeOf();
 whenStated(draw);
+fit();
 begin();

@@ -24,7 +24,7 @@ export function choose(fields) {
 
 const stated = (now) => ({
   w: now.workspace, p: now.page, device: now.device, window: now.window,
-  layers: now.layers.join("."), follow: now.follow ? "1" : "0", dark: now.dark ? "1" : "0", pause: now.paused ? "1" : "0",
+  size: now.size, layers: now.layers.join("."), follow: now.follow ? "1" : "0", dark: now.dark ? "1" : "0", pause: now.paused ? "1" : "0",
 });
 
 export function link(now) {
@@ -41,6 +41,8 @@ function flush() {
   const input = doc?.querySelector("div:has(> .gf-state) + div input");
   if (!input || Date.now() - sent < SPACING_MS || !Object.keys(pending).length) return;
   sent = Date.now();
+  input.setAttribute("aria-label", "What the page asks of the view");
+  input.tabIndex = -1;
   const line = new URLSearchParams({ ...pending, n: String(++count) }).toString();
   pending = {};
   const kind = frame.contentWindow;

@@ -10,7 +10,7 @@ import numpy as np
 from dashboard.data.alarms import TURNS_RADPS, alarms, bench_alarms, counts, waits
 from dashboard.data.pose import roll_pitch
 from dashboard.scene.drawing.geometry import MODES
-from dashboard.scene.drawing.page import Markup, alert, bad, joined, note, rows, tag, term
+from dashboard.scene.drawing.page import EMPTY, Markup, alert, bad, joined, note, rows, tag, term
 from dashboard.scene.drawing.palette import (
     FIX,
     REFERENCE,
@@ -32,6 +32,7 @@ class Devices(Panel):
     """Source badge, health and live values of the chosen device. Also what a phone shows first."""
 
     title = "Device"
+    short = False  # on a phone: the rows are left to the pages of Diagnose
     _table = None
 
     def update(self, s: Snapshot) -> None:
@@ -57,7 +58,7 @@ class Devices(Panel):
             + self._alerts(s)
             + self._advice(s)
             + body
-            + rows(self._health(s), s.stale("link"))
+            + (EMPTY if self.short else rows(self._health(s), s.stale("link")))
             + self._logs(s)
         )
 

@@ -2,12 +2,14 @@
 
 import viser
 
-from dashboard.scene.drawing.page import Markup, alert, bad, rows, tag
+from dashboard.scene.drawing.page import EMPTY, Markup, alert, bad, rows, tag
 from dashboard.scene.drawing.palette import number
 
 
 class Record:
     """What the recorder says of itself."""
+
+    short = False  # on a phone: alarms only
 
     def __init__(self, client: viser.ClientHandle) -> None:
         self._state = client.gui.add_html("")
@@ -17,6 +19,8 @@ class Record:
         stale = latest is None or latest.age(now) > 3.0
         recording = latest is not None and latest.message.recording
         content = self._content(latest, stale, recording)
+        if self.short:
+            content = alert(latest.message.message) if latest is not None else EMPTY
         if self._state.content != content:
             self._state.content = str(content)
 
