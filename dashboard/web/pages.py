@@ -120,7 +120,7 @@ async def _form(request: Request) -> dict[str, str]:
     return {name: values[0] for name, values in fields.items()}
 
 
-async def _signed_form(request: Request) -> tuple[Asker, dict[str, str]]:
+async def signed_form(request: Request) -> tuple[Asker, dict[str, str]]:
     """A form of a signed-in user; HTTP 401 and 403 when it is not."""
     who, fields = asker(request), await _form(request)
     if not same_token(fields.get("csrf", ""), who.session.csrf):
@@ -162,7 +162,10 @@ def _enter(request: Request, token: str, wanted: str = "/") -> RedirectResponse:
 
 
 @routes.get("/")
-def main_page(request: Request, who: SignedIn) -> HTMLResponse:
+def main_page(request: Request, who: SignedIn) -> Response:
+    first = front_of(request).first_run
+    if first is not None and not first.over and who.role >= Role.admin:
+        return RedirectResponse("/setup", 303)
     return render(request, "main.html", who, view=front_of(request).views.of(who.name))
 
 
@@ -235,7 +238,7 @@ async def link(request: Request) -> Response:
 
 @routes.post("/logout")
 async def logout(request: Request) -> Response:
-    await _signed_form(request)
+    await signed_form(request)
     front = front_of(request)
     front.gate.sign_out(request)
     answer = RedirectResponse("/login", 303)
@@ -290,7 +293,7 @@ def _users(request: Request, who: Asker, fault: str = "", status: int = 200) -> 
 @routes.post("/users")
 async def change_users(request: Request) -> Response:
     """Add a user, change his role and password, or (field `remove`) remove him."""
-    who, fields = await _signed_form(request)
+    who, fields = await signed_form(request)
     check_role(who, Role.admin, request)
     settings, name = front_of(request).settings, fields.get("name", "")
     try:
