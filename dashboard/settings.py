@@ -3,7 +3,9 @@
 import ipaddress
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, field_validator
+
+from messages.setting import setting
 
 
 class DashboardSettings(BaseModel):
@@ -13,64 +15,79 @@ class DashboardSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    host: str = "127.0.0.1"  # address the one exposed port listens on; 0.0.0.0 for all
-    port: int = Field(
-        default=8080, ge=1, le=65535
-    )  # if it is taken, the dashboard says so and stops
-    viser_port: int = Field(
-        default=0, ge=0, le=65535
-    )  # of the scene, on the loopback only; 0 takes any free one
-    users: Path = Path(
-        "state/users.json"
-    )  # `gyrofree users add` writes it; sign-ins and links live beside it
-    sessions_root: Path = Path(
-        "sessions-data"
-    )  # folder of the recorded sessions, the one of [recorder] root
-    demo: bool = False  # says so on the pages; the demo's link signs in without a password
+    host: str = setting(
+        "127.0.0.1", "address that the one exposed port listens on; 0.0.0.0 for all", shown=True
+    )
+    port: int = setting(
+        8080, "if it is taken, the dashboard says so and stops", shown=True, ge=1, le=65535
+    )
+    viser_port: int = setting(
+        0, "of the scene, on the loopback only; 0 takes any free one", ge=0, le=65535
+    )
+    users: Path = setting(
+        Path("var/state/users.json"),
+        "who may sign in: `gyrofree users add NAME --role operator`; sign-ins lie beside it",
+        shown=True,
+    )
+    sessions_root: Path = setting(
+        Path("var/sessions"),
+        "folder of the recorded sessions, the one of `[recorder] root`",
+        shown=True,
+    )
+    demo: bool = setting(False, "says so on the pages; the demo's link signs in without a password")
 
-    allowed_hosts: list[str] = Field(
-        default_factory=list
-    )  # names besides localhost that people type to get here
-    secure_cookies: bool = False  # true behind TLS: __Host- cookie, Secure, HSTS
-    trusted_proxies: list[str] = Field(
-        default_factory=list
-    )  # addresses whose X-Forwarded-For is believed
+    allowed_hosts: list[str] = setting([], "names besides localhost that people type to get here")
+    secure_cookies: bool = setting(False, "true behind TLS: `__Host-` cookie, Secure, HSTS")
+    trusted_proxies: list[str] = setting([], "addresses whose X-Forwarded-For is believed")
 
-    session_hours: float = Field(default=12.0, gt=0, le=720)  # h, longest sign-in
-    idle_hours: float = Field(default=2.0, gt=0, le=720)  # h, a sign-in unused for this long ends
-    link_minutes: float = Field(default=15.0, gt=0, le=1440)  # min, life of a one-time sign-in link
-    free_attempts: int = Field(
-        default=3, ge=1, le=100
-    )  # wrong passwords of one address before it has to wait
-    longest_wait_s: float = Field(
-        default=300.0, gt=0, le=86400
-    )  # s, of the doubling wait after them
+    session_hours: float = setting(12.0, "longest sign-in", unit="h", gt=0, le=720)
+    idle_hours: float = setting(2.0, "a sign-in unused for so long ends", unit="h", gt=0, le=720)
+    link_minutes: float = setting(
+        15.0, "life of a one-time sign-in link", unit="min", gt=0, le=1440
+    )
+    free_attempts: int = setting(
+        3, "wrong passwords of one address before it has to wait", ge=1, le=100
+    )
+    longest_wait_s: float = setting(
+        300.0, "longest of the doubling waits after them", unit="s", gt=0, le=86400
+    )
 
-    devices: int = Field(default=64, ge=1, le=1000)  # shown; a silent one makes room for another
-    history_bytes: int = Field(
-        default=1 << 30, ge=1 << 24
-    )  # memory for what the charts show; when it is full they reach back less far
+    devices: int = setting(64, "shown; a silent one makes room for another", ge=1, le=1000)
+    history_bytes: int = setting(
+        1 << 30,
+        "memory for what the charts show; when it is full they reach back less far",
+        unit="bytes",
+        ge=1 << 24,
+    )
 
-    connections: int = Field(default=800, ge=16, le=100_000)  # at a time; see web/connections.py
-    connections_per_address: int = Field(default=100, ge=8, le=100_000)  # of them; not of proxies
-    request_s: float = Field(default=10.0, gt=0, le=300)  # s, to ask for something, or it is ended
-    take_s: float = Field(default=60.0, gt=0, le=3600)  # s, a client that takes nothing is dropped
-    scenes_per_user: int = Field(default=12, ge=1, le=1000)  # open scenes, that is tabs
-    scenes: int = Field(default=64, ge=1, le=10_000)  # of all users
-    body_limit: int = Field(default=65536, ge=1024, le=10_000_000)  # bytes of one request's body
-    body_timeout_s: float = Field(default=10.0, gt=0, le=300)  # s, to receive that body
-    message_limit: int = Field(
-        default=65536, ge=1024, le=10_000_000
-    )  # bytes of one message from a browser's scene
-    message_rate: float = Field(
-        default=300.0, gt=0, le=10_000
-    )  # 1/s, messages of one browser; more closes it
-    stall_s: float = Field(
-        default=10.0, gt=0, le=300
-    )  # s, a browser that takes nothing for so long is dropped
-    stale_s: float = Field(
-        default=3.0, gt=0, le=300
-    )  # s, a device silent for so long is shown as stale
+    connections: int = setting(800, "open at a time, of all addresses", ge=16, le=100_000)
+    connections_per_address: int = setting(
+        100, "of them from one address, which is no trusted proxy", ge=8, le=100_000
+    )
+    request_s: float = setting(
+        10.0, "to ask for something, or the connection is ended", unit="s", gt=0, le=300
+    )
+    take_s: float = setting(
+        60.0, "a client that takes nothing for so long is dropped", unit="s", gt=0, le=3600
+    )
+    scenes_per_user: int = setting(12, "open scenes of a user, that is tabs", ge=1, le=1000)
+    scenes: int = setting(64, "open scenes of all users", ge=1, le=10_000)
+    body_limit: int = setting(
+        65536, "largest body of a request", unit="bytes", ge=1024, le=10_000_000
+    )
+    body_timeout_s: float = setting(10.0, "to receive that body", unit="s", gt=0, le=300)
+    message_limit: int = setting(
+        65536, "largest message from a browser's scene", unit="bytes", ge=1024, le=10_000_000
+    )
+    message_rate: float = setting(
+        300.0, "messages of one browser; more closes it", unit="1/s", gt=0, le=10_000
+    )
+    stall_s: float = setting(
+        10.0, "a browser's scene that takes nothing for so long is dropped", unit="s", gt=0, le=300
+    )
+    stale_s: float = setting(
+        3.0, "a device silent for so long is shown as stale", unit="s", gt=0, le=300
+    )
 
     @field_validator("allowed_hosts")
     @classmethod

@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 import inertial
 from inertial.rate.names import USUAL
+from messages.setting import setting
 
 KINDS = sorted(file.stem for file in (Path(inertial.__file__).parent / "layouts").glob("*.toml"))
 Metres = Annotated[float, Field(ge=-1000.0, le=1000.0)]
@@ -17,11 +18,21 @@ class LayoutSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    # a file of inertial/layouts by name: cube, chen-6, nine, edges-12, stars-12, array-24
-    kind: str = "cube"
-    half_side_m: float = Field(default=0.05, gt=0.0, le=10.0)  # m, from the cube's centre to a face
-    file: str = (
-        ""  # the user's own layout instead, a TOML file (docs/layouts.md); its sizes are its own
+    kind: str = setting(
+        "cube",
+        f"a layout by name: {', '.join(KINDS)} (docs/layouts.md)",
+        shown=True,
+    )
+    half_side_m: float = setting(
+        0.05,
+        "from the cube's centre to a face, on which the accelerometers sit",
+        unit="m",
+        shown=True,
+        gt=0.0,
+        le=10.0,
+    )
+    file: str = setting(
+        "", "your own layout instead, a TOML file (docs/layouts.md); its sizes are its own"
     )
 
     @field_validator("kind")
@@ -39,15 +50,19 @@ class VehicleSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    lever_arm_b_m: tuple[Metres, Metres, Metres] = (
-        0.0,
-        0.0,
-        0.0,
-    )  # m, from IMU to antenna: forward, right, down
-    # m/s, above which the course is taken as the heading; what never gets there is aligned by what
-    # its accelerometers feel
-    align_speed_mps: float = Field(default=4.0, ge=0.5, le=100.0)
-    align_standstill_s: float = Field(default=10.0, ge=1.0, le=600.0)  # s of rest that level it
+    lever_arm_b_m: tuple[Metres, Metres, Metres] = setting(
+        (0.0, 0.0, 0.0), "from IMU to antenna: forward, right, down", unit="m"
+    )
+    align_speed_mps: float = setting(
+        4.0,
+        "above it the course is the heading; slower vehicles are aligned by what they feel",
+        unit="m/s",
+        ge=0.5,
+        le=100.0,
+    )
+    align_standstill_s: float = setting(
+        10.0, "rest that levels the unit", unit="s", ge=1.0, le=600.0
+    )
 
 
 class EstimatorSettings(BaseModel):
@@ -55,55 +70,78 @@ class EstimatorSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    rate: list[str] = Field(default_factory=lambda: list(USUAL))  # gyro-free rate estimators
-    navigators: list[str] = Field(
-        default_factory=lambda: ["huber-nhc", "kf", "fpe-fuzzy"]
-    )  # the first leads
-    gyro_free_navigation: list[str] = Field(
-        default_factory=list
-    )  # filters on a cube's own rate, where it has GNSS
-    gyro_free_rate: str = ""  # the rate estimator whose word they take; empty: the first of rate
-    attitudes: list[str] = Field(
-        default_factory=lambda: ["vqf", "tilt-vector", "tilt-published"]
-    )  # tilt of six axes
-    layout: LayoutSettings = LayoutSettings()  # of a device that layouts does not name
-    layouts: dict[str, LayoutSettings] = Field(default_factory=dict)  # by device name
-    tacho_aid: bool = (
-        False  # correct the rate by the tachometer: then it cannot be scored against it any more
+    rate: list[str] = setting(
+        list(USUAL), "gyro-free rate estimators; the first is the first to be published", shown=True
     )
-    tacho_axis_b: tuple[float, float, float] = (
-        0.0,
-        0.0,
-        1.0,
-    )  # the axis in b that the tachometer's rate is about
-    latitude_deg: float | None = Field(
-        default=None, ge=-90.0, le=90.0
-    )  # given: a standing body turns with the Earth
-    calibration: Path | None = None  # calibration file of a device that calibrations does not name
-    calibrations: dict[str, Path] = Field(default_factory=dict)  # calibration files by device name
-    cards: Path = Path("var/cards")  # folder that a guided calibration saves its cards to
-    axes: Path = Path("var/axes")  # folder that a guided detection saves its axis maps to
-    axis_maps: dict[str, Path] = Field(default_factory=dict)  # axis maps in use, by device name
-    vehicle: VehicleSettings = VehicleSettings()  # of a device that vehicles does not name
-    vehicles: dict[str, VehicleSettings] = Field(default_factory=dict)  # by device name
-    use_every_fix: int = Field(
-        default=1, ge=1, le=1000
-    )  # n: filters get one fix in n, the others only score them
-    max_devices: int = Field(
-        default=256, ge=1, le=4096
-    )  # those that come first; messages of more are counted as refused
-    journal: Path | None = (
-        None  # folder: what is published, and the state to go on with after a crash
+    navigators: list[str] = setting(
+        ["huber-nhc", "kf", "fpe-fuzzy"],
+        "of boards with gyroscopes; the first leads (docs/navigation.md compares them)",
+        shown=True,
     )
-    journal_bytes: int = Field(default=1 << 30, ge=1 << 20)  # bytes kept, the oldest go first ...
-    journal_age_s: float = Field(default=7200.0, ge=60.0)  # ... and s
-    rate_limit_hz: float = Field(
-        default=200.0, gt=0.0, le=1000.0
-    )  # Hz, at most, of each rate/<estimator>
-    attitude_limit_hz: float = Field(
-        default=50.0, gt=0.0, le=1000.0
-    )  # Hz, at most, of each attitude/<estimator>
-    nav_limit_hz: float = Field(default=20.0, gt=0.0, le=200.0)  # Hz, at most, of nav and pose
+    gyro_free_navigation: list[str] = setting(
+        [], "filters on a cube's own rate, where it has GNSS (docs/gyro-free-navigation.md)"
+    )
+    gyro_free_rate: str = setting("", "rate estimator whose word they take; empty: first of `rate`")
+    attitudes: list[str] = setting(
+        ["vqf", "tilt-vector", "tilt-published"], "tilt filters of boards with gyroscopes"
+    )
+    layout: LayoutSettings = setting(
+        LayoutSettings(), "accelerometers of a device that `layouts` does not name"
+    )
+    layouts: dict[str, LayoutSettings] = setting({}, "layouts by device name")
+    tacho_aid: bool = setting(
+        False,
+        "correct the rate by the tachometer: then it cannot be scored against it any more",
+    )
+    tacho_axis_b: tuple[float, float, float] = setting(
+        (0.0, 0.0, 1.0), "axis in the body's frame that the tachometer's rate is about"
+    )
+    latitude_deg: float | None = setting(
+        None, "given: a standing body turns with the Earth", unit="deg", ge=-90.0, le=90.0
+    )
+    calibration: Path | None = setting(
+        None, "calibration file of a device that `calibrations` does not name"
+    )
+    calibrations: dict[str, Path] = setting({}, "calibration files by device name")
+    cards: Path = setting(
+        Path("var/cards"), "folder that a guided calibration saves its calibration files to"
+    )
+    axes: Path = setting(Path("var/axes"), "folder that a guided detection saves its axis maps to")
+    axis_maps: dict[str, Path] = setting({}, "axis maps in use, by device name")
+    vehicle: VehicleSettings = setting(
+        VehicleSettings(), "vehicle of a device that `vehicles` does not name"
+    )
+    vehicles: dict[str, VehicleSettings] = setting({}, "vehicles by device name")
+    use_every_fix: int = setting(
+        1, "n: filters get one fix in n, the others only score them", ge=1, le=1000
+    )
+    max_devices: int = setting(
+        256, "those that come first; messages of more are counted as refused", ge=1, le=4096
+    )
+    journal: Path | None = setting(
+        Path("var/estimates"),
+        "folder: what is published, for who misses some, and the state to go on with after a"
+        ' crash; "" keeps neither',
+        shown=True,
+    )
+    journal_bytes: int = setting(
+        1 << 30, "kept there, the oldest go first", unit="bytes", ge=1 << 20
+    )
+    journal_age_s: float = setting(
+        7200.0, "what is published is kept there no longer", unit="s", ge=60.0
+    )
+    rate_limit_hz: float = setting(
+        200.0, "at most, of each rate/<estimator>", unit="Hz", gt=0.0, le=1000.0
+    )
+    attitude_limit_hz: float = setting(
+        50.0, "at most, of each attitude/<estimator>", unit="Hz", gt=0.0, le=1000.0
+    )
+    nav_limit_hz: float = setting(20.0, "at most, of nav and pose", unit="Hz", gt=0.0, le=200.0)
+
+    @field_validator("journal", mode="before")
+    @classmethod
+    def _none(cls, value: object) -> object:
+        return None if value == "" else value
 
     @property
     def believed_rate(self) -> str:

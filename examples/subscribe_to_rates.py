@@ -80,7 +80,7 @@ def main(router: str = "") -> dict[str, np.ndarray]:
         probe.bind(("127.0.0.1", 0))
         address = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     bus = BusSettings(router=address, listen=[address])
-    settings = EstimatorSettings(navigators=[])
+    settings = EstimatorSettings(navigators=[], journal=None)
     with open_router(bus):
         estimator = threading.Thread(target=service.run, args=(settings, bus, stop))
         estimator.start()

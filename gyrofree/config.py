@@ -10,13 +10,14 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from dashboard.settings import DashboardSettings
 from estimator.settings import EstimatorSettings
 from gateway.settings import GatewaySettings
 from inertial.toml_file import parsed, text_of
 from messages.bus.session import BusSettings
+from messages.setting import setting
 from sessions.procedure.settings import ProcedureSettings
 from sessions.recording.settings import RecorderSettings
 
@@ -32,12 +33,14 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    bus: BusSettings = Field(default_factory=BusSettings)
-    gateway: GatewaySettings = Field(default_factory=GatewaySettings)
-    estimator: EstimatorSettings = Field(default_factory=EstimatorSettings)
-    recorder: RecorderSettings = Field(default_factory=RecorderSettings)
-    procedures: ProcedureSettings = Field(default_factory=ProcedureSettings)
-    dashboard: DashboardSettings = Field(default_factory=DashboardSettings)
+    bus: BusSettings = setting(BusSettings(), "The bus between the processes")
+    gateway: GatewaySettings = setting(GatewaySettings(), "The boards and the journal of each")
+    estimator: EstimatorSettings = setting(EstimatorSettings(), "Samples become motion")
+    recorder: RecorderSettings = setting(RecorderSettings(), "What crossed the bus, kept")
+    procedures: ProcedureSettings = setting(
+        ProcedureSettings(), "Where runs of procedures are kept, and what they drive"
+    )
+    dashboard: DashboardSettings = setting(DashboardSettings(), "The page in the browser")
 
 
 def load(path: Path) -> Settings:

@@ -21,7 +21,7 @@ TRACK_S = 0.2  # trajectories grow five times a second
 # a replay that begins this near to the opening of a page was asked for by the person at it
 ASKED_FOR_S = 60.0
 ASK, ROLE = "Show", "Role"  # labels of what the page and the relay write into
-VIEWER = "viewer"
+VIEWER, OPERATORS = "viewer", ("operator", "admin")  # what the relay says
 FIRST = {"nav": "position", "attitude": "tilt", "rate": "rates"}  # page, by what moves a body
 # Labels of the inputs that change this browser's own view only; anybody may use them, and an order
 # may not have a label that stands here.
@@ -192,7 +192,8 @@ class View:
             for what in wish.do:
                 if what == "camera":
                     self._reset_camera()
-                self._timeline.do(what)
+                if self._role.value in OPERATORS:  # an order, by an input that is anybody's
+                    self._timeline.do(what)
             self._say_state(self._device())
 
     def _turn_to(self, wish: Wish) -> None:
@@ -236,8 +237,9 @@ class View:
         """A viewer sees the orders, and that and why they are not his."""
         with self._lock:
             barred = self._role.value == VIEWER
+            self._timeline.bar(barred)
             for handle in self.orders:
-                if handle is not self._role:
+                if handle is not self._role and not isinstance(handle, viser.GuiButtonGroupHandle):
                     handle.disabled = barred
             self._say_rights()
 

@@ -12,6 +12,7 @@ from dashboard.desk import Desk
 from dashboard.settings import DashboardSettings
 from dashboard.web.auth import Gate, Role, SignIn, User, WaitError, same_token
 from dashboard.web.control import Replay
+from dashboard.web.first.control import FirstRun
 from dashboard.web.jobs import Jobs
 from dashboard.web.readings import Readings
 from dashboard.web.uploads import Uploads
@@ -35,6 +36,7 @@ class Front:
     desk: Desk | None = None
     replay: Replay | None = None
     jobs: Jobs | None = None
+    first_run: FirstRun | None = None  # while there is no board, and where one can be configured
     readings: Readings = field(default_factory=Readings)
     uploads: Uploads = field(default_factory=Uploads)
     open_labels: Collection[str] = ()  # of the scene's inputs that concern nobody else

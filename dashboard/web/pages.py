@@ -162,7 +162,10 @@ def _enter(request: Request, token: str, wanted: str = "/") -> RedirectResponse:
 
 
 @routes.get("/")
-def main_page(request: Request, who: SignedIn) -> HTMLResponse:
+def main_page(request: Request, who: SignedIn) -> Response:
+    first = front_of(request).first_run
+    if first is not None and not first.over and who.role >= Role.admin:
+        return RedirectResponse("/setup", 303)
     return render(request, "main.html", who, view=front_of(request).views.of(who.name))
 
 

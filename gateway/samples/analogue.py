@@ -9,10 +9,11 @@ RateAyz is the rate about +x_b.
 
 import math
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 
 from firmware_protocol.frames import Adc
 from inertial.constants import GRAVITY
+from messages.setting import setting
 
 
 class AnalogueChannel(BaseModel):
@@ -20,8 +21,8 @@ class AnalogueChannel(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    channel: int = Field(ge=0, le=7)
-    invert: bool = False
+    channel: int = setting(..., "input of the converter", ge=0, le=7)
+    invert: bool = setting(False, "the output falls where the quantity rises")
 
 
 class AnalogueSettings(BaseModel):
@@ -33,25 +34,27 @@ class AnalogueSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    bits: int = Field(
-        default=12, ge=8, le=16
-    )  # of the converter: full scale, the frame's reference, is 2^bits - 1
-    accel_x: AnalogueChannel = AnalogueChannel(channel=0)
-    accel_y: AnalogueChannel = AnalogueChannel(channel=1)
-    accel_z: AnalogueChannel = AnalogueChannel(channel=2)
-    gyro_xz: AnalogueChannel = AnalogueChannel(
-        channel=3, invert=True
-    )  # pin GX4: rate of the angle in the xz plane
-    gyro_yz: AnalogueChannel = AnalogueChannel(
-        channel=4, invert=True
-    )  # pin GY4: rate of the angle in the yz plane
-    gyro_z: AnalogueChannel | None = None  # about +z_b; boards with five axes have none, and read 0
-    zero_g_v: float = Field(default=1.65, ge=0.0, le=10.0)  # V at 0 g
-    accel_v_per_g: float = Field(default=0.4785, gt=0.0, le=10.0)  # V per g
-    zero_rate_v: float = Field(default=1.23, ge=0.0, le=10.0)  # V at rest
-    gyro_v_per_dps: float = Field(
-        default=0.002, gt=0.0, le=1.0
-    )  # V per deg/s, as data sheets give it
+    bits: int = setting(
+        12, "of the converter: full scale, the frame's reference, is 2^bits - 1", ge=8, le=16
+    )
+    accel_x: AnalogueChannel = setting(AnalogueChannel(channel=0), "accelerometer, x")
+    accel_y: AnalogueChannel = setting(AnalogueChannel(channel=1), "accelerometer, y")
+    accel_z: AnalogueChannel = setting(AnalogueChannel(channel=2), "accelerometer, z")
+    gyro_xz: AnalogueChannel = setting(
+        AnalogueChannel(channel=3, invert=True), "pin GX4: rate of the angle in the xz plane"
+    )
+    gyro_yz: AnalogueChannel = setting(
+        AnalogueChannel(channel=4, invert=True), "pin GY4: rate of the angle in the yz plane"
+    )
+    gyro_z: AnalogueChannel | None = setting(
+        None, "rate about z of the body; boards with five axes have none, and read 0"
+    )
+    zero_g_v: float = setting(1.65, "output at 0 g", unit="V", ge=0.0, le=10.0)
+    accel_v_per_g: float = setting(0.4785, "of the accelerometers", unit="V/g", gt=0.0, le=10.0)
+    zero_rate_v: float = setting(1.23, "output at rest", unit="V", ge=0.0, le=10.0)
+    gyro_v_per_dps: float = setting(
+        0.002, "of the gyroscopes, as data sheets give it", unit="V/(deg/s)", gt=0.0, le=1.0
+    )
 
     def needed(self) -> set[int]:
         """Inputs that a frame must hold."""

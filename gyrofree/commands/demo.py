@@ -143,5 +143,6 @@ def play(
             bus_port,
             time_scale=speed,
             once=not loop,
+            command="play",
         )
     )

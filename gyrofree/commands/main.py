@@ -9,7 +9,11 @@ from gyrofree.commands import calibrate, handover, layout, procedure, sessions, 
 from gyrofree.commands import run as logs
 from gyrofree.commands.board import board
 from gyrofree.commands.demo import demo, play
-from gyrofree.commands.doctor import doctor
+from gyrofree.commands.installation import config
+from gyrofree.commands.installation.completion import answer_the_shell, completion
+from gyrofree.commands.installation.doctor import doctor
+from gyrofree.commands.installation.setup import setup
+from gyrofree.commands.installation.up import up
 from gyrofree.commands.options import say
 from gyrofree.commands.replay import replay
 from gyrofree.commands.services import (
@@ -34,6 +38,7 @@ app = typer.Typer(
 )
 
 app.add_typer(users.app, name="users")
+app.add_typer(config.app, name="config")
 app.add_typer(layout.app, name="layout")
 app.add_typer(sessions.app, name="sessions")
 app.add_typer(procedure.app, name="procedure")
@@ -44,6 +49,8 @@ for command in (
     logs.run,
     board,
     demo,
+    setup,
+    up,
     router,
     gateway,
     estimator,
@@ -54,6 +61,7 @@ for command in (
     play,
     replay,
     doctor,
+    completion,
 ):
     app.command()(command)
 
@@ -76,4 +84,5 @@ def _root(
 
 def main() -> None:
     """Entry point of `gyrofree`."""
+    answer_the_shell()
     app()

@@ -6,20 +6,17 @@ process can also be started by hand.
 """
 
 import secrets
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from dashboard.web.users import add_user, issue_link_token
 from gyrofree.config import Settings, load
-from gyrofree.running.doctor import health, port_taken
-from gyrofree.running.process import EXIT_FAILED, EXIT_TAKEN, fail, start_logging, stop_on_signals
+from gyrofree.running.doctor import port_taken
+from gyrofree.running.process import EXIT_TAKEN, fail, start_logging, stop_on_signals
 from gyrofree.running.supervisor import Supervisor
+from gyrofree.running.watch import SERVICES, Watch
 from sessions.library.catalogue import Catalogue
 
-TICK = 0.1  # s between two looks at the children
-DRAIN = 3.0  # s that the last samples of a played log have to reach the recording
-WAIT_FOR_PAGE = 60.0  # s; a cold compile cache needs most of it
 USER = "demo"
 
 
@@ -38,6 +35,7 @@ class Plan:
     time_scale: float = 1.0  # seconds of the log per second
     estimator: str = ""  # further lines of [estimator]
     once: bool = False  # the board is a log that is played to its end
+    command: str = "demo"  # what the person called
     table: bool = False  # the board stands on a table that takes orders
 
 
@@ -59,7 +57,7 @@ def write_configuration(plan: Plan) -> Path:
     path = plan.folder / "gyrofree.toml"
     plan.folder.mkdir(parents=True, exist_ok=True)
     path.write_text(
-        f"""# Written by `gyrofree demo`.
+        f"""# Written by `gyrofree {plan.command}`.
 # Start any of its services by hand with --config on this file.
 [bus]
 router = "tcp/127.0.0.1:{plan.bus_port}"
@@ -127,28 +125,7 @@ def run(plan: Plan) -> None:
     supervisor = _supervise(plan, config)
     url = _sign_in_link(settings)
     supervisor.say(f"starting; configuration and data in {plan.folder}")
-    supervisor.start()
-    said, deadline = False, time.monotonic() + WAIT_FOR_PAGE
-    try:
-        while not stop.wait(TICK) and supervisor.fatal is None and not supervisor.done:
-            supervisor.step()
-            if not said and health("dashboard", settings).state == "ok":
-                said = True
-                supervisor.say(f"open  {url}", "bold green")
-            elif not said and time.monotonic() > deadline:
-                raise fail(
-                    f"the dashboard does not answer after {WAIT_FOR_PAGE:g} s; the log above"
-                    " says why"
-                )
-        if supervisor.done:
-            supervisor.say("the log has been played to its end")
-            stop.wait(DRAIN)
-    finally:
-        supervisor.say("stopping")
-        clean = supervisor.stop()
-        supervisor.say("stopped cleanly" if clean else "stopped; a process had to be killed")
-    if supervisor.fatal is not None:
-        raise fail(f"{supervisor.fatal.name} could not go on", EXIT_FAILED)
+    Watch(supervisor, settings, [(f"open  {url}", "bold green")]).run(stop)
     if supervisor.done:
         print(_summary(settings, plan))
 
@@ -165,8 +142,8 @@ def _summary(settings: Settings, plan: Plan) -> str:
 
 
 def _supervise(plan: Plan, config: Path) -> Supervisor:
-    supervisor = Supervisor()
-    for service in ("router", "gateway", "estimator", "record", "procedures", "dashboard"):
+    supervisor = Supervisor(name=plan.command)
+    for service in SERVICES:
         supervisor.add(service, service, "--config", str(config))
     # The board comes last: estimators that see its first standstill know its heading and biases
     # from the start.

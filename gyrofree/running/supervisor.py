@@ -59,10 +59,13 @@ def _die_with_parent() -> None:
 class Supervisor:
     """Starts children in order, keeps them alive, stops them in reverse order."""
 
-    def __init__(self, console: Console | None = None) -> None:
+    def __init__(self, console: Console | None = None, name: str = "gyrofree") -> None:
+        """name: of the command, before the supervisor's own lines."""
+        self.name = name
         self.console = console or Console(stderr=True, highlight=False)
         self.children: list[Child] = []
         self.fatal: Child | None = None
+        self.fatal_code = 0  # its exit code
         self.done = False  # a child that runs once has done its work
         self._stopping = False
 
@@ -83,7 +86,7 @@ class Supervisor:
 
     def say(self, text: str, style: str = "bold") -> None:
         """A line of the supervisor's own."""
-        self._print("demo", "bold white", text, style)
+        self._print(self.name, "bold white", text, style)
 
     def start(self) -> None:
         """Start every child."""
@@ -102,6 +105,12 @@ class Supervisor:
                     self._spawn(child)
             elif child.process.poll() is not None:
                 self._ended(child, child.process.returncode, now)
+
+    def restart(self, *names: str) -> None:
+        """Have these children end in order; `step` starts them again."""
+        for child in self.children:
+            if child.name in names and child.process and child.process.poll() is None:
+                child.process.terminate()
 
     def stop(self) -> bool:
         """SIGTERM in reverse order, SIGKILL after PATIENCE; True when all ended by themselves."""
@@ -157,7 +166,7 @@ class Supervisor:
             self.done = True
             return
         if child.once or code in (EXIT_CONFIG, EXIT_TAKEN):
-            self.fatal = child
+            self.fatal, self.fatal_code = child, code
             self.say(
                 f"{child.name} ended {how} and cannot go on: its line above says why", "bold red"
             )

@@ -15,13 +15,14 @@ from typing import TypeVar
 
 import zenoh
 from google.protobuf.message import Message
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 
 from messages.bus.fencing import packed
 from messages.contract.door import read
 from messages.contract.names import Name
 from messages.contract.topics import REPLAY_SUFFIX, Topic
 from messages.history.spool import Spool
+from messages.setting import setting
 
 CLOSING_S = 5.0
 
@@ -31,21 +32,26 @@ M = TypeVar("M", bound=Message)
 
 
 class BusSettings(BaseModel):
-    """[bus] of gyrofree.toml."""
+    """[bus]: how the processes find one another."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    prefix: Name = (
-        "gyrofree"  # first part of every key; two installations on one router differ in it
+    prefix: Name = setting(
+        "gyrofree",
+        "first part of every bus key; two installations on one router differ in it",
+        shown=True,
     )
-    router: str = "tcp/127.0.0.1:7447"  # endpoint of the router that clients connect to
-    listen: list[str] = Field(
-        default_factory=lambda: ["tcp/127.0.0.1:7447"]
-    )  # endpoints the router listens on
-    # A peer that shows no life for so long is cut off. 2 s noticed a frozen process sooner, but on
-    # a machine busy with drawing in software it also cut off live ones, and lost 3 % of all
-    # messages.
-    lease_ms: int = Field(default=10_000, ge=200, le=60_000)
+    router: str = setting("tcp/127.0.0.1:7447", "where all processes find the router", shown=True)
+    listen: list[str] = setting(
+        ["tcp/127.0.0.1:7447"],
+        "where the router listens; beyond loopback read docs/deployment.md first",
+        shown=True,
+    )
+    # 2 s noticed a frozen process sooner, but on a machine busy with drawing in software it also
+    # cut off live ones, and lost 3 % of all messages.
+    lease_ms: int = setting(
+        10_000, "a peer that shows no life for so long is cut off", unit="ms", ge=200, le=60_000
+    )
 
 
 def _config(settings: BusSettings, mode: str) -> zenoh.Config:

@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 
 from messages.contract.names import Name
+from messages.setting import setting
 
 
 class TableSettings(BaseModel):
@@ -12,9 +13,11 @@ class TableSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    device: Name  # the board that stands on it
-    port: str = Field(min_length=1)  # serial port by its by-id name, or tcp://host:port
-    description: str = "simulated"  # TOML file of its text commands, or the name of a shipped one
+    device: Name = setting(..., "the board that stands on it")
+    port: str = setting(..., "serial port by its by-id name, or `tcp://host:port`", min_length=1)
+    description: str = setting(
+        "simulated", "TOML file of its text commands, or the name of a shipped one"
+    )
 
 
 class ProcedureSettings(BaseModel):
@@ -22,7 +25,12 @@ class ProcedureSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    root: Path = Path("var/procedures")  # what happened in each run; made when absent
-    # procedures of this installation, as FILE.toml; they go before shipped ones of the same name
-    folder: Path = Path("procedures")
-    tables: list[TableSettings] = []
+    root: Path = setting(
+        Path("var/procedures"), "what happened in each run; made when absent", shown=True
+    )
+    folder: Path = setting(
+        Path("procedures"),
+        "procedures of this installation, as FILE.toml; they go before shipped ones of the same"
+        " name",
+    )
+    tables: list[TableSettings] = setting([], "tables that are driven, a block for each")

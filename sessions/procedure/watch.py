@@ -102,8 +102,8 @@ class Watch:
                 self.evidence.add_pulse(seen)
             case Turned() if seen.epoch == self.epoch:
                 self.evidence.add_estimates(seen)
-            case Axes():
-                self.evidence.axes = seen
+            case Axes() if seen.epoch == self.epoch:
+                self.evidence.health.append(seen)
             case TableSays() if np.isfinite(self.now):
                 self.evidence.table = self.now, seen.omega
             case Line() if not seen.connected:
@@ -177,7 +177,7 @@ class Watch:
 
     def _fault(self, t: float, shaking: float | None) -> str:
         """Why the step cannot be measured at this moment; empty: it can."""
-        axes = self.evidence.axes
+        axes = self.evidence.axes(t)
         if axes is not None and axes.unfit:
             return "; ".join(text for _, text in axes.unfit)
         wrong = self._not_posed(t) if self.step.kind == "pose" else self._not_turning_so()

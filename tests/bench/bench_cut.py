@@ -87,7 +87,7 @@ def trial(cut_s: float, compressed: bool) -> dict:
     watched.set()
     with tempfile.TemporaryDirectory() as name, open_router(bus):
         cable, store = Cable(port), Store()
-        settings = RecorderSettings(root=Path(name) / "sessions")
+        settings = RecorderSettings(root=Path(name) / "sessions", auto_start=True)
         recording = threading.Thread(target=recorder.run, args=(settings, bus, stop))
         recording.start()
         listener = open_client(bus)

@@ -92,7 +92,7 @@ def recorder(count: int, folder: Path) -> None:
     from sessions.recording.recorder import Recorder
     from sessions.recording.settings import RecorderSettings
 
-    one = Recorder(RecorderSettings(root=folder), BusSettings(prefix="t"))
+    one = Recorder(RecorderSettings(root=folder, auto_start=True), BusSettings(prefix="t"))
     one.step()
 
     def take(n: int, item: tuple[str, bytes]) -> None:

@@ -40,7 +40,7 @@ from sessions.recording import service as recorder
 from sessions.recording.settings import RecorderSettings
 stop = stop_on_signals()
 bus = BusSettings(prefix="bench", router=sys.argv[2])
-recorder.run(RecorderSettings(root=Path(sys.argv[1])), bus, stop)
+recorder.run(RecorderSettings(root=Path(sys.argv[1]), auto_start=True), bus, stop)
 """
 
 

@@ -218,7 +218,7 @@ def test_service_over_the_bus(free_port: int) -> None:
 
     def work() -> None:
         try:
-            service.run(EstimatorSettings(navigators=["kf"]), bus, stop)
+            service.run(EstimatorSettings(navigators=["kf"], journal=None), bus, stop)
         except BaseException as error:
             failures.append(error)
 

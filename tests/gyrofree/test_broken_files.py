@@ -88,6 +88,7 @@ def no_services(monkeypatch):
         if hasattr(loaded, "run_service"):
             monkeypatch.setattr(loaded, "run_service", lambda body, verbose=False: None)
     monkeypatch.setattr("gyrofree.running.demo.run", lambda plan: None)
+    monkeypatch.setattr("gyrofree.running.up.run", lambda plan: None)
 
 
 def arguments(command, spoilt, value, seeds, place):
@@ -200,7 +201,14 @@ def test_what_is_kept_may_be_broken_too(name, seeds, tmp_path, no_services, monk
 
 def test_every_command_that_takes_a_file_is_tried():
     tried = {name for name, _ in pairs()}
-    assert set(COMMANDS) - tried <= {"layout optimise", "calibrate plan", "calibrate simulate"}
+    assert set(COMMANDS) - tried <= {
+        "layout optimise",
+        "calibrate plan",
+        "calibrate simulate",
+        "config default",
+        "config reference",
+        "completion",
+    }
 
 
 def test_a_sample_in_processes_of_their_own(seeds, tmp_path):

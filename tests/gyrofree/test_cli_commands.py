@@ -11,11 +11,24 @@ from estimator.settings import EstimatorSettings
 from gyrofree.commands.main import app
 from gyrofree.running.rerun_settings import with_changes
 
-SERVICES = {"demo", "router", "gateway", "estimator", "record", "dashboard", "simulate", "play"}
+SERVICES = {
+    "demo",
+    "up",
+    "router",
+    "gateway",
+    "estimator",
+    "record",
+    "dashboard",
+    "simulate",
+    "play",
+}
 ORDERS = {
     "users add",
     "users remove",
     "calibrate simulate",
+    "config default",
+    "config reference",
+    "completion",
 }  # they do something, and have no result to print
 
 

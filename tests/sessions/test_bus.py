@@ -70,7 +70,7 @@ def recording(bus, tmp_path):
     threads = []
 
     def begin(**fields):
-        settings = RecorderSettings(root=tmp_path / "root", **fields)
+        settings = RecorderSettings(root=tmp_path / "root", **{"auto_start": True} | fields)
         threads.append(
             threading.Thread(target=recorder.run, args=(settings, bus, stop, {"who": "test"}))
         )
@@ -238,7 +238,7 @@ from sessions.recording import service as recorder
 from sessions.recording.settings import RecorderSettings
 stop = stop_on_signals()
 bus = BusSettings(prefix="t", router=sys.argv[2])
-recorder.run(RecorderSettings(root=Path(sys.argv[1])), bus, stop)
+recorder.run(RecorderSettings(root=Path(sys.argv[1]), auto_start=True), bus, stop)
 """
 
 

@@ -32,7 +32,8 @@ from tests.support import hostile_bus
 def recorder(tmp_path):
     """Messages go into its inbox by `give`; `end` ends it and reads its file."""
     recorder = Recorder(
-        RecorderSettings(root=tmp_path / "root", max_devices=20), BusSettings(prefix="t")
+        RecorderSettings(root=tmp_path / "root", max_devices=20, auto_start=True),
+        BusSettings(prefix="t"),
     )
     recorder.step()
 

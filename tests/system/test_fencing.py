@@ -117,7 +117,7 @@ class Bench:
         self.heard: dict[str, dict[int, int]] = {}  # topic -> number of its publisher -> messages
         self._subscriber = self._session.declare_subscriber("t/**", self._on)
         self._stop = threading.Event()
-        settings = RecorderSettings(root=folder / "sessions")
+        settings = RecorderSettings(root=folder / "sessions", auto_start=True)
         self._recorder = threading.Thread(
             target=recorder.run, args=(settings, self.bus, self._stop)
         )

@@ -65,6 +65,7 @@ class Timeline:
         self._loop.on_click(lambda _: self._set_loop(self._loop.value))
         self._replay_inputs = (self._slider, self._buttons, self._speed, self._loop)
         self._showing: bool | None = None
+        self._barred = False
 
     @property
     def orders(self) -> tuple[Input, ...]:
@@ -77,10 +78,11 @@ class Timeline:
         running = replay.age(now) < STALE_S
         if self._showing != running:
             self._showing = running
-            for handle in self._replay_inputs:
-                handle.visible = running
+            self._show_inputs()
         live = EMPTY if self.short else self._live_html(now)
         content = self._replay_html(replay.status) if running else live
+        if running and self._barred:
+            content += note("Its controls take the role operator; you look as viewer.")
         content += self._marks_html()
         if self._state.content != content:
             self._state.content = str(content)
@@ -142,9 +144,19 @@ class Timeline:
 
     # --- what a person does
 
+    def bar(self, barred: bool) -> None:
+        """For a viewer: rows of buttons cannot be greyed, they go and the reason stands there."""
+        self._barred = barred
+        self._show_inputs()
+
+    def _show_inputs(self) -> None:
+        for handle in self._replay_inputs:
+            group = isinstance(handle, viser.GuiButtonGroupHandle)
+            handle.visible = bool(self._showing) and not (group and self._barred)
+
     def do(self, what: str) -> None:
         """What a key of the page asks: play (or pause), back or on by a step."""
-        if what in KEYS and not self._buttons.disabled:
+        if what in KEYS and not self._barred:
             self._press(KEYS[what])
 
     def _order(self, action: int, value: float = 0.0, until: float = 0.0) -> None:

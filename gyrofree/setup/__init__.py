@@ -1,0 +1,1 @@
+"""From the box to a configuration: what is attached, what is asked, what is written."""
