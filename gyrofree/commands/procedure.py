@@ -219,7 +219,7 @@ def compare(
     """One sheet for a batch of units: figures with two standard errors, and who is unlike the
     others.
     """
-    from gyrofree.running import procedure_sheet as sheet
+    from sessions.procedure import sheet
 
     settings = settings_of(config)
     try:
