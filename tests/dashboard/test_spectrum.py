@@ -1,11 +1,28 @@
 """The spectrum of a signal that is known, and that holes are no part of it."""
 
+import time
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+import viser
+from support.feeder import Feeder
 
-from dashboard.scene.panels.motion.spectrum import density, unbroken
+from dashboard.data.store import Store
+from dashboard.scene.panels import Snapshot
+from dashboard.scene.panels.motion.spectrum import Spectrum, density, unbroken
 
 PERIOD = 0.01
+
+
+class Direct:
+    """Puts straight into a store."""
+
+    def __init__(self, store: Store) -> None:
+        self.store = store
+
+    def put(self, topic, device, message, estimator="") -> None:
+        self.store.put(topic, device, estimator, message)
 
 
 def test_white_noise_has_its_density_and_a_tone_its_place():
@@ -27,3 +44,22 @@ def test_the_longest_stretch_without_a_hole_is_taken():
     found, period = unbroken(t[keep], y[keep])
     assert (found[0], found[-1]) == (301.0, 699.0) and period == pytest.approx(PERIOD)
     assert len(unbroken(t[:2], y[:2])[0]) == 0
+
+
+def test_the_page_draws_the_signal_that_is_chosen():
+    store = Store()
+    feeder = Feeder(Direct(store))
+    for k in range(600):
+        feeder.cube(k * 0.01)
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        folder = server.gui.add_folder("page")
+        page = Spectrum(SimpleNamespace(gui=server.gui), folder)
+        device = store.device("cube-01")
+        page.update(Snapshot(store, device, 0.0, device.t_newest, time.monotonic(), True))
+        assert {"psd"} <= set(page._plots)
+        assert "ωz · products filter" in page._choice.options
+        x, y = page._plots["psd"].data
+        assert len(x) == len(y) > 20 and (x > 0).all() and (y > 0).all()
+    finally:
+        server.stop()
