@@ -5,6 +5,7 @@
 # make firmware  the board's image and map into build/firmware, with its size
 # make fuzz   libFuzzer on the board's decoder and commands (SECONDS=60)
 # make wheel  dist/gyrofree-*.whl, which installs and runs where there is no compiler
+# make site   the documents as a site in build/site, links checked; make pictures takes its pictures anew
 # make bench  the figures of README and docs, one JSON line each
 PYTHON ?= python3
 SOURCE ?= table
@@ -18,7 +19,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 INSTALL := $(PIP) install --quiet --no-deps --require-hashes
 DRIVE := $(if $(DATA),--data "$(DATA)")
 
-.PHONY: demo test cases setup wheel dev system-packages bench docs messages lint firmware fuzz compose-test clean
+.PHONY: demo test cases setup wheel dev system-packages bench docs site pictures messages lint firmware fuzz compose-test clean
 
 # BOARD=emulated: the table is sensed by the firmware image in the emulator
 demo: setup $(if $(filter emulated,$(BOARD)),.make/board firmware)
@@ -80,7 +81,7 @@ system-packages:
 	@sh tests/support/system_packages.sh
 
 # The browser draws in software and wants the machine for itself, so it comes after the others.
-test: setup dev system-packages
+test: setup dev system-packages site
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "not browser"
 	$(BIN)/python -m pytest -m browser
 
@@ -105,6 +106,21 @@ docs: setup
 	$(BIN)/python -m firmware_protocol.document > docs/protocol.md
 	$(BIN)/python -m messages.contract.document > docs/topics.md
 	$(BIN)/gyrofree config reference > docs/configuration.md
+
+# Its packages want versions of their own, so they have an environment of their own.
+.make/site: requirements/site.txt | .make/venv
+	@echo "Installing what the site is built with ..."
+	@rm -rf .make/site && $(PYTHON) -m venv .make/site
+	@.make/site/bin/python -m pip --disable-pip-version-check install --quiet --no-deps --require-hashes -r requirements/site.txt
+	@touch $@
+
+site: .make/site
+	@NO_MKDOCS_2_WARNING=1 .make/site/bin/mkdocs build --quiet --strict
+	@echo "build/site/index.html"
+
+pictures: setup dev system-packages
+	$(BIN)/python docs/guide/draw.py docs/guide/pictures
+	$(BIN)/python tests/support/pictures.py docs/guide/pictures
 
 messages: dev
 	$(BIN)/python -m grpc_tools.protoc -Imessages/contract --python_out=messages/contract --pyi_out=messages/contract messages/contract/gyrofree.proto

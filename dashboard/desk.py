@@ -45,6 +45,10 @@ class Desk:
         """An order to a board, through its gateway."""
         return orders.give(self._session, self._prefix, orders.BOARD, command, device)
 
+    def procedure(self, command: pb.ProcedureCommand) -> pb.Reply:
+        """An order to the test of `command.device`."""
+        return orders.give(self._session, self._prefix, orders.PROCEDURES, command, command.device)
+
     def replay(self, command: pb.ReplayCommand) -> pb.ReplayStatus:
         """An order to the replay that runs."""
         return orders.give(self._session, self._prefix, orders.REPLAY, command)

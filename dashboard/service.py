@@ -18,6 +18,7 @@ from dashboard.web.app import create_app
 from dashboard.web.auth import Gate
 from dashboard.web.connections import Connections
 from dashboard.web.control import Replay
+from dashboard.web.first.control import FirstRun
 from dashboard.web.front import Front
 from dashboard.web.jobs import Jobs
 from dashboard.web.users import UserStore, load_users
@@ -111,11 +112,13 @@ def run(
     stop: threading.Event,
     replay: Replay | None = None,
     jobs: Jobs | None = None,
+    first_run: FirstRun | None = None,
 ) -> None:
     """The dashboard until `stop` is set.
 
     `replay` starts replays for the sessions page (control.ProcessReplay); without it the page has
-    no such button. `jobs` makes reports and exports in the background. Raises PortTaken when the
+    no such button. `jobs` makes reports and exports in the background; `first_run` asks an
+    administrator for the first board. Raises PortTaken when the
     port or viser's is in use, UsersError for a damaged users file, BusUnavailable when it is
     stopped before a router answers.
     """
@@ -151,6 +154,7 @@ def run(
                 desk=desk,
                 replay=replay,
                 jobs=jobs,
+                first_run=first_run,
                 open_labels=scene.OWN_INPUTS,
             )
             log.info("dashboard at %s", settings.url)

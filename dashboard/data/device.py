@@ -24,6 +24,7 @@ SLOW_STALE_S = {
     "status": 3.0,
     "estimator": 3.0,
     "board": 30.0,
+    "procedure": 5.0,
     "gnss": 2.5,
     "innovation": 10.0,
 }

@@ -2,6 +2,7 @@
 answered.
 """
 
+from collections import Counter
 from pathlib import Path
 
 from fastapi import FastAPI, Request
@@ -20,9 +21,11 @@ from dashboard.web import (
     session_api,
     session_pages,
 )
+from dashboard.web.first import pages as first_pages
 from dashboard.web.frame import proxy
 from dashboard.web.front import Front
 from dashboard.web.guard import Guard
+from dashboard.web.programs import live_api, users_page
 from dashboard.web.users import UsersError
 
 STATIC = Path(__file__).parent / "static"
@@ -34,17 +37,21 @@ def create_app(front: Front) -> ASGIApp:
         title="gyrofree", version=pages.version(), docs_url=None, redoc_url=None, openapi_url=None
     )
     app.state.front = front
+    app.state.listeners = Counter()  # user -> open streams
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
     app.include_router(
         proxy.router(front.settings, front.gate, front.scene_port, front.open_labels)
     )
     app.include_router(api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(desk_api.routes, responses={401: {"description": "not signed in"}})
+    app.include_router(live_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(intake_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(session_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(compare_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(pages.routes)
     app.include_router(session_pages.routes)
+    app.include_router(users_page.routes)
+    app.include_router(first_pages.routes)
     app.add_exception_handler(RequestValidationError, _not_valid)
     app.add_exception_handler(HTTPException, _refused)
     app.add_exception_handler(UsersError, _users_file)

@@ -19,6 +19,7 @@ from dataclasses import asdict, dataclass, field
 from starlette.requests import HTTPConnection
 
 from dashboard.settings import DashboardSettings
+from dashboard.web.programs.tokens import TokenStore
 from dashboard.web.users import (
     Role,
     User,
@@ -124,6 +125,7 @@ class Gate:
     ) -> None:
         """clock: s since 1970; None: by elapsed time, whatever is done to the wall clock."""
         self.settings, self.users = settings, users
+        self.tokens = TokenStore(settings.users, users.get)
         self._own = clock is None
         self._clock = clock or _elapsed()
         self.backoff = Backoff(settings.free_attempts, settings.longest_wait_s, self._clock)

@@ -1,6 +1,7 @@
 """What the pages and the REST interface share: the services behind them, and who is asking."""
 
 import logging
+import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 
@@ -9,8 +10,9 @@ from fastapi import HTTPException, Request
 from dashboard.data.store import Store
 from dashboard.desk import Desk
 from dashboard.settings import DashboardSettings
-from dashboard.web.auth import Gate, Role, SignIn, User, same_token
+from dashboard.web.auth import Gate, Role, SignIn, User, WaitError, same_token
 from dashboard.web.control import Replay
+from dashboard.web.first.control import FirstRun
 from dashboard.web.jobs import Jobs
 from dashboard.web.readings import Readings
 from dashboard.web.uploads import Uploads
@@ -34,6 +36,7 @@ class Front:
     desk: Desk | None = None
     replay: Replay | None = None
     jobs: Jobs | None = None
+    first_run: FirstRun | None = None  # while there is no board, and where one can be configured
     readings: Readings = field(default_factory=Readings)
     uploads: Uploads = field(default_factory=Uploads)
     open_labels: Collection[str] = ()  # of the scene's inputs that concern nobody else
@@ -50,6 +53,7 @@ class Asker:
 
     session: SignIn
     user: User
+    token: str = ""  # id of the API token that he showed; empty: his browser's cookie
 
     @property
     def name(self) -> str:
@@ -71,11 +75,41 @@ def address_of(request: Request) -> str:
 
 
 def asker(request: Request) -> Asker:
-    """Who asks; HTTP 401 for nobody."""
+    """Who asks: by his cookie, or for REST by an API token in `Authorization: Bearer`; HTTP 401
+    for nobody.
+    """
+    if "authorization" in request.headers and request.url.path.startswith("/api/"):
+        return _by_token(request)
     found = front_of(request).gate.session_of(request)
     if found is None:
         raise HTTPException(401, "sign in first")
     return Asker(*found)
+
+
+def _by_token(request: Request) -> Asker:
+    """Who shows a token; HTTP 401 for one that is none, 429 for too many requests."""
+    gate = front_of(request).gate
+    scheme, _, secret = request.headers["authorization"].partition(" ")
+    found = gate.tokens.find(secret.strip()) if scheme.lower() == "bearer" else None
+    if found is None:
+        try:
+            gate.backoff.attempt(address_of(request))
+        except WaitError as wait:
+            raise _wait(str(wait).replace("passwords", "tokens"), wait.seconds) from None
+        audit.warning("a token refused from %s: %s", address_of(request), request.url.path)
+        raise HTTPException(
+            401,
+            "this token is unknown, revoked or past its end; want Authorization: Bearer TOKEN",
+            {"www-authenticate": "Bearer"},
+        )
+    token, user = found
+    if seconds := gate.tokens.wait_s(token):
+        raise _wait(f"token {token.name!r} asks too often: wait {seconds:.2f} s", seconds)
+    return Asker(SignIn(user.name, "", token.created, token.created), user, token.id)
+
+
+def _wait(text: str, seconds: float) -> HTTPException:
+    return HTTPException(429, text, {"retry-after": str(max(1, math.ceil(seconds)))})
 
 
 def needs(role: Role) -> Callable[[Request], Asker]:
@@ -85,7 +119,10 @@ def needs(role: Role) -> Callable[[Request], Asker]:
 
     def check(request: Request) -> Asker:
         who = asker(request)
-        if not same_token(request.headers.get("x-csrf-token", ""), who.session.csrf):
+        # a token is sent by no browser on its own, so no other site can borrow it
+        if not who.token and not same_token(
+            request.headers.get("x-csrf-token", ""), who.session.csrf
+        ):
             raise HTTPException(
                 403,
                 "the header X-CSRF-Token is missing or is not this session's; GET /api/me has it",

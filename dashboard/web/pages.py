@@ -15,8 +15,8 @@ from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Resp
 from dashboard.terms import TERMS
 from dashboard.web import api
 from dashboard.web.auth import Role, WaitError, same_token
-from dashboard.web.front import Asker, address_of, asker, check_role, front_of
-from dashboard.web.users import UsersError, add_user, remove_user
+from dashboard.web.front import Asker, address_of, asker, front_of
+from dashboard.web.users import UsersError
 from messages.text import template_value
 
 log = logging.getLogger(__name__)
@@ -120,7 +120,7 @@ async def _form(request: Request) -> dict[str, str]:
     return {name: values[0] for name, values in fields.items()}
 
 
-async def _signed_form(request: Request) -> tuple[Asker, dict[str, str]]:
+async def signed_form(request: Request) -> tuple[Asker, dict[str, str]]:
     """A form of a signed-in user; HTTP 401 and 403 when it is not."""
     who, fields = asker(request), await _form(request)
     if not same_token(fields.get("csrf", ""), who.session.csrf):
@@ -162,7 +162,10 @@ def _enter(request: Request, token: str, wanted: str = "/") -> RedirectResponse:
 
 
 @routes.get("/")
-def main_page(request: Request, who: SignedIn) -> HTMLResponse:
+def main_page(request: Request, who: SignedIn) -> Response:
+    first = front_of(request).first_run
+    if first is not None and not first.over and who.role >= Role.admin:
+        return RedirectResponse("/setup", 303)
     return render(request, "main.html", who, view=front_of(request).views.of(who.name))
 
 
@@ -235,7 +238,7 @@ async def link(request: Request) -> Response:
 
 @routes.post("/logout")
 async def logout(request: Request) -> Response:
-    await _signed_form(request)
+    await signed_form(request)
     front = front_of(request)
     front.gate.sign_out(request)
     answer = RedirectResponse("/login", 303)
@@ -266,43 +269,6 @@ def sessions_page(
 def words(request: Request, who: SignedIn) -> HTMLResponse:
     """The words that stand on the pages, and what they mean."""
     return render(request, "words.html", who, terms=TERMS)
-
-
-@routes.get("/users")
-def users_page(request: Request, who: SignedIn) -> HTMLResponse:
-    check_role(who, Role.admin, request)
-    return _users(request, who)
-
-
-def _users(request: Request, who: Asker, fault: str = "", status: int = 200) -> HTMLResponse:
-    users = sorted(front_of(request).gate.users.all().values(), key=lambda user: user.name)
-    return render(
-        request,
-        "users.html",
-        who,
-        status,
-        users=users,
-        roles=[role.name for role in Role],
-        fault=fault,
-    )
-
-
-@routes.post("/users")
-async def change_users(request: Request) -> Response:
-    """Add a user, change his role and password, or (field `remove`) remove him."""
-    who, fields = await _signed_form(request)
-    check_role(who, Role.admin, request)
-    settings, name = front_of(request).settings, fields.get("name", "")
-    try:
-        if "remove" in fields:
-            if name == who.name:
-                raise UsersError("you cannot remove yourself: another admin can")
-            remove_user(settings.users, name)
-        else:
-            add_user(settings.users, name, fields.get("password", ""), fields.get("role", ""))
-    except UsersError as error:
-        return _users(request, who, str(error), 422)
-    return RedirectResponse("/users", 303)
 
 
 @routes.get("/api/openapi.json")

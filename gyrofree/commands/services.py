@@ -4,6 +4,9 @@
 
 import logging
 import threading
+from typing import Annotated
+
+import typer
 
 from gyrofree.commands.options import (
     Config,
@@ -93,20 +96,27 @@ def procedures(config: Config = None, verbose: Verbose = False) -> None:
     run_service(body, verbose)
 
 
-def dashboard(config: Config = None, verbose: Verbose = False) -> None:
+def dashboard(
+    setup: Annotated[
+        bool, typer.Option("--setup", help="Ask for the first board, while there is none.")
+    ] = False,
+    config: Config = None,
+    verbose: Verbose = False,
+) -> None:
     """Serve the web page with scene, charts, recordings and sign-in."""
     settings = settings_of(config)
 
     def body(stop: threading.Event) -> None:
         from dashboard import service
         from dashboard.web.control import ProcessReplay
+        from dashboard.web.first.control import FirstRun
         from dashboard.web.jobs import Jobs
 
         options = ["--config", str(config)] if config else []
         replayer = command("replay", "--stay", *options)
         jobs = Jobs(command(), options)
-        service.run(
-            settings.dashboard, settings.bus, stop, replay=ProcessReplay(replayer), jobs=jobs
-        )
+        first = FirstRun(command("setup", *options)) if setup else None
+        replay = ProcessReplay(replayer)
+        service.run(settings.dashboard, settings.bus, stop, replay, jobs, first)
 
     run_service(body, verbose)

@@ -2,10 +2,12 @@
 
 import json
 import sys
+from datetime import UTC, datetime
 from typing import Annotated
 
 import typer
 
+from dashboard.web.programs.tokens import issue_token, load_tokens, revoke_token
 from dashboard.web.users import UsersError, add_user, load_users, remove_user
 from gyrofree.commands.options import AsJson, Config, say, settings_of
 from gyrofree.running.process import EXIT_CONFIG, fail
@@ -39,6 +41,65 @@ def users_add(
     except UsersError as error:
         raise fail(error, EXIT_CONFIG) from None
     say(f"{name} may sign in as {role}")
+
+
+tokens = typer.Typer(
+    no_args_is_help=True, rich_markup_mode=None, help="API tokens: for programs, with an end."
+)
+app.add_typer(tokens, name="token")
+
+
+@tokens.command("create")
+def token_create(
+    user: Annotated[str, typer.Argument(help="User whose token it is.")],
+    name: Annotated[str, typer.Option(help="What it is for.")],
+    role: Annotated[str, typer.Option(help="At most what the user may do.")] = "viewer",
+    days: Annotated[float, typer.Option(help="Until it ends.")] = 90.0,
+    config: Config = None,
+) -> None:
+    """Make a token and print it on standard output, once: only its hash is kept."""
+    try:
+        users_file = settings_of(config).dashboard.users
+        secret, entry = issue_token(users_file, user, name, role, days)
+    except UsersError as error:
+        raise fail(error, EXIT_CONFIG) from None
+    say(f"token {entry.id} of {user} ({role}) ends {_day(entry.ends)}", file=sys.stderr)
+    say(secret)
+
+
+@tokens.command("list")
+def token_list(as_json: AsJson = False, config: Config = None) -> None:
+    """Tokens, their roles and ends; never the tokens themselves."""
+    try:
+        found = load_tokens(settings_of(config).dashboard.users).values()
+    except UsersError as error:
+        raise fail(error) from None
+    if as_json:
+        kept = ("id", "user", "name", "role", "created", "ends")
+        say(json.dumps([{key: getattr(one, key) for key in kept} for one in found], indent=2))
+        return
+    if not found:
+        say("no tokens; make one: gyrofree users token create USER --name 'what it is for'")
+    for one in found:
+        end = "ended" if one.over else "ends"
+        say(f"{one.id}\t{one.user}\t{one.role}\t{end} {_day(one.ends)}\t{one.name}")
+
+
+@tokens.command("revoke")
+def token_revoke(
+    token: Annotated[str, typer.Argument(help="Id of the token, as `list` shows it.")],
+    config: Config = None,
+) -> None:
+    """Take a token back; it is of no use at once."""
+    try:
+        gone = revoke_token(settings_of(config).dashboard.users, token)
+    except UsersError as error:
+        raise fail(error) from None
+    say(f"token {gone.id} ({gone.name}) of {gone.user} is revoked")
+
+
+def _day(seconds: float) -> str:
+    return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:%M UTC")
 
 
 @app.command("list")

@@ -5,7 +5,7 @@ FIRST, who has a password that nobody knows; he goes as soon as there is another
 """
 
 import secrets
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -17,7 +17,7 @@ from dashboard.web.users import (
     load_users,
     remove_user,
 )
-from gyrofree.config import Settings
+from gyrofree.config import DEFAULT_PATH, ConfigError, Settings, load
 from gyrofree.running.doctor import port_taken
 from gyrofree.running.process import (
     EXIT_CONFIG,
@@ -40,6 +40,46 @@ class Plan:
     config: Path | None  # file of the settings; None: the defaults
     services: tuple[str, ...] = SERVICES
 
+    @property
+    def asks(self) -> bool:
+        """True where the page asks for the first board."""
+        return not self.settings.gateway.devices and {"gateway", "dashboard"} <= set(self.services)
+
+
+class FirstBoard:
+    """Starts the services of a board anew once the file has one: the page or `gyrofree setup` wrote
+    it.
+    """
+
+    def __init__(self, plan: Plan, supervisor: Supervisor) -> None:
+        self._path = plan.config or DEFAULT_PATH
+        self._supervisor, self._plan = supervisor, plan
+        self._stamp, self._done = self._now(), False
+
+    def look(self) -> None:
+        """Once; cheap."""
+        stamp = self._now()
+        if self._done or stamp == self._stamp:
+            return
+        self._stamp = stamp
+        try:
+            settings = load(self._path)
+        except ConfigError as error:
+            self._supervisor.say(f"{self._path} has changed, but {error}", "yellow")
+            return
+        if settings.gateway.devices:
+            self._done = True
+            plan = replace(self._plan, settings=settings, config=self._path)
+            self._supervisor.say(f"the first board: {_boards(plan)}", "bold green")
+            self._supervisor.restart("gateway", "estimator", "record", "procedures")
+
+    def _now(self) -> tuple[int, int] | None:
+        try:
+            status = self._path.stat()
+        except OSError:
+            return None
+        return status.st_mtime_ns, status.st_ino
+
 
 def run(plan: Plan) -> None:
     """Run until Ctrl-C; raises typer.Exit with a code when it cannot."""
@@ -49,10 +89,13 @@ def run(plan: Plan) -> None:
     settings = plan.settings
     supervisor = Supervisor(name="up")
     for service in plan.services:
-        supervisor.add(service, service, *(["--config", str(plan.config)] if plan.config else []))
+        options = ["--config", str(plan.config)] if plan.config else []
+        options += ["--setup"] if service == "dashboard" and plan.asks else []
+        supervisor.add(service, service, *options)
     welcome = _welcome(settings) if "dashboard" in plan.services else []
     supervisor.say(f"starting {', '.join(plan.services)}; {_boards(plan)}")
-    Watch(supervisor, settings, welcome).run(stop)
+    each = FirstBoard(plan, supervisor).look if plan.asks else lambda: None
+    Watch(supervisor, settings, welcome, each).run(stop)
 
 
 def _boards(plan: Plan) -> str:

@@ -4,6 +4,7 @@ there.
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from gyrofree.config import Settings
@@ -31,6 +32,7 @@ class Watch:
     supervisor: Supervisor
     settings: Settings
     welcome: list[tuple[str, str]]  # said once the page answers: text and style; none: no page
+    each: Callable[[], None] = lambda: None  # called between two looks
 
     def run(self, stop: threading.Event) -> None:
         """Until `stop`, or until a child ends all; raises typer.Exit when one could not go on.
@@ -57,6 +59,7 @@ class Watch:
         deadline = time.monotonic() + WAIT_FOR_PAGE
         while not stop.wait(TICK) and supervisor.fatal is None and not supervisor.done:
             supervisor.step()
+            self.each()
             if said:
                 continue
             if health("dashboard", self.settings).state == "ok":

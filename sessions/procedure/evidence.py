@@ -19,6 +19,7 @@ KEPT = 1.5  # s
 THIN = 0.01  # s, one estimate in so long is kept
 MEAN = 0.3  # s, over which pulses are averaged
 SILENCE = 0.6  # s without a pulse: the table stands, as in the report
+OVERDUE, LATE_S = 3.0, 0.05  # times the usual interval, and s: a pulse should have come
 FRESH = 1.0  # s that an estimate is believed
 TABLE_FRESH = 2.5  # s that a table's own word is
 WINDOW = 0.5  # s, of vibration and of the direction of gravity
@@ -49,7 +50,7 @@ class Estimate(NamedTuple):
 class Evidence:
     """Of one boot; `forget` begins with another."""
 
-    axes: Axes | None = None
+    health: deque[Axes] = field(default_factory=deque)
     pulses_seen: bool = False  # in this boot or an earlier one: there is a tachometer
     pulses: deque[Pulse] = field(default_factory=deque)
     estimates: deque[Estimate] = field(default_factory=deque)
@@ -63,7 +64,12 @@ class Evidence:
         self.pulses.clear()
         self.estimates.clear()
         self.samples.clear()
+        self.health.clear()
         self.table = None
+
+    def axes(self, t: float) -> Axes | None:
+        """The newest word on the axes up to a moment."""
+        return next((one for one in reversed(self.health) if one.t <= t), None)
 
     def add_pulse(self, seen: Pulse) -> None:
         """One rate of the tachometer."""
@@ -92,6 +98,8 @@ class Evidence:
             self.samples.popleft()
         while self.pulses and self.pulses[0].t < old:
             self.pulses.popleft()
+        while len(self.health) > 1 and self.health[1].t < old:
+            self.health.popleft()
         while self.estimates and self.estimates[0].t < old:
             self.estimates.popleft()
 
@@ -103,7 +111,7 @@ class Evidence:
                 near = [p for p in self.pulses if t - SILENCE < p.t <= t][-1:]
             if not near:
                 return Reference(0.0, True, "tachometer")
-            mean = float(np.mean([p.omega for p in near]))
+            mean = float(np.mean([p.omega for p in near])) * self._slowed(t)
             return Reference(mean, all(p.signed for p in near), "tachometer")
         if self.table is not None and abs(t - self.table[0]) < TABLE_FRESH:
             return Reference(self.table[1], True, "table")
@@ -111,6 +119,15 @@ class Evidence:
             if one.still or one.valid:
                 return Reference(0.0 if one.still else one.omega, True, one.estimator)
         return None
+
+    def _slowed(self, t: float) -> float:
+        """At most this share of the rate is left where pulses are overdue: 0 to 1."""
+        times = [p.t for p in self.pulses if p.t <= t][-6:]
+        if len(times) < 2:
+            return 1.0
+        usual = max(b - a for a, b in zip(times, times[1:], strict=False))
+        since = t - times[-1]
+        return usual / since if since > OVERDUE * usual + LATE_S else 1.0
 
     def newest(self, t: float) -> Iterator[Estimate]:
         """The newest estimate of each estimator up to a moment, if it is fresh."""
@@ -126,14 +143,7 @@ class Evidence:
         if window is None:
             return None
         times, rows = window
-        s = times - t
-        columns = [np.ones_like(s), s, s**2]
-        omega = 0.0 if reference is None else reference.omega
-        if abs(omega) > 10.0 * DEG:  # slower ones are in the parabola
-            columns += [np.cos(omega * s), np.sin(omega * s)]
-        design = np.column_stack(columns)
-        rest = rows - design @ np.linalg.lstsq(design, rows, rcond=None)[0]
-        return float(np.sqrt((rest**2).sum() / max(1, len(s) - len(columns)) / rows.shape[1]))
+        return shaking(times - t, rows, 0.0 if reference is None else reference.omega)
 
     def force(self, t: float) -> Array | None:
         """Mean specific force, (3,) m/s^2 in b; None where the axes' directions are not known."""
@@ -143,9 +153,10 @@ class Evidence:
         mean = window[1].mean(axis=0)
         if not self.own_axes:
             return mean
-        if self.axes is None or len(self.axes.direction_b) != len(mean):
+        axes = self.axes(t)
+        if axes is None or len(axes.direction_b) != len(mean):
             return None
-        return np.linalg.lstsq(self.axes.direction_b, mean, rcond=None)[0]
+        return np.linalg.lstsq(axes.direction_b, mean, rcond=None)[0]
 
     def _window(self, t: float) -> tuple[Array, Array] | None:
         if not self.samples:
@@ -158,3 +169,15 @@ class Evidence:
         if at.sum() < 10 or times[at][-1] - times[at][0] < 0.6 * WINDOW:
             return None
         return times[at], np.concatenate([rows for _, rows in self.samples])[at]
+
+
+def shaking(t: Array, rows: Array, omega: float) -> float:
+    """RMS over the axes of readings (n, k), m/s^2 at times (n,) s, without what is slow, and
+    without gravity as it goes round on a tilted table that turns at omega, rad/s.
+    """
+    columns = [np.ones_like(t), t, t**2]
+    if abs(omega) > 10.0 * DEG:  # slower ones are in the parabola
+        columns += [np.cos(omega * t), np.sin(omega * t)]
+    design = np.column_stack(columns)
+    rest = rows - design @ np.linalg.lstsq(design, rows, rcond=None)[0]
+    return float(np.sqrt((rest**2).sum() / max(1, len(t) - len(columns)) / rows.shape[1]))

@@ -60,8 +60,10 @@ class Turned:
 
 @dataclass(frozen=True)
 class Axes:
-    """The axes' health and directions."""
+    """The axes' health and directions, from a moment on."""
 
+    epoch: int
+    t: float  # s
     unfit: tuple[tuple[int, str], ...]  # column and what is wrong, for people
     direction_b: Array  # (k, 3)
 
@@ -136,5 +138,6 @@ def _axes(m: pb.AxisHealth) -> Axes | None:
     )
     rows = [list(axis.direction_b) for axis in m.axes]
     if any(len(row) != 3 for row in rows):
-        return Axes(unfit, np.zeros((0, 3)))
-    return Axes(unfit, np.array(rows))
+        rows = []
+    h = m.header
+    return Axes(h.epoch, h.device_us * 1e-6, unfit, np.array(rows).reshape(-1, 3))

@@ -102,8 +102,8 @@ class Watch:
                 self.evidence.add_pulse(seen)
             case Turned() if seen.epoch == self.epoch:
                 self.evidence.add_estimates(seen)
-            case Axes():
-                self.evidence.axes = seen
+            case Axes() if seen.epoch == self.epoch:
+                self.evidence.health.append(seen)
             case TableSays() if np.isfinite(self.now):
                 self.evidence.table = self.now, seen.omega
             case Line() if not seen.connected:
@@ -177,7 +177,7 @@ class Watch:
 
     def _fault(self, t: float, shaking: float | None) -> str:
         """Why the step cannot be measured at this moment; empty: it can."""
-        axes = self.evidence.axes
+        axes = self.evidence.axes(t)
         if axes is not None and axes.unfit:
             return "; ".join(text for _, text in axes.unfit)
         wrong = self._not_posed(t) if self.step.kind == "pose" else self._not_turning_so()
@@ -199,7 +199,7 @@ class Watch:
             omega, target = abs(omega), abs(want)
         if abs(omega - target) <= self.step.tolerance:
             return ""
-        said = f"it turns at {omega / DEG:+.1f} deg/s, wanted"
+        said = f"it turns at {omega / DEG:+.1f} °/s, wanted"
         if self.step.kind == "still":
             return f"{said} standstill"
         wanted = f"{said} {target / DEG:+.1f} ± {self.step.tolerance / DEG:g}"
@@ -208,7 +208,7 @@ class Watch:
 
     def _not_posed(self, t: float) -> str:
         if self.reference is not None and abs(self.reference.omega) > 2.0 * DEG:
-            return f"it turns at {self.reference.omega / DEG:+.1f} deg/s: let it rest"
+            return f"it turns at {self.reference.omega / DEG:+.1f} °/s: let it rest"
         force = self.evidence.force(t)
         if force is None:
             return "the direction of gravity is not known yet"

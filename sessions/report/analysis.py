@@ -61,9 +61,12 @@ class Analysis:
         return next((one for one in self.rates if one.name == name), None)
 
 
-def analyse(run: Run, manifest: Manifest | None) -> Analysis:
-    """All results of a run; what the session cannot tell stays None."""
-    parts = segment(run.tacho, run.seconds) if run.tacho is not None else []
+def analyse(run: Run, manifest: Manifest | None, parts: list[Segment] | None = None) -> Analysis:
+    """All results of a run; what the session cannot tell stays None. `parts`: the standstills and
+    plateaus, where a procedure has said them; else they are looked for.
+    """
+    if parts is None:
+        parts = segment(run.tacho, run.seconds) if run.tacho is not None else []
     rest = longest_rest(parts) if parts else _all_still(run)
     cube = cube_test(run.accel, _side(manifest), parts, run) if run.accel is not None else None
     g = local_gravity(run)

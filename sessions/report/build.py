@@ -11,16 +11,20 @@ from typing import Any
 
 import numpy as np
 
+from messages.contract import gyrofree_pb2 as pb
 from sessions.export.table import Progress, silent
+from sessions.procedure.evaluate import Held, Outcome, StepResult, evaluate, held_by, segments
+from sessions.procedure.pages import facts, provenance, steps
 from sessions.recording.manifest import Manifest, SessionError, read_manifest
 from sessions.report.analysis import Analysis, analyse
-from sessions.report.data import load_run
-from sessions.report.document import compose
+from sessions.report.data import Run, load_run
+from sessions.report.document import Extra, compose
 from sessions.report.figures import pictures
 from sessions.report.html import to_html
 from sessions.report.metrics import Metric, metrics
 from sessions.report.pdf import to_pdf
-from sessions.report.verdict import Check, Spec, judge, overall
+from sessions.report.segments import Segment
+from sessions.report.verdict import Check, Spec, judge, load_spec, overall
 
 
 @dataclass(frozen=True)
@@ -52,19 +56,28 @@ def build(
     figure, OSError.
     """
     manifest = _manifest(path)
+    held = held_by(path, manifest, device)
+    if held is not None:
+        device, boot = held.status.header.device, held.epoch if boot is None else boot
+        if spec == load_spec(None):  # nobody asked for other limits than the procedure's
+            spec = Spec(title=held.plan.procedure.title, estimator=held.plan.procedure.estimator)
     run = load_run(path, device, boot, lambda done, what: progress(0.6 * done, what))
     progress(0.6, "analysing")
-    found = analyse(run, manifest)
+    found = analyse(run, manifest, _parts(held, run))
     figures = metrics(found, spec.estimator)
-    checks = judge(spec, figures)
+    checks, extra, outcome = judge(spec, figures), Extra(), None
+    if held is not None:
+        outcome = evaluate(held, found, figures)
+        figures, checks = [*figures, *outcome.figures], outcome.checks + checks
+        extra = Extra(facts(outcome), [steps(outcome)], provenance(outcome))
     progress(0.65, "drawing")
     sha256 = sha256_of(path)
-    document = compose(found, manifest, sha256, spec, checks, pictures(found))
+    document = compose(found, manifest, sha256, spec, checks, pictures(found), extra)
     progress(0.85, "writing")
     report = Report(
         html=to_html(document),
         pdf=to_pdf(document),
-        json=_json(found, manifest, sha256, spec, figures, checks),
+        json=_json(found, manifest, sha256, spec, figures, checks, outcome),
         verdict=document.verdict,
     )
     progress(1.0, "done")
@@ -91,8 +104,9 @@ def _json(
     spec: Spec,
     figures: list[Metric],
     checks: list[Check],
+    outcome: Outcome | None,
 ) -> str:
-    content = {
+    content: dict[str, Any] = {
         "session": manifest.id if manifest else None,
         "device": found.run.device,
         "boot": found.run.epoch,
@@ -111,7 +125,47 @@ def _json(
         "link": found.run.link,
         "damage": list(found.run.said),
     }
+    if outcome is not None:
+        status = outcome.held.status
+        content["procedure"] = {
+            "name": outcome.held.plan.name,
+            "title": outcome.held.plan.procedure.title,
+            "sha256": outcome.held.plan.sha256,
+            "run": status.run,
+            "unit": status.unit,
+            "operator": status.operator,
+            "state": pb.ProcedureStatus.State.Name(status.state),
+            "steps": [_step(one) for one in outcome.steps],
+        }
     return json.dumps(_plain(content), indent=1, sort_keys=True, ensure_ascii=False) + "\n"
+
+
+def _parts(held: Held | None, run: Run) -> list[Segment] | None:
+    """The steps of a procedure as standstills and plateaus; None where nobody said them."""
+    if held is None:
+        return None
+    pairs = zip(held.plan.steps, segments(held, run), strict=True)
+    found = [part for step, part in pairs if part is not None and step.kind in ("rate", "still")]
+    return found or None
+
+
+def _step(one: StepResult) -> dict[str, Any]:
+    part = asdict(one.segment) if one.segment is not None else None
+    plateau = one.plateau
+    return {
+        "name": one.step.name,
+        "kind": one.step.kind,
+        "target_radps": one.step.target,
+        "state": pb.ProcedureStatus.Step.State.Name(one.record.state),
+        "reason": one.record.reason,
+        "attempts": one.record.attempts,
+        "spoilt": one.record.spoilt,
+        "segment": part,
+        "error_radps": None if plateau is None else plateau.error[2],
+        "standard_error_radps": None if plateau is None else plateau.standard_error[2],
+        "rms_radps": None if plateau is None else plateau.rms[2],
+        "vibration_mps2": one.vibration,
+    }
 
 
 def _plain(value: Any) -> Any:

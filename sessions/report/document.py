@@ -2,6 +2,7 @@
 here.
 """
 
+import math
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 
@@ -37,6 +38,15 @@ class Document:
     provenance: list[tuple[str, str]] = field(default_factory=list)
 
 
+@dataclass(frozen=True)
+class Extra:
+    """What a procedure adds to the report of its session."""
+
+    facts: list[tuple[str, str]] = field(default_factory=list)
+    grids: list[Grid] = field(default_factory=list)
+    provenance: list[tuple[str, str]] = field(default_factory=list)
+
+
 def compose(
     found: Analysis,
     manifest: Manifest | None,
@@ -44,9 +54,11 @@ def compose(
     spec: Spec,
     checks: list[Check],
     drawn: list[Picture],
+    extra: Extra = Extra(),
 ) -> Document:
     """Put the report together."""
     grids = [
+        *extra.grids,
         plateaus(found),
         scale_factors(found),
         biases(found),
@@ -57,11 +69,11 @@ def compose(
     return Document(
         title=f"{'Rate table test' if found.segments else 'Session'} of {found.run.device}",
         verdict=overall(checks),
-        facts=_facts(found, manifest, spec),
+        facts=extra.facts + _facts(found, manifest, spec),
         checks=[_check(check) for check in checks],
         grids=[grid for grid in grids if grid is not None and grid.rows],
         pictures=drawn,
-        provenance=_provenance(found, manifest, sha256),
+        provenance=extra.provenance + _provenance(found, manifest, sha256),
     )
 
 
@@ -98,10 +110,14 @@ def _check(check: Check) -> tuple[str, str, str, str]:
     low, high = check.minimum, check.maximum
     limits = f"{number(low)} to {number(high)}" if low is not None and high is not None else ""
     limits = limits or (f"≥ {number(low)}" if low is not None else f"≤ {number(high)}")
+    limits = "measured" if low is None and high is None else limits
+    value = number(check.value, 4)
+    if check.value is not None and check.sigma is not None and math.isfinite(check.sigma):
+        value += f" ± {number(2.0 * check.sigma, 2)}"
     name = f"{check.text} ({check.name})" if check.text else check.name
     return (
         name,
-        number(check.value, 4),
+        value,
         limits,
         {True: "pass", False: "fail", None: "not told"}[check.passed],
     )

@@ -46,6 +46,7 @@ class Check:
     minimum: float | None
     maximum: float | None
     text: str = ""  # what the figure is
+    sigma: float | None = None  # standard error of the value, where it is known
 
     @property
     def passed(self) -> bool | None:

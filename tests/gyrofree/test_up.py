@@ -95,8 +95,8 @@ def test_from_the_box_to_live(board, tmp_path):
         assert "up         starting router, gateway" in up.text()
         url = link.split("/login")[0]
         with httpx.Client(base_url=url, follow_redirects=True, timeout=30.0) as client:
-            assert client.get(link).status_code == 200
-            assert "first" in client.get("/").text
+            enter(client, link)
+            assert client.get("/api/me").json()["role"] == "admin"
         with httpx.Client(base_url=url, timeout=30.0) as stranger:
             assert stranger.get("/api/sessions").status_code == 401
         assert rate_is_heard(tmp_path)
@@ -110,6 +110,51 @@ def test_from_the_box_to_live(board, tmp_path):
         for absent in ("gateway", "estimator", "record"):
             assert not re.search(rf"^\S+ {absent} ", up.text(), re.MULTILINE)
         assert up.end() == 0
+
+
+def enter(client, link):
+    """What a click on the one-time link's page does."""
+    token = link.partition("token=")[2]
+    origin = {"origin": str(client.base_url).rstrip("/")}
+    assert client.post("/login/link", data={"token": token}, headers=origin).status_code == 200
+
+
+def test_the_first_board_in_the_browser(board, tmp_path):
+    """`gyrofree up` without a board: the page asks for it, and its samples arrive."""
+    port, bus = free_port(), free_port()
+    (tmp_path / "gyrofree.toml").write_text(
+        f"[dashboard]\nport = {port}\n"
+        f'[bus]\nrouter = "tcp/127.0.0.1:{bus}"\nlisten = ["tcp/127.0.0.1:{bus}"]\n'
+    )
+    with Up(tmp_path) as up:
+        link = up.until(r"open  (http://\S+/login/link\?token=\S+)")[1]
+        assert "no board in" in up.text()
+        url = f"http://127.0.0.1:{port}"
+        origin = {"origin": url}
+        with httpx.Client(
+            base_url=url, follow_redirects=True, timeout=60.0, headers=origin
+        ) as client:
+            enter(client, link)
+            page = client.get("/")
+            assert page.url.path == "/setup" and "Listen at the ports" in page.text
+            csrf = {"csrf": client.get("/api/me").json()["csrf"]}
+            form = csrf | {"port": str(board), "half-side": "0.06", "pulses": "100"}
+            wrong = client.post("/setup", data=form | {"name": "A B"})
+            assert wrong.status_code == 422 and "want a-z" in wrong.text
+            assert str(board) in wrong.text
+            no_file = client.post("/setup", data=form | {"port": "file:///etc/passwd"})
+            assert no_file.status_code == 422 and "root:" not in no_file.text
+            weak = client.post("/setup", data=form | {"user": "anna", "password": "short"})
+            assert weak.status_code == 422 and "password" in weak.text
+            user = {"user": "anna", "password": "a long pass phrase"}
+            done = client.post("/setup", data=form | user)
+            assert done.status_code == 200 and done.url.path == "/"
+        up.until("the first board: gyrofree.toml: cube on")
+        assert rate_is_heard(tmp_path)
+        assert up.end() == 0
+    written = load(tmp_path / "gyrofree.toml")
+    assert written.estimator.layout.half_side_m == 0.06 and written.dashboard.port == port
+    assert load_users(tmp_path / "var/state/users.json")["anna"].role.name == "admin"
 
 
 def test_a_taken_port_is_said_with_its_key(tmp_path):

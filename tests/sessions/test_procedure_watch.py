@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from inertial.constants import MILLI_G
@@ -16,7 +16,6 @@ from sessions.procedure.watch import HOLE, State, Watch
 PERIOD = 0.01
 LAYOUT = CUBE(0.05)
 STEP = Step("turn", "rate", 100.0 * DEG, 1.0, 2.0, 3.0 * DEG)
-GOOD = Axes((), LAYOUT.theta_b)
 
 
 @dataclass(frozen=True)
@@ -33,15 +32,13 @@ class Piece:
 
 def life(pieces: list[Piece], seed: int = 1, up=(0.0, 0.0, 1.0)):
     """Samples (epoch, t, row) one by one, and what else is said, in the order of time."""
-    draw, epoch, t, angle, unfit = np.random.default_rng(seed), 1, 0.0, 0.0, False
+    draw, epoch, t, angle = np.random.default_rng(seed), 1, 0.0, 0.0
     for piece in pieces:
         t += piece.hole
         if piece.reboot:
             epoch, t = epoch + 1, 0.0
-        if piece.unfit != unfit:
-            unfit = piece.unfit
-            yield Axes(((3, "axis a21 is stuck"),), LAYOUT.theta_b) if unfit else GOOD
-        for _ in range(round(piece.seconds / PERIOD)):
+        said = ((3, "axis a21 is stuck"),) if piece.unfit else ()
+        for k in range(round(piece.seconds / PERIOD)):
             t = round(t + PERIOD, 6)
             angle += piece.rate * PERIOD
             if abs(angle) >= 1.0:
@@ -51,6 +48,8 @@ def life(pieces: list[Piece], seed: int = 1, up=(0.0, 0.0, 1.0)):
             noise = draw.normal(size=12) * (4.0 + piece.shaking) * MILLI_G
             utc_ns = 10**18 + epoch * 10**13 + round(t * 1e9)
             yield Samples(epoch, np.array([t]), (rest + noise)[None], utc_ns)
+            if k % 10 == 0:
+                yield Axes(epoch, t, said, LAYOUT.theta_b)
 
 
 def batched(seen, size: int):
@@ -78,7 +77,6 @@ def batched(seen, size: int):
 
 def watched(seen, step: Step = STEP, **options) -> Watch:
     watch = Watch(step, 0.5, 30.0 * MILLI_G, **options)
-    watch.take(GOOD)
     for one in seen:
         watch.take(one)
     return watch
@@ -114,7 +112,10 @@ def bad_stretches(pieces: list[Piece]):
         t += piece.seconds
 
 
-@settings(max_examples=60, deadline=None)
+QUICK = (Phase.explicit, Phase.reuse, Phase.generate)  # a life is long to shrink
+
+
+@settings(max_examples=60, deadline=None, phases=QUICK)
 @given(PIECES)
 def test_a_dwell_that_counts_was_what_the_step_wants(pieces):
     watch = watched(life(pieces))
@@ -129,7 +130,7 @@ def test_a_dwell_that_counts_was_what_the_step_wants(pieces):
         assert watch.reason
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25, deadline=None, phases=QUICK)
 @given(PIECES, st.integers(2, 25))
 def test_how_data_are_cut_into_messages_changes_nothing(pieces, size):
     one, many = watched(life(pieces)), watched(batched(life(pieces), size))

@@ -38,7 +38,7 @@ def test_every_file_that_a_guide_names_is_there(name):
         "README.md",
         "CONTRIBUTING.md",
         "CHANGELOG.md",
-        *(f"docs/{p.name}" for p in (ROOT / "docs").glob("*.md")),
+        *(str(p.relative_to(ROOT)) for p in (ROOT / "docs").rglob("*.md")),
     ],
 )
 def test_every_link_of_a_page_leads_somewhere(page):

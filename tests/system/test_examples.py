@@ -11,6 +11,7 @@ EXAMPLES = ROOT / "examples"
 SAYS = {  # example -> a part of what it prints
     "add_rate_estimator.py": "the zero-velocity update takes",
     "add_wire_frame.py": "damaged: cobs, 35 bytes",
+    "live_values.py": "0.00 - 114.59 deg/s",
     "read_recording.py": "deg/s RMS against the tachometer",
     "run_log.py": "the worst is least-squares",
     "subscribe_to_rates.py": "products-ekf: ",

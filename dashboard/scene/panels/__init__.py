@@ -9,6 +9,7 @@ from dashboard.scene.panels.device.health import Health
 from dashboard.scene.panels.device.layout import LayoutBench
 from dashboard.scene.panels.device.link import Link
 from dashboard.scene.panels.guided.calibration import Calibration
+from dashboard.scene.panels.guided.procedure import ProcedurePanel
 from dashboard.scene.panels.guided.wiring import Wiring
 from dashboard.scene.panels.motion.acceleration import Acceleration
 from dashboard.scene.panels.motion.angle import Angle
@@ -30,6 +31,7 @@ PAGES: tuple[type[Panel], ...] = (
     Angle,
     Tilt,
     Race,
+    ProcedurePanel,
     Axes,
     Health,
     Innovations,

@@ -1,0 +1,244 @@
+"""What a run of a procedure came to, computed from its recording: the steps' figures with their
+uncertainty, each against its limit. The same recording gives the same numbers.
+"""
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.constants import GRAVITY, MILLI_G
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import PROCEDURE
+from sessions.export.table import Selection, messages
+from sessions.procedure.evidence import WINDOW, shaking
+from sessions.procedure.library import ProcedureError, of_text
+from sessions.procedure.model import DEG, Plan, Step
+from sessions.recording.manifest import Manifest
+from sessions.recording.mcap_damage import Damage
+from sessions.report.analysis import Analysis
+from sessions.report.data import Run
+from sessions.report.metrics import Metric
+from sessions.report.segments import Segment, reference
+from sessions.report.table_test import Plateau
+from sessions.report.verdict import Check
+
+Array = NDArray[np.float64]
+M = pb.ProcedureStatus
+LEAST_SHARE = 0.95  # of a dwell that must be in the recording
+
+
+@dataclass(frozen=True)
+class Held:
+    """A run as the recording holds it."""
+
+    status: M
+    plan: Plan
+
+    @property
+    def epoch(self) -> int | None:
+        """Boot in which most of its steps were measured."""
+        boots = Counter(s.epoch for s in self.status.steps if s.until_us > s.from_us)
+        return max(sorted(boots), key=lambda boot: boots[boot]) if boots else None
+
+
+@dataclass(frozen=True)
+class StepResult:
+    """One step, judged; SI."""
+
+    step: Step
+    record: pb.ProcedureStatus.Step
+    segment: Segment | None  # None: not measured, or not in this recording
+    plateau: Plateau | None
+    vibration: float | None  # m/s^2
+    checks: list[Check]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """All that a report says of a run."""
+
+    held: Held
+    steps: list[StepResult]
+    figures: list[Metric]  # of the whole, beyond those that every report has
+    checks: list[Check]
+
+
+def held_by(path: Path, manifest: Manifest | None, device: str = "") -> Held | None:
+    """The last run that a recording holds, of a device (default: any); None: there is none.
+
+    Raises OSError.
+    """
+    if manifest is not None and not any(k.endswith(f"/{PROCEDURE.name}") for k in manifest.keys):
+        return None
+    newest: M | None = None
+    # What is damaged is told by the reading that takes the samples.
+    for _, _, message in messages(path, Selection(frozenset([PROCEDURE.name])), Damage()):
+        if not isinstance(message, M) or message.state == M.STATE_IDLE or not message.toml:
+            continue
+        mine = not device or message.header.device == device
+        here = manifest is None or message.session in ("", manifest.id) or manifest.continues
+        if mine and here:
+            newest = message
+    if newest is None:
+        return None
+    try:
+        plan = of_text(newest.toml, newest.procedure)
+    except ProcedureError:
+        return None
+    return Held(newest, plan) if len(plan.steps) == len(newest.steps) else None
+
+
+def segments(held: Held, run: Run) -> list[Segment | None]:
+    """Where each step lies in a run; None where it was not measured, or is not in it."""
+    found: list[Segment | None] = []
+    before = 0.0
+    for step, record in zip(held.plan.steps, held.status.steps, strict=True):
+        begin = (record.from_utc_ns * 1e-9) - run.start_utc_s
+        end = (record.until_utc_ns * 1e-9) - run.start_utc_s
+        inside = min(end, run.seconds) - max(begin, 0.0)
+        measured = record.state == M.Step.STATE_DONE and end > begin
+        if not measured or record.epoch != run.epoch or inside < LEAST_SHARE * (end - begin):
+            found.append(None)
+            continue
+        begin, end = max(begin, 0.0), min(end, run.seconds)
+        omega, scatter = step.target, 0.0
+        if run.tacho is not None:
+            values = reference(run.tacho, np.arange(begin, end, 0.01))
+            omega, scatter = float(values.mean()), float(values.std())
+        found.append(Segment(begin, end, omega, scatter, begin - before))
+        before = end
+    return found
+
+
+def evaluate(held: Held, found: Analysis, figures: list[Metric]) -> Outcome:
+    """Judge a run; `figures` are those of the whole that the report has."""
+    steps = []
+    for number, (step, record, part) in enumerate(
+        zip(held.plan.steps, held.status.steps, segments(held, found.run), strict=True), 1
+    ):
+        steps.append(_step(number, step, record, part, held, found))
+    more = [_hysteresis(steps)]
+    values = {metric.name: metric for metric in [*figures, *more]}
+    sigmas = _sigmas(held, found) | {"hysteresis_ppm": _hysteresis_sigma(steps)}
+    checks = [check for one in steps for check in one.checks]
+    for name, limit in held.plan.procedure.limits.items():
+        metric = values.get(name)
+        value, text = (metric.value, metric.text) if metric is not None else (None, "")
+        checks.append(Check(name, value, limit.min, limit.max, text, sigmas.get(name)))
+    if held.status.state != M.STATE_DONE:
+        how = held.status.message or "it was not run to its end"
+        checks.append(Check("run to its end", None, None, None, how))
+    return Outcome(held, steps, more, checks)
+
+
+def _step(
+    number: int,
+    step: Step,
+    record: pb.ProcedureStatus.Step,
+    part: Segment | None,
+    held: Held,
+    found: Analysis,
+) -> StepResult:
+    watched = step.kind in ("rate", "still", "pose")
+    if part is None:
+        done = record.state == M.Step.STATE_DONE
+        if not watched and done:
+            return StepResult(step, record, None, None, None, [])
+        why = "not in this boot of the recording" if done else record.reason or "not measured"
+        missing = Check(f"step {number}, {step.name}", None, None, None, why)
+        return StepResult(step, record, None, None, None, [missing])
+    rate = found.rate(held.plan.procedure.estimator)
+    plateau = None
+    if rate is not None and step.kind != "pose":
+        plateau = next((p for p in rate.plateaus if p.segment == part), None)
+    vibration = _vibration(found.run, part)
+    values = _values(step, part, plateau, vibration, found)
+    checks = []
+    for name, limit in step.limits:
+        value, sigma = values.get(name, (None, None))
+        where = f"step {number}, {step.name}"
+        checks.append(Check(f"{where}: {name}", value, limit.min, limit.max, "", sigma))
+    return StepResult(step, record, part, plateau, vibration, checks)
+
+
+def _values(
+    step: Step, part: Segment, plateau: Plateau | None, vibration: float | None, found: Analysis
+) -> dict[str, tuple[float | None, float | None]]:
+    """Figure -> value and standard error."""
+    values: dict[str, tuple[float | None, float | None]] = {}
+    if vibration is not None:
+        values["vibration_mg"] = (vibration / MILLI_G, None)
+    if plateau is not None:
+        error, sigma = plateau.error[2] / DEG, plateau.standard_error[2] / DEG
+        values["rate_error_dps"] = (float(error), float(sigma))
+        values["rate_scatter_dps"] = (float(plateau.scatter[2] / DEG), None)
+        values["rate_rms_dps"] = (float(plateau.rms[2] / DEG), None)
+    if step.kind == "pose" and found.cube is not None:
+        p = found.cube.p_b[part.holds(found.cube.t)]
+        if len(p) > 1:
+            size = float(np.linalg.norm(p.mean(axis=0)))
+            spread = float(p.std(axis=0, ddof=1).max() / np.sqrt(len(p)))
+            values["force_error_mg"] = ((size - GRAVITY) / MILLI_G, spread / MILLI_G)
+    return values
+
+
+def _vibration(run: Run, part: Segment) -> float | None:
+    """The largest of any WINDOW, m/s^2 RMS."""
+    if run.accel is None:
+        return None
+    t, rows = run.accel.t, run.accel.f_axis
+    found = []
+    for begin in np.arange(part.begin, part.end - WINDOW + 1e-9, WINDOW):
+        at = (t >= begin) & (t < begin + WINDOW)
+        if at.sum() >= 10:
+            found.append(shaking(t[at] - begin, rows[at], part.omega))
+    return max(found) if found else None
+
+
+def _pairs(steps: list[StepResult]) -> list[tuple[float, float]]:
+    """Differences (rad/s) of the same rate measured again, with their standard errors."""
+    first: dict[float, Plateau] = {}
+    found = []
+    for one in steps:
+        if one.step.kind != "rate" or one.plateau is None:
+            continue
+        target = round(one.step.target / DEG, 6)
+        before = first.setdefault(target, one.plateau)
+        if before is not one.plateau:
+            a, b = before, one.plateau
+            sigma = float(np.hypot(a.standard_error[2], b.standard_error[2]))
+            found.append((float(b.error[2] - a.error[2]), sigma))
+    return found
+
+
+def _full_scale(steps: list[StepResult]) -> float:
+    return max((abs(one.step.target) for one in steps if one.plateau is not None), default=0.0)
+
+
+def _hysteresis(steps: list[StepResult]) -> Metric:
+    """The largest difference between two visits of one rate over full scale (R-5)."""
+    pairs, full = _pairs(steps), _full_scale(steps)
+    value = max(abs(d) for d, _ in pairs) / full * 1e6 if pairs and full else None
+    return Metric("hysteresis_ppm", value, "largest difference between two visits of one rate")
+
+
+def _hysteresis_sigma(steps: list[StepResult]) -> float | None:
+    pairs, full = _pairs(steps), _full_scale(steps)
+    if not pairs or not full:
+        return None
+    return max(pairs, key=lambda pair: abs(pair[0]))[1] / full * 1e6
+
+
+def _sigmas(held: Held, found: Analysis) -> dict[str, float | None]:
+    """Standard errors of figures of the whole, where they are known."""
+    rate = found.rate(held.plan.procedure.estimator)
+    fit = rate.fit if rate is not None else None
+    if fit is None:
+        return {}
+    return {
+        "scale_factor_error_ppm": fit.scale_factor_sigma * 1e6,
+        "rate_bias_dps": float(fit.bias_sigma / DEG),
+    }

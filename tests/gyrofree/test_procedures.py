@@ -1,0 +1,183 @@
+"""Procedures with the real services: simulated board and table on pseudo-terminals, and all that
+`gyrofree demo` starts.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from gyrofree.config import load
+from messages.bus import orders
+from messages.bus.session import open_client, subscribe
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import PROCEDURE, TRUTH
+from tests.support.stack import RunningDemo
+
+M = pb.ProcedureStatus
+SHORT = """
+title = "Short"
+settle_s = 0.3
+[[steps]]
+kind = "still"
+seconds = 1.5
+[[steps]]
+kind = "rate"
+rate_dps = 90
+dwell_s = {dwell}
+tolerance_dps = 4
+[steps.limits.rate_error_dps]
+min = -5
+max = 5
+[[steps]]
+kind = "still"
+seconds = 1.5
+[limits.hysteresis_ppm]
+max = 10000
+"""
+OPEN = """
+title = "Open and posed"
+settle_s = 0.3
+[[steps]]
+kind = "open"
+instruction = "Read the thermometer"
+ask = "temperature in deg C"
+[[steps]]
+kind = "pose"
+up = "+x"
+seconds = 1.0
+[[steps]]
+kind = "pose"
+up = "+z"
+seconds = 1.0
+"""
+
+
+class Bench:
+    """A demo, and somebody who gives orders and listens."""
+
+    def __init__(self, demo: RunningDemo) -> None:
+        self.demo = demo
+        settings = load(demo.config)
+        self.prefix, self.sessions = settings.bus.prefix, settings.recorder.root
+        folder = settings.procedures.folder
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "short.toml").write_text(SHORT.format(dwell=2.0))
+        (folder / "longer.toml").write_text(SHORT.format(dwell=6.0))
+        (folder / "open.toml").write_text(OPEN)
+        self.session = open_client(settings.bus, timeout_s=20)
+        self.said: list[M] = []
+        self.truth = pb.Truth()
+        self._kept = [
+            subscribe(self.session, PROCEDURE, self.prefix, lambda _, m: self.said.append(m)),
+            subscribe(self.session, TRUTH, self.prefix, lambda _, m: self.truth.CopyFrom(m)),
+        ]
+
+    def order(self, action: str, **more) -> pb.Reply:
+        number = pb.ProcedureCommand.Action.Value(f"ACTION_{action}")
+        command = pb.ProcedureCommand(action=number, device="cube", user="anna", **more)
+        return orders.give(self.session, self.prefix, orders.PROCEDURES, command, "cube")
+
+    def until(self, wanted, seconds: float = 60.0) -> M:
+        """The first status that is as wanted."""
+        end, seen = time.monotonic() + seconds, 0
+        while time.monotonic() < end:
+            for m in self.said[seen:]:
+                seen += 1
+                if wanted(m):
+                    return m
+            time.sleep(0.05)
+        last = self.said[-1] if self.said else None
+        raise AssertionError(f"not seen; last: {last}\n{self.demo.text()[-3000:]}")
+
+    def start(self, name: str) -> None:
+        self.said.clear()
+        reply = self.order("START", procedure=name, unit="SN-1", own_session=True)
+        assert reply.ok, reply.message
+
+    def ended(self) -> M:
+        return self.until(lambda m: m.state >= M.STATE_DONE and "closed" not in m.instruction)
+
+    def report(self, session: str, *more: str) -> dict:
+        out = self.demo.folder / f"out-{time.monotonic_ns()}"
+        words = ["report", session, "--config", str(self.demo.config), "--out", str(out), *more]
+        command = [sys.executable, "-P", "-m", "gyrofree", *words]
+        made = subprocess.run(command, capture_output=True, text=True, timeout=120)
+        assert made.returncode in (0, 1), made.stderr
+        return {path.suffix: path.read_bytes() for path in out.iterdir()}
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    with RunningDemo(tmp_path_factory.mktemp("procedures")) as demo:
+        made = Bench(demo)
+        made.until(lambda m: m.state == M.STATE_IDLE and "short" in m.offered)
+        yield made
+        made.session.close()
+
+
+def test_a_run_ends_with_a_report_of_its_steps_and_the_same_bytes(bench):
+    bench.start("short")
+    assert not bench.order("START", procedure="short").ok  # one at a time
+    m = bench.ended()
+    assert m.state == M.STATE_DONE, m.message
+    assert [s.state for s in m.steps] == [M.Step.STATE_DONE] * 3
+    assert m.unit == "SN-1" and m.operator == "anna"
+    assert m.steps[1].state == M.Step.STATE_DONE and "tachometer" in m.reference
+    first, again = bench.report(m.session), bench.report(m.session)
+    assert first == again
+    said = json.loads(first[".json"])
+    assert said["procedure"]["unit"] == "SN-1" and said["procedure"]["sha256"] == m.sha256
+    step = said["procedure"]["steps"][1]
+    assert step["segment"]["omega"] == pytest.approx(1.5708, abs=0.02)
+    assert step["segment"]["end"] - step["segment"]["begin"] == pytest.approx(2.0, abs=0.01)
+    assert step["standard_error_radps"] > 0.0
+    checks = {check["name"]: check for check in said["checks"]}
+    assert checks["step 2, +90 deg/s: rate_error_dps"]["passed"] is True
+    assert checks["hysteresis_ppm"]["passed"] is None and said["verdict"] == "incomplete"
+    assert b"SN-1" in first[".html"] and m.sha256.encode() in first[".html"]
+
+
+def test_a_killed_service_goes_on_where_it_was(bench):
+    bench.start("longer")
+    m = bench.until(lambda m: m.step == 1 and m.steps[1].state == M.Step.STATE_DWELL)
+    os.kill(bench.demo.children()["procedures"].pid, signal.SIGKILL)
+    end = bench.ended()
+    assert (end.run, end.session, end.state) == (m.run, m.session, M.STATE_DONE), end.message
+    assert [s.attempts for s in end.steps] == [1, 2, 1]
+    assert end.steps[1].until_us - end.steps[1].from_us == 6_000_000
+    # The table was driven all the while; the first step's window is still the one before the kill.
+    assert end.steps[0].until_us == m.steps[0].until_us < end.steps[1].from_us
+
+
+def test_an_emergency_stop_stands_the_table_and_ends_the_run(bench):
+    bench.start("longer")
+    bench.until(lambda m: m.step == 1 and m.steps[1].state == M.Step.STATE_DWELL)
+    assert abs(bench.truth.omega_ib_b_radps[2]) > 1.0
+    assert bench.order("STOP").ok
+    m = bench.ended()
+    assert m.state == M.STATE_STOPPED and "anna" in m.message
+    assert abs(bench.truth.omega_ib_b_radps[2]) < 0.02 or bench.truth.profile_time_s < 5.0
+    said = json.loads(bench.report(m.session)[".json"])
+    assert said["verdict"] == "incomplete" and said["procedure"]["state"] == "STATE_STOPPED"
+
+
+def test_open_steps_are_confirmed_and_poses_are_followed(bench):
+    bench.start("open")
+    bench.until(lambda m: m.state == M.STATE_RUNNING and m.instruction.startswith("Read"))
+    assert "temperature" in bench.order("NEXT").message  # what was read is wanted
+    assert bench.order("NEXT", text="23.5").ok
+    m = bench.ended()
+    assert m.state == M.STATE_DONE, m.message
+    assert m.steps[0].reason == "temperature in deg C: 23.5" and m.steps[0].confirmed_by == "anna"
+    said = json.loads(bench.report(m.session)[".json"])
+    assert [s["segment"] is not None for s in said["procedure"]["steps"]] == [False, True, True]
+
+
+def test_an_order_that_cannot_be_says_why(bench):
+    assert "did you mean 'short'" in bench.order("START", procedure="shrt").message
+    assert bench.order("REPEAT").message == "no procedure runs on cube"
