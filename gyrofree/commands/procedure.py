@@ -205,3 +205,32 @@ def abort(device: Device = "cube", config: Config = None) -> None:
 def stop(device: Device = "cube", config: Config = None) -> None:
     """EMERGENCY STOP: the driven table stops at once, the run ends."""
     _order("STOP", device, config)
+
+
+@app.command()
+def compare(
+    sessions: Annotated[
+        list[str], typer.Argument(help="Ids of sessions, or paths of MCAP files: one for a unit.")
+    ],
+    out: Annotated[Path | None, typer.Option(help="Write the sheet to this CSV file too.")] = None,
+    as_json: AsJson = False,
+    config: Config = None,
+) -> None:
+    """One sheet for a batch of units: figures with two standard errors, and who is unlike the
+    others.
+    """
+    from sessions.procedure import sheet
+
+    settings = settings_of(config)
+    try:
+        made = sheet.made([(name, file_of(settings, name)) for name in sessions])
+        if out is not None:
+            sheet.write(made, out)
+    except (ValueError, OSError) as error:
+        raise fail(error, EXIT_CONFIG) from None
+    if as_json:
+        say(json.dumps(sheet.as_json(made), indent=2))
+        return
+    show_table(sheet.table(made))
+    for remark in sheet.remarks(made):
+        say(remark)

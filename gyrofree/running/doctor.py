@@ -4,7 +4,6 @@ Each check returns one Finding; none changes anything. `health` asks a running s
 life and is what the containers' health checks call.
 """
 
-import contextlib
 import ctypes
 import grp
 import importlib.metadata
@@ -20,8 +19,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from queue import Empty, Queue
 from urllib.parse import urlsplit
-
-from google.protobuf.message import DecodeError
 
 from gyrofree.config import Settings
 from messages.bus.session import BusUnavailable, open_client, subscribe
@@ -81,20 +78,18 @@ def _settings(settings: Settings) -> list[Finding]:
         session = open_client(settings.bus, timeout_s=HEALTH_WAIT)
     except BusUnavailable:
         return []
-    heard: Queue[tuple[str, bytes]] = Queue()
+    heard: Queue[pb.EstimatorStatus] = Queue()
     with session:
         subscription = subscribe(
-            session, ESTIMATOR, settings.bus.prefix, lambda key, payload: heard.put((key, payload))
+            session, ESTIMATOR, settings.bus.prefix, lambda _, message: heard.put(message)
         )
         time.sleep(LISTEN_S)
         subscription.undeclare()
     said: dict[str, str] = {}
     while not heard.empty():
-        key, payload = heard.get()
-        device = key.removeprefix(f"{settings.bus.prefix}/").partition("/")[0]
-        with contextlib.suppress(DecodeError):
-            message = pb.EstimatorStatus.FromString(bytes(payload)).message
-            said[device] = max(said.get(device, ""), message.partition(DOUBTED)[2], key=len)
+        status = heard.get()
+        device = status.header.device
+        said[device] = max(said.get(device, ""), status.message.partition(DOUBTED)[2], key=len)
     return [
         Finding(f"settings of {device}", "warn", plain(text), "change the setting, start it anew")
         if text

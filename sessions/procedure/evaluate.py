@@ -22,7 +22,7 @@ from sessions.report.analysis import Analysis
 from sessions.report.data import Run
 from sessions.report.metrics import Metric
 from sessions.report.segments import Segment, reference
-from sessions.report.table_test import Plateau
+from sessions.report.table_test import FLOOR, Plateau
 from sessions.report.verdict import Check
 
 Array = NDArray[np.float64]
@@ -122,12 +122,14 @@ def evaluate(held: Held, found: Analysis, figures: list[Metric]) -> Outcome:
         steps.append(_step(number, step, record, part, held, found))
     more = [_hysteresis(steps)]
     values = {metric.name: metric for metric in [*figures, *more]}
-    sigmas = _sigmas(held, found) | {"hysteresis_ppm": _hysteresis_sigma(steps)}
+    errors = sigmas(held.plan.procedure.estimator, found) | {
+        "hysteresis_ppm": _hysteresis_sigma(steps)
+    }
     checks = [check for one in steps for check in one.checks]
     for name, limit in held.plan.procedure.limits.items():
         metric = values.get(name)
         value, text = (metric.value, metric.text) if metric is not None else (None, "")
-        checks.append(Check(name, value, limit.min, limit.max, text, sigmas.get(name)))
+        checks.append(Check(name, value, limit.min, limit.max, text, errors.get(name)))
     if held.status.state != M.STATE_DONE:
         how = held.status.message or "it was not run to its end"
         checks.append(Check("run to its end", None, None, None, how))
@@ -232,13 +234,25 @@ def _hysteresis_sigma(steps: list[StepResult]) -> float | None:
     return max(pairs, key=lambda pair: abs(pair[0]))[1] / full * 1e6
 
 
-def _sigmas(held: Held, found: Analysis) -> dict[str, float | None]:
-    """Standard errors of figures of the whole, where they are known."""
-    rate = found.rate(held.plan.procedure.estimator)
+def sigmas(estimator: str, found: Analysis) -> dict[str, float | None]:
+    """Standard errors of figures of the whole, from those of the plateaus, where they are known."""
+    rate = found.rate(estimator)
     fit = rate.fit if rate is not None else None
-    if fit is None:
+    if rate is None or fit is None:
         return {}
-    return {
+    known = {
         "scale_factor_error_ppm": fit.scale_factor_sigma * 1e6,
         "rate_bias_dps": float(fit.bias_sigma / DEG),
     }
+    levels = np.array([p.segment.omega for p in rate.plateaus])
+    errors = np.array([p.standard_error[2] for p in rate.plateaus])
+    full = float(np.abs(levels).max())
+    if np.isfinite(errors).all() and full > 0.0:
+        known["linearity_ppm"] = float(errors.max() / full * 1e6)
+        if fit.asymmetry_ppm is not None:
+            weights = np.hypot(errors, FLOOR)
+            design = np.column_stack([np.ones_like(levels), levels, np.abs(levels)])
+            design /= weights[:, None]
+            spread = np.sqrt(np.linalg.inv(design.T @ design)[2, 2])
+            known["asymmetry_ppm"] = float(2.0 * spread / fit.scale_factor * 1e6)
+    return known

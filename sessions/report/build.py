@@ -46,6 +46,39 @@ class Report:
         return files
 
 
+@dataclass(frozen=True)
+class Judged:
+    """A session, analysed and judged, before anything is drawn."""
+
+    manifest: Manifest | None
+    found: Analysis
+    spec: Spec  # the one that was asked for, or the procedure's
+    figures: list[Metric]
+    checks: list[Check]
+    held: Held | None
+    outcome: Outcome | None
+
+
+def judged(
+    path: Path, spec: Spec, device: str = "", boot: int | None = None, progress: Progress = silent
+) -> Judged:
+    """The figures of an MCAP file against limits; raises as `build`."""
+    manifest = _manifest(path)
+    held = held_by(path, manifest, device)
+    if held is not None:
+        device, boot = held.status.header.device, held.epoch if boot is None else boot
+        if spec == load_spec(None):  # nobody asked for other limits than the procedure's
+            spec = Spec(title=held.plan.procedure.title, estimator=held.plan.procedure.estimator)
+    run = load_run(path, device, boot, progress)
+    found = analyse(run, manifest, _parts(held, run))
+    figures = metrics(found, spec.estimator)
+    checks, outcome = judge(spec, figures), None
+    if held is not None:
+        outcome = evaluate(held, found, figures)
+        figures, checks = [*figures, *outcome.figures], outcome.checks + checks
+    return Judged(manifest, found, spec, figures, checks, held, outcome)
+
+
 def build(
     path: Path, spec: Spec, device: str = "", boot: int | None = None, progress: Progress = silent
 ) -> Report:
@@ -55,29 +88,18 @@ def build(
     Raises ReportError when the recording has nothing to report on, SpecError for a limit on no
     figure, OSError.
     """
-    manifest = _manifest(path)
-    held = held_by(path, manifest, device)
-    if held is not None:
-        device, boot = held.status.header.device, held.epoch if boot is None else boot
-        if spec == load_spec(None):  # nobody asked for other limits than the procedure's
-            spec = Spec(title=held.plan.procedure.title, estimator=held.plan.procedure.estimator)
-    run = load_run(path, device, boot, lambda done, what: progress(0.6 * done, what))
-    progress(0.6, "analysing")
-    found = analyse(run, manifest, _parts(held, run))
-    figures = metrics(found, spec.estimator)
-    checks, extra, outcome = judge(spec, figures), Extra(), None
-    if held is not None:
-        outcome = evaluate(held, found, figures)
-        figures, checks = [*figures, *outcome.figures], outcome.checks + checks
-        extra = Extra(facts(outcome), [steps(outcome)], provenance(outcome))
+    one = judged(path, spec, device, boot, lambda done, what: progress(0.6 * done, what))
+    extra = Extra()
+    if one.outcome is not None:
+        extra = Extra(facts(one.outcome), [steps(one.outcome)], provenance(one.outcome))
     progress(0.65, "drawing")
-    sha256 = sha256_of(path)
-    document = compose(found, manifest, sha256, spec, checks, pictures(found), extra)
+    sha256, drawn = sha256_of(path), pictures(one.found)
+    document = compose(one.found, one.manifest, sha256, one.spec, one.checks, drawn, extra)
     progress(0.85, "writing")
     report = Report(
         html=to_html(document),
         pdf=to_pdf(document),
-        json=_json(found, manifest, sha256, spec, figures, checks, outcome),
+        json=_json(one, sha256),
         verdict=document.verdict,
     )
     progress(1.0, "done")
@@ -97,15 +119,9 @@ def sha256_of(path: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def _json(
-    found: Analysis,
-    manifest: Manifest | None,
-    sha256: str,
-    spec: Spec,
-    figures: list[Metric],
-    checks: list[Check],
-    outcome: Outcome | None,
-) -> str:
+def _json(one: Judged, sha256: str) -> str:
+    manifest, found, spec, outcome = one.manifest, one.found, one.spec, one.outcome
+    figures, checks = one.figures, one.checks
     content: dict[str, Any] = {
         "session": manifest.id if manifest else None,
         "device": found.run.device,
