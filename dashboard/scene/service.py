@@ -21,8 +21,8 @@ log = logging.getLogger(__name__)
 
 __all__ = ["OWN_INPUTS", "SceneError", "SceneHandle", "start"]
 
-POSE_S = 1 / 25  # period of poses
-PANEL_S = 1 / 4  # period of charts and tables
+POSE_S = 1 / 20  # period of poses
+PANEL_S = 0.4  # period of charts and tables
 
 
 class SceneSettings(Protocol):

@@ -56,6 +56,7 @@ class View:
         self._page_chosen = False
         self._last: dict[str, int] = {}  # page that was open in each workspace
         self._rooms: list[dict] = []
+        self._cursors: tuple[float, float] | tuple[()] = ()
         self._theme()
         self.scene = SceneView(client, self._choice)
         with client.atomic():
@@ -112,7 +113,8 @@ class View:
         t1 = device.t_newest if self._paused_at is None else self._paused_at
         t0 = max(t1 - WINDOWS[self._window], device.t_first)
         clock = self._store.replay.clock(device.name, now)
-        return Snapshot(self._store, device, t0, max(t1, t0 + 1.0), clock, self._choice.dark)
+        t1 = max(t1, t0 + 1.0)
+        return Snapshot(self._store, device, t0, t1, clock, self._choice.dark, self._cursors)
 
     # --- building
 
@@ -186,6 +188,8 @@ class View:
                 self._choice.follow = wish.follow
             if wish.layers is not None:
                 self._choice.layers.update({layer: layer in wish.layers for layer in LAYERS})
+            if wish.cursors is not None:
+                self._cursors = wish.cursors
             if wish.size in WIDTHS:
                 self._fit(wish.size)
             self._turn_to(wish)

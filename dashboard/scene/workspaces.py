@@ -78,6 +78,7 @@ class Wish:
     pause: bool | None = None
     follow: bool | None = None
     layers: frozenset[str] | None = None  # those shown
+    cursors: tuple[float, float] | tuple[()] | None = None  # s on the device's axis; (): none
     do: tuple[str, ...] = field(default=())  # "camera", "play", "back", "on"
 
     @classmethod
@@ -101,8 +102,17 @@ class Wish:
             pause=switch.get(given.get("pause", "")),
             follow=switch.get(given.get("follow", "")),
             layers=None if layers is None else frozenset(layers.split(".")) & frozenset(LAYERS),
+            cursors=_cursors(given.get("cursors")),
             do=tuple(given.get("do", "").split(".")),
         )
+
+
+def _cursors(text: str | None) -> tuple[float, float] | tuple[()] | None:
+    try:
+        a, b = map(float, (text or "").split("_"))
+    except ValueError:
+        return None if text is None else ()
+    return (min(a, b), max(a, b)) if abs(a) + abs(b) < 1e12 else ()
 
 
 def stated(**state: Any) -> str:

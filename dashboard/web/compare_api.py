@@ -56,6 +56,9 @@ def comparison(
     everything: Annotated[
         bool, Query(description="all estimators, not the leading ones only")
     ] = False,
+    cursors: Annotated[
+        str, Query(max_length=60, description="begin_end of a stretch to be measured, s")
+    ] = "",
 ) -> Response:
     """202 with the share done while a recording is still being read; 409 for sessions that cannot
     be compared.
@@ -82,7 +85,7 @@ def comparison(
     except CompareError as error:
         raise HTTPException(409, str(error)) from None
     window = [value if value is None or math.isfinite(value) else None for value in (begin, end)]
-    drawn = drawing(result, window[0], window[1], points, everything)
+    drawn = drawing(result, window[0], window[1], points, everything, _cursors(cursors))
     _add_notes(front, result, drawn)
     facts = as_dict(result)
     table = {name: facts[name] for name in ("bin_s", "differences", "track_differences")}
@@ -101,6 +104,18 @@ def _ids(text: str) -> list[str]:
     if len(set(chosen)) < len(chosen):
         raise HTTPException(422, "the same session twice")
     return chosen
+
+
+def _cursors(text: str) -> tuple[float, float] | None:
+    if not text:
+        return None
+    try:
+        a, b = map(float, text.split("_"))
+    except ValueError:
+        a = b = math.nan
+    if not math.isfinite(a + b):
+        raise HTTPException(422, f"cursors {text[:60]!r}: want begin_end, s")
+    return min(a, b), max(a, b)
 
 
 def _offsets(text: str) -> dict[str, float]:

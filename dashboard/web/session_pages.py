@@ -26,7 +26,7 @@ TRENDS = (
     ("accel_bias_y_mg", "equivalent bias y, mg"),
     ("accel_bias_z_mg", "equivalent bias z, mg"),
     ("scale_factor_error_ppm", "scale factor error, ppm"),
-    ("rate_rms_z_dps", "RMS of ω_z, deg/s"),
+    ("rate_rms_z_dps", "RMS of ω_z, °/s"),
     ("angle_error_deg", "angle error at the end, deg"),
 )
 

@@ -113,7 +113,7 @@ def offsets_of(texts: list[str]) -> dict[str, float]:
 
 
 def show(result: "Comparison") -> None:
-    """For people: deg/s."""
+    """For people: °/s."""
     _show_offsets(result)
     _show_differences(result)
     if result.tracks:
@@ -155,9 +155,9 @@ def _show_differences(result: "Comparison") -> None:
         Column("session", no_wrap=True),
         "line",
         "against",
-        "x, deg/s",
-        "y, deg/s",
-        "z, deg/s",
+        "x, °/s",
+        "y, °/s",
+        "z, °/s",
         "over",
         title="RMS difference",
     )

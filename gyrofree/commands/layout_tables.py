@@ -65,7 +65,7 @@ def axes_table(layout: Any) -> Table:
 def figures_table(found: list[Any]) -> Table:
     table = Table("", *(q.layout.name for q in found))
     degrees = math.degrees
-    turning = f"w at {degrees(found[0].rate[2]):.0f} deg/s, filter, deg/s"
+    turning = f"w at {degrees(found[0].rate[2]):.0f} °/s, filter, °/s"
     rows = [
         ("axes", [str(q.layout.axes) for q in found]),
         ("scale (counts as 1), mm", [f"{1e3 * q.layout.scale_m:g}" for q in found]),
@@ -83,7 +83,7 @@ def figures_table(found: list[Any]) -> Table:
             "noise of w' x y z, rad/s2",
             [_three_of(q.sigma_least_squares[:3], 1.0, 3) for q in found],
         ),
-        ("w by integration, deg/s per root s", [_three_of(q.walk, degrees(1.0), 2) for q in found]),
+        ("w by integration, °/s per root s", [_three_of(q.walk, degrees(1.0), 2) for q in found]),
         (turning, [_three_of(q.sigma_rate, degrees(1.0), 2) for q in found]),
     ]
     for name, values in rows:

@@ -16,11 +16,10 @@ from matplotlib.axes import Axes
 
 from logs.cube_log import CubeLog
 from logs.cube_run import EstimatorRun, Reference
-from logs.figures.colours import COLOURS
+from logs.figures.names import RATE_UNIT, REFERENCE, estimator_colour, estimator_title
 from messages.text import drawn
 
 DEG = 180.0 / np.pi
-REFERENCE = "#222222"
 STYLE = {
     "font.size": 9,
     "axes.spines.top": False,
@@ -79,13 +78,14 @@ def _rates(
 ) -> None:
     known = bool(np.isfinite(truth.omega_b[:, k]).any())
     reach = 0.0
-    for colour, (name, track) in zip(COLOURS * 3, tracks.items(), strict=False):
-        left.plot(t, track.omega_b[:, k] * DEG, color=colour, label=name)
+    for name, track in tracks.items():
+        colour, title = estimator_colour(name, tracks), estimator_title(name)
+        left.plot(t, track.omega_b[:, k] * DEG, color=colour, label=title)
         if not known:
             continue
         error = (track.omega_b[:, k] - truth.omega_b[:, k]) * DEG
         rms = result["estimators"][name]["rate_rms_radps"][k] * DEG
-        right.plot(t, error, color=colour, label=f"{name}: RMS {rms:.2f} °/s")
+        right.plot(t, error, color=colour, label=f"{title}: RMS {rms:.2f} {RATE_UNIT}")
         if name == result["default"]:
             sigma = 3.0 * np.sqrt(np.maximum(track.P[:, k, k], 0.0)) * DEG
             right.fill_between(t, -sigma, sigma, color=colour, alpha=0.15, linewidth=0)
@@ -110,7 +110,7 @@ def _rates(
             transform=right.transAxes,
             ha="center",
         )
-    left.set_ylabel(f"$\\omega_{axis}$, °/s")
+    left.set_ylabel(f"$\\omega_{axis}$, {RATE_UNIT}")
     right.set_ylabel(f"error of $\\omega_{axis}$, °/s")
 
 
@@ -118,11 +118,12 @@ def _angles(
     left: Axes, right: Axes, t: np.ndarray, tracks: Mapping[str, EstimatorRun], truth: Reference
 ) -> None:
     known = bool(np.isfinite(truth.angle_z).any())
-    for colour, (name, track) in zip(COLOURS * 3, tracks.items(), strict=False):
+    for name, track in tracks.items():
+        colour, title = estimator_colour(name, tracks), estimator_title(name)
         left.plot(t, track.angle_z * DEG, color=colour)
         if known:
             error = (track.angle_z - truth.angle_z) * DEG
-            right.plot(t, error, color=colour, label=f"{name}: {error[-1]:+.1f}° at the end")
+            right.plot(t, error, color=colour, label=f"{title}: {error[-1]:+.1f}° at the end")
     if known:
         left.plot(t, truth.angle_z * DEG, color=REFERENCE, linewidth=0.9, linestyle=(0, (4, 2)))
         right.set_yscale("symlog", linthresh=5.0)

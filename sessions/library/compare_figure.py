@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from logs.figures.colours import COLOURS
+from logs.figures.names import ANGLE_UNIT, RATE_UNIT, line_colour, line_title
 from sessions.library.compare import Comparison, Overlaid, moved
 from sessions.library.curves import TACHO, Line
 from sessions.report.figures import STYLE
@@ -20,7 +20,8 @@ DASHES = (
     (0, (5, 2)),
     (0, (1.5, 1.5)),
     (0, (6, 2, 1.5, 2)),
-)  # sessions are told apart without colour, too
+)
+SHADES = (1.0, 0.75, 0.55, 0.45)  # colours tell estimators; sessions have dashes and shades
 
 
 def draw(found: Comparison, path: Path) -> Path:
@@ -41,7 +42,7 @@ def draw(found: Comparison, path: Path) -> Path:
             line = one.curves.lines.get(one.lead)
             if line is not None and line.part("angle_z") is not None:
                 _plot(angle, one, line, "angle_z", k)
-        angle.set(ylabel="angle about z, deg", xlabel="s")
+        angle.set(ylabel=f"angle about z, {ANGLE_UNIT}", xlabel="s")
         _words(marks, found)
         if tracks:
             _tracks(figure.add_subplot(grid[4, :]), tracks)
@@ -57,22 +58,23 @@ def _component(left: Axes, right: Axes, found: Comparison, name: str) -> None:
         line = one.curves.lines.get(one.lead)
         if line is None:
             continue
-        _plot(left, one, line, name, k, f"{one.curves.session}: {line.title}")
+        _plot(left, one, line, name, k, f"{one.curves.session}: {line_title(line.title)}")
         against, errors = one.curves.error_of(line)
         if name in errors:
             t, values = _thinned(one.curves.t + one.offset_s, errors[name])
             right.plot(
                 t,
                 np.degrees(values),
-                color=COLOURS[k],
+                color=line_colour(line.title),
+                alpha=SHADES[k],
                 linestyle=DASHES[k],
-                label=f"against {against}",
+                label=f"against {line_title(against)}",
             )
         for tacho in one.curves.of_kind(TACHO)[:1]:
             if name in tacho.components:
                 _plot(left, one, tacho, name, k, alpha=0.45, linewidth=0.6)
-    left.set_ylabel(f"$\\omega_{name}$, deg/s")
-    right.set_ylabel(f"error of $\\omega_{name}$, deg/s")
+    left.set_ylabel(f"$\\omega_{name}$, {RATE_UNIT}")
+    right.set_ylabel(f"error of $\\omega_{name}$, {RATE_UNIT}")
     if not right.lines:
         right.text(
             0.5,
@@ -94,10 +96,10 @@ def _plot(
         ax.plot(
             t,
             np.degrees(values),
-            color=COLOURS[k],
+            color=line_colour(line.title),
             linestyle=DASHES[k],
             label=label or None,
-            **style,
+            **({"alpha": SHADES[k]} | style),
         )
 
 
@@ -132,15 +134,20 @@ def _tracks(ax: Axes, tracks: list[tuple[int, Overlaid, str]]) -> None:
     origin = one.curves.tracks[key].origin
     for k, one, key in tracks:
         points = moved(one.curves.tracks[key], origin)
+        name = key.split("/", 1)[1].removeprefix("nav/")
+        colour = line_colour(name)
         if key.endswith("/gnss"):
-            ax.plot(points[:, 2], points[:, 1], ".", color=COLOURS[k], markersize=2, alpha=0.6)
+            ax.plot(
+                points[:, 2], points[:, 1], ".", color=colour, markersize=2, alpha=0.6 * SHADES[k]
+            )
         else:
             ax.plot(
                 points[:, 2],
                 points[:, 1],
-                color=COLOURS[k],
+                color=colour,
+                alpha=SHADES[k],
                 linestyle=DASHES[k],
-                label=f"{k + 1}: {key}",
+                label=f"{k + 1}: {key.split('/')[0]} {line_title(name)}",
             )
     ax.set(xlabel="east, m", ylabel="north, m")
     ax.set_aspect("equal", adjustable="datalim")

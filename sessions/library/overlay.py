@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from logs.figures.names import line_colour, line_title
+from logs.figures.stretch import stretch
 from sessions.library.compare import Comparison, Overlaid, moved
 from sessions.library.curves import RATE, TACHO, TRUTH, Line
 
@@ -24,8 +26,10 @@ def drawing(
     end_s: float | None = None,
     points: int = POINTS,
     everything: bool = False,
+    cursors: tuple[float, float] | None = None,
 ) -> dict[str, Any]:
-    """Lines of rate, error and angle within a window, and the tracks; for JSON.
+    """Lines of rate, error and angle within a window, and the tracks; for JSON. Between two cursors
+    (s on the first session's time) every sample of the curves is measured, too.
 
     `everything`: all estimators of every session instead of its leading line. Units: deg/s, deg, s,
     m.
@@ -36,7 +40,10 @@ def drawing(
     lines = []
     for number, one in enumerate(found.sessions):
         for line in _shown(one, number, everything):
-            lines.append(_line(one, number, line, begin, end, points))
+            drawn = _line(one, number, line, begin, end, points)
+            if cursors is not None:
+                drawn["measured"] = _measured(one, line, *cursors)
+            lines.append(drawn)
     return {
         "span": list(span),
         "window": [begin, end],
@@ -95,12 +102,32 @@ def _line(
         "session": number,
         "key": line.key,
         "kind": line.kind,
-        "title": line.title,
+        "title": line_title(line.title),
+        "colour": line_colour(line.title),
+        "reference": line.kind in (TACHO, TRUTH),
         "t0": t + one.offset_s,
         "dt": step,
         "rate": parts,
         "error": errors,
         "against": against,
+        "angle": {"z": angle} if angle else {},
+    }
+
+
+def _measured(one: Overlaid, line: Line, begin: float, end: float) -> dict[str, Any]:
+    """Figures between two cursors, by kind and component, as _line gives the points."""
+    t = one.curves.t + one.offset_s
+    parts = {name: line.part(name) for name in line.components}
+    rates = {
+        name: stretch(t, part[0] * DEG, begin, end)
+        for name, part in parts.items()
+        if part is not None
+    }
+    angle = rates.pop("angle_z", None)
+    errors = one.curves.error_of(line)[1]
+    return {
+        "rate": rates,
+        "error": {name: stretch(t, e * DEG, begin, end) for name, e in errors.items()},
         "angle": {"z": angle} if angle else {},
     }
 
@@ -153,7 +180,9 @@ def _tracks(found: Comparison) -> list[dict[str, Any]]:
             {
                 "session": number,
                 "key": key,
-                "title": key.split("/", 1)[1].removeprefix("nav/"),
+                "title": line_title(key.split("/", 1)[1].removeprefix("nav/")),
+                "colour": line_colour(key.split("/", 1)[1].removeprefix("nav/")),
+                "dots": key.endswith("/gnss"),
                 "t": np.round(points[:, 0] + one.offset_s, 2).tolist(),
                 "north": np.round(points[:, 1], 3).tolist(),
                 "east": np.round(points[:, 2], 3).tolist(),

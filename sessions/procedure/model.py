@@ -236,10 +236,10 @@ def plan_of(procedure: Procedure) -> tuple[Step, ...]:
                     Step(name, "still", 0.0, 0.0, step.seconds, STILL_DPS * DEG, limits=limits)
                 )
             case Rate():
-                found.append(_turn(step.name or f"{step.rate_dps:+g} deg/s", step.rate_dps, step))
+                found.append(_turn(step.name or f"{step.rate_dps:+g} °/s", step.rate_dps, step))
             case Staircase():
                 for k, level in enumerate(step.levels(), 1):
-                    where = f"{step.name or 'stair'} {k}: {level:+.4g} deg/s"
+                    where = f"{step.name or 'stair'} {k}: {level:+.4g} °/s"
                     found.append(_turn(where, level, step))
             case Pose():
                 name = step.name or f"{step.up} up"

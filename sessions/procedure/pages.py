@@ -62,7 +62,7 @@ def steps(outcome: Outcome) -> Grid:
         "result",
     )
     remark = (
-        f"Rates of {outcome.held.plan.procedure.estimator} about z in deg/s, over the dwell that"
+        f"Rates of {outcome.held.plan.procedure.estimator} about z in °/s, over the dwell that"
         " counts. Attempts: all, and of them spoilt."
     )
     return Grid("Steps of the procedure", head, rows, remark)

@@ -147,6 +147,6 @@ def asked(step: Step, driven: bool) -> str:
     dps = step.target / DEG
     way = "counter-clockwise" if dps > 0 else "clockwise"
     if driven:
-        return f"The table goes to {dps:+.4g} deg/s ({way} seen from above)"
+        return f"The table goes to {dps:+.4g} °/s ({way} seen from above)"
     turn = 360.0 / abs(dps)
-    return f"Turn the table {way} at {abs(dps):.4g} deg/s: one turn in {turn:.3g} s"
+    return f"Turn the table {way} at {abs(dps):.4g} °/s: one turn in {turn:.3g} s"

@@ -179,7 +179,7 @@ class TextTable:
         if not abs(omega) <= self.limit:
             most = self._said.limits.rate_dps
             raise TableError(
-                f"{self.name}: {math.degrees(omega):g} deg/s, it can {most:g}: change the procedure"
+                f"{self.name}: {math.degrees(omega):g} °/s, it can {most:g}: change the procedure"
             )
         if acceleration is not None and self._said.commands.set_acceleration:
             most = math.radians(self._said.limits.acceleration_dps2)

@@ -199,7 +199,7 @@ class Watch:
             omega, target = abs(omega), abs(want)
         if abs(omega - target) <= self.step.tolerance:
             return ""
-        said = f"it turns at {omega / DEG:+.1f} deg/s, wanted"
+        said = f"it turns at {omega / DEG:+.1f} °/s, wanted"
         if self.step.kind == "still":
             return f"{said} standstill"
         wanted = f"{said} {target / DEG:+.1f} ± {self.step.tolerance / DEG:g}"
@@ -208,7 +208,7 @@ class Watch:
 
     def _not_posed(self, t: float) -> str:
         if self.reference is not None and abs(self.reference.omega) > 2.0 * DEG:
-            return f"it turns at {self.reference.omega / DEG:+.1f} deg/s: let it rest"
+            return f"it turns at {self.reference.omega / DEG:+.1f} °/s: let it rest"
         force = self.evidence.force(t)
         if force is None:
             return "the direction of gravity is not known yet"

@@ -11,11 +11,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from logs.figures.colours import COLOURS
+from logs.figures.names import ANGLE_UNIT, RATE_UNIT, REFERENCE, estimator_colour, estimator_title
 from sessions.report.analysis import Analysis
 from sessions.report.data import Run
 from sessions.report.segments import grid, reference
 
-REFERENCE = "#000000"
 STYLE = {
     "font.family": "DejaVu Sans",
     "font.size": 8.5,
@@ -115,9 +115,9 @@ def _alpha(figure: Figure, found: Analysis) -> bool:
 def _omega(figure: Figure, found: Analysis) -> bool:
     if not found.run.rates:
         return False
-    ax = _axes(figure, "rate ω$_z$, deg/s")
+    ax = _axes(figure, f"rate ω$_z$, {RATE_UNIT}")
     for rate in found.run.rates:
-        ax.plot(rate.t, np.degrees(rate.omega_b[:, 2]), label=rate.name)
+        ax.plot(rate.t, np.degrees(rate.omega_b[:, 2]), **_look(rate.name))
     t, omega = _reference(found.run)
     if len(t):
         ax.plot(
@@ -130,9 +130,9 @@ def _omega(figure: Figure, found: Analysis) -> bool:
 def _angle(figure: Figure, found: Analysis) -> bool:
     if not found.run.rates:
         return False
-    ax = _axes(figure, "angle about z, deg")
+    ax = _axes(figure, f"angle about z, {ANGLE_UNIT}")
     for rate in found.run.rates:
-        ax.plot(rate.t, np.degrees(rate.angle_z - rate.angle_z[0]), label=rate.name)
+        ax.plot(rate.t, np.degrees(rate.angle_z - rate.angle_z[0]), **_look(rate.name))
     t, omega = _reference(found.run)
     if len(t):
         ax.plot(
@@ -153,7 +153,7 @@ def _position(figure: Figure, found: Analysis) -> bool:
     ax = _axes(figure, "position error, m")
     for rate in moving:
         distance = np.linalg.norm(rate.p_n, axis=1)
-        ax.semilogy(rate.t, np.where(distance > 1e-4, distance, np.nan), label=rate.name)
+        ax.semilogy(rate.t, np.where(distance > 1e-4, distance, np.nan), **_look(rate.name))
     ax.legend()
     return True
 
@@ -174,12 +174,12 @@ def _plateau_errors(figure: Figure, found: Analysis) -> bool:
             fmt="os^Dv"[k % 5],
             capsize=3,
             markersize=4,
-            label=rate.name,
+            **_look(rate.name),
         )
     ax.axhline(0.0, color="#555555", linewidth=0.8)
     ax.set_yscale("symlog", linthresh=1.0)
-    ax.set_xlabel("reference, deg/s")
-    ax.set_ylabel("mean error, deg/s")
+    ax.set_xlabel(f"reference, {RATE_UNIT}")
+    ax.set_ylabel(f"mean error, {RATE_UNIT}")
     ax.legend()
     return True
 
@@ -212,7 +212,7 @@ def _nis(figure: Figure, found: Analysis) -> bool:
         values = nis[at] / dof[at]
         width = max(1, len(values) // 60)
         smooth = np.convolve(values, np.ones(width) / width, mode="valid")
-        ax.plot(t[at][: len(smooth)] + 0.5 * (t[at][width - 1] - t[at][0]), smooth, label=name)
+        ax.plot(t[at][: len(smooth)] + 0.5 * (t[at][width - 1] - t[at][0]), smooth, **_look(name))
     ax.axhline(1.0, color="#555555", linestyle="--", linewidth=0.8)
     ax.set_yscale("log")
     ax.legend()
@@ -226,12 +226,17 @@ def _track(figure: Figure, found: Analysis) -> bool:
     figure.set_size_inches(WIDE, 4.0)
     ax = figure.subplots()
     for nav in drawn:
-        ax.plot(nav.p_ned[:, 1], nav.p_ned[:, 0], label=nav.name)
+        ax.plot(nav.p_ned[:, 1], nav.p_ned[:, 0], **_look(nav.name))
     ax.set_aspect("equal", adjustable="datalim")
     ax.set_xlabel("east, m")
     ax.set_ylabel("north, m")
     ax.legend()
     return True
+
+
+def _look(name: str) -> dict[str, str]:
+    """An estimator's name and colour, as everywhere."""
+    return {"label": estimator_title(name), "color": estimator_colour(name)}
 
 
 def _axes(figure: Figure, label: str):

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from logs.figures.names import estimator_title
 from sessions.recording.manifest import Manifest
 from sessions.report.analysis import Analysis
 
@@ -36,7 +37,7 @@ def deg(value: float | None, places: int = 3) -> str:
 def plateaus(found: Analysis) -> Grid | None:
     rows = [
         (
-            rate.name,
+            estimator_title(rate.name),
             f"{part.segment.begin:.2f}–{part.segment.end:.2f}",
             f"{part.segment.settle:.2f}",
             deg(part.segment.omega),
@@ -61,7 +62,7 @@ def plateaus(found: Analysis) -> Grid | None:
         "RMS x y z",
     )
     remark = (
-        "Rates in deg/s. Plateaus are found from the tachometer alone; 0.25 s at both ends are left"
+        "Rates in °/s. Plateaus are found from the tachometer alone; 0.25 s at both ends are left"
         " out."
     )
     return Grid("Rate error on every plateau", head, rows, remark)
@@ -76,7 +77,7 @@ def scale_factors(found: Analysis) -> Grid | None:
         asymmetry = "–" if fit.asymmetry_ppm is None else f"{fit.asymmetry_ppm:,.0f}"
         rows.append(
             (
-                rate.name,
+                estimator_title(rate.name),
                 f"{fit.scale_factor:.6f} ± {2 * fit.scale_factor_sigma:.6f}",
                 f"{fit.linearity_ppm:,.0f}",
                 asymmetry,
@@ -91,9 +92,9 @@ def scale_factors(found: Analysis) -> Grid | None:
         "scale factor",
         "linearity, ppm",
         "asymmetry, ppm",
-        "bias, deg/s",
+        "bias, °/s",
         "cross-axis x, y, mrad",
-        "RMS x y z, deg/s",
+        "RMS x y z, °/s",
         "angle error, deg",
     )
     remark = (
@@ -118,7 +119,7 @@ def biases(found: Analysis) -> Grid | None:
 def positions(found: Analysis) -> Grid | None:
     rows = [
         (
-            rate.name,
+            estimator_title(rate.name),
             f"{p.seconds:.1f}",
             " ".join(number(value) for value in p.error),
             number(float(np.linalg.norm(p.error))),
@@ -170,7 +171,7 @@ def consistency(found: Analysis) -> Grid | None:
     every = [one.nis for one in (*found.rates, *found.navigation) if one.nis is not None]
     rows = [
         (
-            one.name,
+            estimator_title(one.name),
             f"{one.count:,}",
             f"{one.mean:.3f}",
             f"{one.low:.3f}–{one.high:.3f}",
@@ -186,7 +187,7 @@ def consistency(found: Analysis) -> Grid | None:
 def navigation(found: Analysis) -> Grid | None:
     rows = [
         (
-            nav.name,
+            estimator_title(nav.name),
             str(nav.fixes),
             f"{nav.distance_m:,.0f}",
             number(nav.sigma_end_m),

@@ -172,3 +172,57 @@ def test_axes_follow_the_theme(visit):
     page.locator("details.menu summary").click()
     page.locator("[data-theme-toggle]").click()
     assert page.evaluate(darkest) < in_dark - 100
+
+
+def test_two_cursors_measure_every_sample_and_escape_takes_them_away(visit):
+    page = visit(f"/sessions/{SESSION}")
+    chart = plot(page, "rate z").locator(".chart")
+    chart.focus()
+    with page.expect_response(lambda answer: "cursors=" in answer.url) as answer:
+        page.keyboard.press("c")
+    (line,) = [one for one in answer.value.json()["lines"] if one["title"] == "products filter"]
+    table = plot(page, "rate z").locator(".gf-between")
+    expect(table).to_contain_text("of every sample")
+    assert table.locator("tr", has_text="products filter").locator("td").last.inner_text() == str(
+        line["measured"]["rate"]["z"]["n"]
+    )
+    before = table.locator("p").inner_text()
+    page.keyboard.press("ArrowRight")
+    expect(table.locator("p")).not_to_have_text(before)
+    assert page.locator(".gf-between").count() > 3  # the same stretch under every chart
+    page.keyboard.press("Escape")
+    expect(page.locator(".gf-between")).to_have_count(0)
+
+
+@pytest.mark.parametrize("kind", ["SVG", "PNG"])
+def test_a_figure_is_saved_with_title_unit_and_legend(visit, tmp_path, kind):
+    page = visit(f"/sessions/{SESSION}", scheme="dark")
+    with page.expect_download() as download:
+        plot(page, "rate z").get_by_role("button", name=f"Save the figure as {kind}").click()
+    path = tmp_path / download.value.suggested_filename
+    download.value.save_as(path)
+    if kind == "PNG":
+        assert path.read_bytes().startswith(b"\x89PNG") and path.stat().st_size > 20_000
+        return
+    text = path.read_text()
+    for words in ("°/s", "time, s since", "products filter", "tachometer", 'fill="#fff"'):
+        assert words in text
+    assert text.count("<path") > 5 and "NaN" not in text
+
+
+ODD = """async () => {
+  const { robust } = await import('/static/figure.js');
+  const x = Array.from({ length: 300 }, (_, k) => k / 10);
+  const y = x.map((t) => Math.sin(t));
+  const line = (values) => [{ label: 'a', x, low: values, high: values }];
+  const spike = y.with(100, 500), fresh = y.with(299, 500);
+  const signal = y.map((v, k) => v + (k > 100 && k < 130 ? 500 : 0));
+  const of = (values) => robust(line(values), 0, 30);
+  return [of(y), of(spike), of(fresh), of(signal), of(y.map(() => 3))];
+}"""
+
+
+def test_one_outlier_does_not_flatten_the_scale_and_a_signal_is_none(visit):
+    plain, spike, fresh, signal, constant = visit(f"/sessions/{SESSION}").evaluate(ODD)
+    assert plain is None and fresh is None and signal is None and constant is None
+    assert spike["max"] < 1.1 and [(one["x"], one["y"]) for one in spike["odd"]] == [(10, 500)]

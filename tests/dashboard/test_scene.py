@@ -183,7 +183,7 @@ def test_chart_data_are_of_one_length_finite_and_end_with_the_mask():
         Curve("b", "#D55E00", t[::7], t[::7]),
     ]
     data = _data(curves, 0.0, 10.0, 0)
-    assert len(data) == 1 + 3 + 1 + 3 and {len(array) for array in data} == {series.POINTS}
+    assert len(data) == 1 + 3 + 1 + 2 and {len(array) for array in data} == {series.POINTS}
     assert all(np.isfinite(array).all() for array in data) and not data[-1].any()
     assert data[2].max() < 20.0  # a band without bound does not press the curves flat
 
@@ -595,7 +595,6 @@ def test_what_comes_late_takes_its_place_and_is_marked():
     assert device.get("accel").message.header.sequence == 159
     edges = np.linspace(0.0, 6.0, 13)
     assert list(series.stretch_mask(device.late, edges)) == [0.0] * 8 + [1.0] * 12 + [0.0] * 4
-    assert list(np.flatnonzero(series.moment_mask([0.1, 5.9, 7.0], edges))) == [0, 22]
 
 
 def test_a_replay_that_is_paused_does_not_age():

@@ -221,7 +221,9 @@ def test_a_browser_gets_few_points_that_keep_the_extremes(pair):
     for line in drawn["lines"]:
         for part in (*line["rate"].values(), *line["error"].values(), *line["angle"].values()):
             assert len(part["low"]) <= 101
-    (z,) = [one for one in drawn["lines"] if one["session"] == 0 and one["title"] == "products-ekf"]
+    (z,) = [
+        one for one in drawn["lines"] if one["session"] == 0 and one["title"] == "products filter"
+    ]
     highest = np.degrees(np.nanmax(pair[0].lines["cube/rate/products-ekf"].high[:, 2]))
     assert max(v for v in z["rate"]["z"]["high"] if v is not None) == pytest.approx(
         highest, abs=1e-3

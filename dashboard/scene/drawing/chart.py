@@ -1,5 +1,8 @@
 """One uPlot chart: curves with 3-sigma bands, grey gaps, and a heading with live values.
 
+The heading also tells the page around the scene what is drawn (data-chart: title, unit, ranges with
+their names), from which static/figure.js makes cursors, named ranges and pictures for a paper.
+
 uPlot's own legend knows values only under the cursor, so the heading takes its place. Known traps
 of the charts and what is done about them: NaN is never sent; the time axis is told that it is not a
 date; a gap is a grey series on a scale of its own, drawn last and opaque so that it covers the
@@ -7,8 +10,11 @@ straight line beneath. What was filled in after a loss has an amber strip at the
 a vertical line, made the same way.
 """
 
+import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import viser
@@ -16,9 +22,12 @@ import viser
 from dashboard.scene.drawing import series
 from dashboard.scene.drawing.page import tag
 from dashboard.scene.drawing.palette import number, rgba
+from logs.figures.stretch import stretch
 
 LATE_HEIGHT = 0.035  # of the strip that marks filled-in data, of the chart's height
-REPAIRED, MARK = "#e69f00", "#cc79a7"  # both of the colour-blind safe palette
+MOST_RANGES = 24  # named in one chart
+SINGLE = np.float32  # of a browser's points: seven digits are more than a screen shows
+REPAIRED = "#e69f00"
 
 
 @dataclass
@@ -47,6 +56,16 @@ class Shade:
     colour: str
     t: np.ndarray
     on: np.ndarray
+
+
+@dataclass(frozen=True)
+class Range:
+    """What happened from t0 to t1, s; a moment where both are the same."""
+
+    t0: float
+    t1: float
+    text: str
+    kind: str = "mark"  # mark, step or late
 
 
 class Chart:
@@ -90,16 +109,27 @@ class Chart:
         dark: bool,
         primary: int = 0,
         late: Sequence[Sequence[float]] = (),
-        marks: Sequence[float] = (),
+        ranges: Sequence[Range] = (),
         shades: Sequence[Shade] = (),
+        cursors: tuple[float, float] | tuple[()] = (),
+        origin: str = "",
     ) -> None:
         """Draw the window [t0, t1]; gaps are those of the curve number `primary`.
 
         Stretches [from, until] of `late` get a strip at the bottom: filled in after a loss. Each of
-        `marks` (s) gets a line from top to bottom. A shade lies behind the times it names.
+        `ranges` is drawn with its name. A shade lies behind the times it names. Between the
+        cursors all samples are measured; `origin` says what the time counts from.
         """
         shades = [shade for shade in shades if len(shade.t)]
-        heading = self._heading_html(curves, shades)
+        inside = [one for one in ranges if one.t1 >= t0 and one.t0 <= t1][-MOST_RANGES:]
+        told = {
+            "title": re.sub(r"<[^>]*>", "", str(self._title)),
+            "unit": self._unit,
+            "origin": origin,
+            "ranges": [[one.t0, one.t1, one.text, one.kind] for one in inside],
+            "measured": _measured(curves, *cursors) if cursors else None,
+        }
+        heading = self._heading_html(curves, shades, told)
         if self._heading.content != heading:
             self._heading.content = heading
         curves = [curve for curve in curves if len(curve.t)]
@@ -107,7 +137,7 @@ class Chart:
             if self._plot is not None and self._plot.visible:
                 self._plot.visible = False
             return
-        data = _data(curves, t0, t1, min(primary, len(curves) - 1), late, marks, shades)
+        data = _data(curves, t0, t1, min(primary, len(curves) - 1), late, shades)
         signature = (
             dark,
             *(s.label for s in shades),
@@ -119,14 +149,19 @@ class Chart:
             # Changed in place: a browser that is behind would complain of an update of a chart
             # already removed.
             self._plot.series, self._plot.bands = _lines(curves, dark, shades)
-            self._plot.data = data
-        else:
-            self._plot.data = data
+            _send(self._plot, data)
+        elif not _same(self._plot.data, data):
+            _send(self._plot, data)
         self._signature = signature
         if not self._plot.visible:
             self._plot.visible = True
 
-    def _heading_html(self, curves: Sequence[Curve], shades: Sequence[Shade] = ()) -> str:
+    def _heading_html(
+        self,
+        curves: Sequence[Curve],
+        shades: Sequence[Shade],
+        told: dict[str, Any],
+    ) -> str:
         items = []
         for curve in curves:
             if not curve.label:
@@ -148,7 +183,9 @@ class Chart:
                 items.append(tag("span", sample, shade.label, class_="gf-item"))
         items = items or [tag("span", "no data yet", class_="gf-item gf-stale")]
         title = tag("span", self._title, " ", tag("em", self._unit), class_="gf-title")
-        return str(tag("div", title, tag("span", *items, class_="gf-legend"), class_="gf-chart"))
+        legend = tag("span", *items, class_="gf-legend")
+        data = json.dumps(told, separators=(",", ":"), ensure_ascii=False)
+        return str(tag("div", title, legend, class_="gf-chart", data_chart=data))
 
     def _build(
         self,
@@ -163,7 +200,12 @@ class Chart:
                 data,
                 series=lines,
                 bands=bands,
-                scales={"x": {"time": False}, "y": {}, "gap": {"range": (0, 1)}},
+                scales={
+                    "x": {"time": False},
+                    "y": {},
+                    "gap": {"range": (0, 1)},
+                    "strip": {"range": (0, 1 / LATE_HEIGHT)},
+                },
                 axes=(
                     {"size": 26, "font": "11px sans-serif"},
                     {"size": 46, "font": "11px sans-serif"},
@@ -207,9 +249,8 @@ def _lines(
         lines.append(fill | {"label": shade.label, "points": {"show": False}})
     grey = "#3b3b3b" if dark else "#d5d5d5"
     gap = {"label": "gap", "scale": "gap", "stroke": grey, "width": 0, "fill": grey, "fillTo": 0}
-    strip = gap | {"label": "filled in", "stroke": REPAIRED, "fill": REPAIRED}
-    mark = gap | {"label": "mark", "stroke": MARK, "fill": MARK}
-    lines += [line | {"points": {"show": False}} for line in (strip, mark, gap)]
+    strip = gap | {"label": "filled in", "scale": "strip", "stroke": REPAIRED, "fill": REPAIRED}
+    lines += [line | {"points": {"show": False}} for line in (strip, gap)]
     return tuple(lines), tuple(bands) or None
 
 
@@ -219,11 +260,10 @@ def _data(
     t1: float,
     primary: int,
     late: Sequence[Sequence[float]] = (),
-    marks: Sequence[float] = (),
     shades: Sequence[Shade] = (),
 ) -> tuple[np.ndarray, ...]:
-    """The arrays of a chart: time, each curve with the edges of its band, and the gap mask; all of
-    one length.
+    """The arrays of a chart: time, each curve with the edges of its band, and the masks of shades,
+    of what was filled in and of gaps; all of one length, in the smallest type that serves.
     """
     edges, x = series.grid(t0, t1)
     lines = [series.decimate(curve.t, curve.y, edges)[0] for curve in curves]
@@ -233,21 +273,43 @@ def _data(
     reach = max((high - low) / 2, 1e-9)
     out = [x]
     for curve, y in zip(curves, lines, strict=True):
-        out.append(y)
+        out.append(y.astype(SINGLE))
         if curve.half is not None:
             half = series.decimate(curve.t, curve.half, edges)[0]
             centre = np.zeros_like(y) if curve.about_zero else y
             out += [
-                np.clip(centre + half, low - reach, high + reach),
-                np.clip(centre - half, low - reach, high + reach),
+                np.clip(centre + half, low - reach, high + reach).astype(SINGLE),
+                np.clip(centre - half, low - reach, high + reach).astype(SINGLE),
             ]
     for shade in shades:  # the nearest sample's word, 0 or 1
         on = np.clip(np.searchsorted(shade.t, x), 0, len(shade.t) - 1)
-        out.append(shade.on[on].astype(float))
-    out.append(LATE_HEIGHT * series.stretch_mask(late, edges))
-    out.append(series.moment_mask(marks, edges))
+        out.append(shade.on[on].astype(np.uint8))
+    out.append(series.stretch_mask(late, edges).astype(np.uint8))
     t, y = curves[primary].t, curves[primary].y
     if not np.isfinite(y).any():
         t = t[:0]  # samples without a value are no values: all of it is a gap
-    out.append(series.gap_mask(t, edges, max(series.gap_limit(t), 2.5 * (edges[1] - edges[0]))))
+    pause = max(series.gap_limit(t), 2.5 * (edges[1] - edges[0]))
+    out.append(series.gap_mask(t, edges, pause).astype(np.uint8))
     return tuple(out)
+
+
+def _measured(curves: Sequence[Curve], a: float, b: float) -> dict[str, Any]:
+    """What lies between two cursors, of every sample; by label."""
+    return {
+        str(curve.label): stretch(curve.t, curve.y, a, b) | {"at": [a, b]}
+        for curve in curves
+        if curve.label
+    }
+
+
+def _send(plot: viser.GuiUplotHandle, data: tuple[np.ndarray, ...]) -> None:
+    """Set the data in the types that they have: viser's own setter makes 64 bits of each value,
+    which its page does not ask for, and which doubles what a browser receives.
+    """
+    plot._impl.props.data = data
+    plot._queue_update("data", data)
+
+
+def _same(before: Sequence[np.ndarray], now: Sequence[np.ndarray]) -> bool:
+    """Is there nothing new to send?"""
+    return len(before) == len(now) and all(map(np.array_equal, before, now))

@@ -3,48 +3,23 @@ formats.
 """
 
 import math
-from collections.abc import Iterable
 
+from logs.figures.names import (
+    FIX,
+    GYRO_FREE,
+    RATE_UNIT,
+    REFERENCE,
+    estimator_colour,
+    estimator_title,
+)
 from messages.contract import gyrofree_pb2 as pb
-from messages.text import plain
 
 ORANGE, SKY, GREEN, YELLOW = "#E69F00", "#56B4E9", "#009E73", "#F0E442"
 BLUE, VERMILLION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#8C8C8C"
 
 AXES = (VERMILLION, GREEN, SKY)  # x, y, z
-REFERENCE = GREEN  # tachometer
-FIX = ORANGE  # GNSS
 REJECTED = VERMILLION  # a fix the filter did not believe
-_ESTIMATORS = {
-    "products-ekf": SKY,
-    "products-free": SKY,
-    "least-squares": VERMILLION,
-    "ekf": SKY,
-    "huber-nhc": SKY,
-    "kf": VERMILLION,
-    "fpe-fuzzy": PURPLE,
-}
-_FURTHER = (PURPLE, YELLOW, ORANGE, BLUE, VERMILLION, SKY)
-GYRO_FREE = "gyro-free-"  # before the name of a filter that runs on a cube's own rate
-# Names for people; anything else is shown as it is called on the bus.
-_TITLES = {
-    "products-ekf": "products filter",
-    "least-squares": "least squares",
-    "products-free": "products, free body",
-    "products-ukf": "products, unscented",
-    "products-rls": "products, recursive",
-    "products-mhe": "products, moving horizon",
-    "ekf": "INS/GNSS filter",
-    "kf": "Kalman filter",
-    "kf-nhc": "Kalman + wheels",
-    "huber": "robust",
-    "huber-nhc": "robust + wheels",
-    "fpe-fuzzy": "predictive, fuzzy",
-    "mhe-robust": "robust horizon",
-    "vqf": "VQF",
-    "tilt-vector": "fixed weight, vector form",
-    "tilt-published": "fixed weight, published",
-}
+__all__ = ["FIX", "GYRO_FREE", "RATE_UNIT", "REFERENCE", "estimator_colour", "estimator_title"]
 
 SOURCES = {
     pb.SOURCE_SIMULATED: ("SIMULATED", PURPLE),
@@ -53,23 +28,6 @@ SOURCES = {
     pb.SOURCE_EMULATED: ("EMULATED", YELLOW),
     pb.SOURCE_UNKNOWN: ("SOURCE UNKNOWN", GREY),
 }
-
-
-def estimator_colour(name: str, among: Iterable[str] = ()) -> str:
-    """The colour of an estimator: fixed for ours, else by its place among the names that have
-    none.
-    """
-    if name in _ESTIMATORS:
-        return _ESTIMATORS[name]
-    others = sorted({other for other in among if other not in _ESTIMATORS} | {name})
-    return _FURTHER[others.index(name) % len(_FURTHER)]
-
-
-def estimator_title(name: str) -> str:
-    """The estimator's name for people."""
-    if name.startswith(GYRO_FREE):
-        return f"gyro-free, {estimator_title(name.removeprefix(GYRO_FREE))}"
-    return _TITLES.get(name) or plain(name, 40)
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-POINTS = 400  # per series: two per bucket
+POINTS = 300  # per series: two per bucket
 
 
 def grid(t0: float, t1: float, points: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
@@ -78,13 +78,3 @@ def stretch_mask(stretches: Sequence[Sequence[float]], edges: np.ndarray) -> np.
             first = max(np.searchsorted(edges, begin, side="right") - 1, 0)
             inside[first : max(np.searchsorted(edges, end, side="right"), first + 1)] = 1.0
     return np.repeat(inside, 2)
-
-
-def moment_mask(moments: Sequence[float], edges: np.ndarray) -> np.ndarray:
-    """1 at the first point of each bucket that holds one of the moments, s, else 0; (2 b,) for b
-    buckets.
-    """
-    mask = np.zeros(2 * (len(edges) - 1))
-    inside = [moment for moment in moments if edges[0] <= moment < edges[-1]]
-    mask[2 * (np.searchsorted(edges, np.array(inside), side="right") - 1)] = 1.0
-    return mask

@@ -4,6 +4,7 @@ import logging
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 
 import numpy as np
 import viser
@@ -11,7 +12,7 @@ import viser
 from dashboard.data.device import Device
 from dashboard.data.store import Store
 from dashboard.desk import Desk
-from dashboard.scene.drawing.chart import Chart, Curve, Shade
+from dashboard.scene.drawing.chart import Chart, Curve, Range, Shade
 from dashboard.scene.drawing.page import Markup, html
 from dashboard.scene.drawing.palette import estimator_colour, estimator_title
 from messages.bus.orders import OrderError
@@ -40,6 +41,7 @@ class Snapshot:
     t1: float
     now: float  # time.monotonic(), s; of a replay that is paused, when it was
     dark: bool
+    cursors: tuple[float, float] | tuple[()] = ()  # s, of the stretch that is measured
 
     def rows(self, topic: str, estimator: str = "") -> tuple[np.ndarray, np.ndarray]:
         """Times (n,) s and rows (n,) of a topic inside the window; columns by name (tables.py)."""
@@ -129,7 +131,9 @@ class Panel:
             s.t1,
             s.dark,
             late=s.device.late,
-            marks=[at for at, _ in s.device.marks],
+            ranges=ranges(s.device),
+            cursors=s.cursors,
+            origin=f"s since {when(s.device.utc0_ns)} UTC",
             shades=shades,
         )
 
@@ -165,6 +169,26 @@ class Panel:
 
     def hide(self) -> None:
         """Another page was opened."""
+
+
+def when(utc_ns: int) -> str:
+    """A moment for people, UTC."""
+    moment = datetime.fromtimestamp(utc_ns * 1e-9, UTC) if 0 <= utc_ns < 1 << 62 else None
+    return "?" if moment is None else f"{moment:%Y-%m-%d %H:%M:%S}"
+
+
+def ranges(device: Device) -> list[Range]:
+    """Notes, what was filled in, and the steps of a procedure that runs, on the device's axis."""
+    found = [Range(at, at, text[:60]) for at, text in device.marks]
+    found += [Range(begin, end, "filled in", "late") for begin, end in device.late]
+    procedure = device.get("procedure")
+    for step in procedure.message.steps if procedure is not None else ():
+        if step.from_utc_ns and step.until_utc_ns >= step.from_utc_ns:
+            begin, end = (
+                (at - device.utc0_ns) * 1e-9 for at in (step.from_utc_ns, step.until_utc_ns)
+            )
+            found.append(Range(begin, end, step.name[:60], "step"))
+    return found
 
 
 def estimator_curve(

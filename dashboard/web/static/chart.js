@@ -2,6 +2,9 @@
 // window and one cursor for all charts of a group. Drag to zoom, double click (or double tap) for
 // all of it, arrow keys to move, + and - to zoom.
 
+import { Cursors } from "/static/cursors.js";
+import { dress } from "/static/figure.js";
+
 const { uPlot } = window; // vendor/uplot, a classic script before this module
 const FONT = "12px system-ui, 'DejaVu Sans', sans-serif";
 const DRAGGED = 8; // px that make a drag of a click
@@ -68,6 +71,8 @@ export class Plot {
     this.group = group;
     this.root = figure.querySelector(".chart");
     this.readout = figure.querySelector("output");
+    this.title = figure.querySelector("figcaption > span")?.textContent ?? "";
+    this.unit = figure.querySelector("small")?.textContent ?? "";
     this.lines = [];
     this.marks = [];
     group.plots.push(this);
@@ -83,6 +88,7 @@ export class Plot {
     else this.chart?.setData(table(this.lines), false);
     this.shape = shape;
     this.look();
+    if (this.group.cursors.at) this.group.cursors.refresh();
   }
 
   build() {
@@ -99,9 +105,13 @@ export class Plot {
         sync: { key: this.group.cursorKey, scales: ["x", null] },
         bind: { mousedown: () => () => {}, dblclick: () => () => this.group.look(...this.group.span) },
       },
-      hooks: { drawAxes: [(u) => this.drawMarks(u)], setCursor: [(u) => this.say(u)] },
+      hooks: { setCursor: [(u) => this.say(u)] },
     }, table(this.lines), this.root);
+    dress(this.chart, () => this.described());
     this.listen(this.chart.over);
+    const figure = this.root.parentElement;
+    figure.querySelectorAll(".gf-tools, .gf-between").forEach((old) => old.remove());
+    this.group.cursors.add(this.chart, figure, () => this.described());
   }
 
   resize() {
@@ -117,24 +127,18 @@ export class Plot {
     this.chart?.setScale("x", { min, max });
   }
 
-  drawMarks(u) {
-    const c = u.ctx, { left, top, width, height } = u.bbox, px = uPlot.pxRatio;
-    c.save();
-    c.beginPath();
-    c.rect(left, top, width, height);
-    c.clip();
-    c.font = FONT.replace("12px", `${12 * px}px`);
-    c.textBaseline = "top";
-    c.lineWidth = px;
-    c.setLineDash([3 * px, 3 * px]);
-    for (const mark of this.marks) {
-      const x = u.valToPos(mark.t, "x", true), near = x > left + width - 110 * px;
-      c.strokeStyle = c.fillStyle = mark.color;
-      c.beginPath(); c.moveTo(x, top); c.lineTo(x, top + height); c.stroke();
-      c.textAlign = near ? "right" : "left";
-      c.fillText(mark.text.slice(0, 40), x + (near ? -4 : 4) * px, top + 2 * px);
-    }
-    c.restore();
+  // As figure.js wants it.
+  described() {
+    const lines = this.lines.map((line) => {
+      const x = Array.from(line.low, (_, k) => line.t0 + k * line.dt);
+      return { label: line.short, color: line.color, dash: line.dash, width: line.width, x, low: line.low, high: line.high };
+    });
+    const fresh = this.lines.every((line) => line.measured && line.asked === this.group.asked);
+    return {
+      title: this.title, unit: this.unit, origin: "s since the recording began",
+      ranges: this.marks.map((mark) => [mark.t, mark.until ?? mark.t, mark.text, mark.kind ?? "mark"]), lines: () => lines,
+      measured: fresh ? Object.fromEntries(this.lines.map((line) => [line.short, line.measured])) : null,
+    };
   }
 
   // Time and values under the cursor, of this chart or of another of the group.
@@ -185,6 +189,12 @@ export class Group {
   constructor(onLook, click = () => {}) {
     this.plots = [];
     this.span = this.window = [0, 1];
+    this.asked = ""; // the stretch that the server is asked to measure
+    this.cursors = new Cursors((a, b) => {
+      this.asked = a === null ? "" : `${a}_${b}`;
+      clearTimeout(this.timer);
+      if (this.asked) this.timer = setTimeout(() => this.onLook(...this.window), LOOK_MS);
+    });
     this.cursorKey = `charts ${Group.count++}`;
     Object.assign(this, { onLook, click });
     onTheme(() => this.plots.forEach((plot) => { if (plot.chart) { plot.build(); plot.look(); } }));
@@ -201,6 +211,7 @@ export class Group {
   }
 
   key(event) {
+    if (event.defaultPrevented) return;
     const [a, b] = this.window, w = b - a;
     const moves = { ArrowLeft: [a - w / 4, b - w / 4], ArrowRight: [a + w / 4, b + w / 4], "+": [a + w / 4, b - w / 4], "-": [a - w / 2, b + w / 2], 0: this.span };
     if (!(event.key in moves)) return;

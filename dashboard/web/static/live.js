@@ -1,4 +1,5 @@
 // The bar above the scene: device, where its data come from, alarms, recording, replay. Polled once a second.
+import "/static/live_charts.js";
 import { call, toast } from "/static/rest.js";
 import { mayOperate, turnTo } from "/static/desk.js";
 import { state } from "/static/view.js";
@@ -155,17 +156,3 @@ replay.addEventListener("click", async () => {
 
 poll();
 
-// The scene keeps a chart's zoom as a share of its time axis, and reads that from a chart just made before the axis has
-// its limits: one second of thirty is then shown for good. Nobody can have zoomed a chart that is so new: show all of it.
-const firstSeen = new WeakMap();
-const NEW_MS = 3000;
-
-function showWholeOfNewCharts() {
-  const charts = byId("scene").contentWindow?.__viserTestpoints?.uplots ?? {};
-  for (const { chart } of Object.values(charts)) {
-    if (!firstSeen.has(chart)) firstSeen.set(chart, Date.now());
-    const t = chart.data?.[0];
-    if (t?.length && Date.now() - firstSeen.get(chart) < NEW_MS) chart.setScale("x", { min: t[0], max: t[t.length - 1] });
-  }
-}
-setInterval(showWholeOfNewCharts, 500);

@@ -3,8 +3,10 @@ import { Group, Plot } from "/static/chart.js";
 import { call } from "/static/rest.js";
 import { Tracks } from "/static/tracks.js";
 
-const COLORS = ["#3296d8", "#d55e00", "#009e73", "#c564a0"]; // told apart by all eyes; dashes tell them apart, too
+// A colour is an estimator's, the same one everywhere; sessions are told apart by dash and shade.
 const DASHES = [[], [7, 3], [2, 2], [9, 3, 2, 3]];
+const SHADES = [1, 0.75, 0.55, 0.45];
+const MARKS = "#c564a0";
 const LETTERS = "ABCD";
 const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
@@ -26,9 +28,12 @@ export class Overlay {
     const mine = ++this.turn;
     for (;;) {
       const query = new URLSearchParams({ ids: this.ids.join(","), ...this.more() });
+      const asked = this.group.asked;
+      if (asked) query.set("cursors", asked);
       if (begin !== undefined) { query.set("begin", begin); query.set("end", end); }
       const answer = await call(`compare?${query}`).catch((error) => { this.hooks.state(error.message, true); return null; });
       if (!answer || mine !== this.turn) return;
+      if (answer.lines) for (const line of answer.lines) line.asked = asked;
       if (answer.lines) this.show(answer, begin === undefined);
       const share = Math.round(100 * answer.done);
       this.hooks.state(answer.state === "done" ? "" : answer.lines ? `First look; reading all of it, ${share} %` : `Reading the recording, ${share} %`);
@@ -42,12 +47,14 @@ export class Overlay {
     this.group.span = answer.span;
     if (all || !this.drawn) this.group.window = answer.span;
     this.drawn = true;
-    const marks = answer.sessions.flatMap((s, k) => s.marks.map((m) => ({ ...m, color: this.color(k) })));
+    const marks = answer.sessions.flatMap((s, k) => s.marks.map((m) => ({ ...m, color: MARKS })));
     const lines = answer.lines.map((line) => ({ ...line, id: `${line.session} ${line.key}` }));
     for (const { figure, kind, part, plot } of this.plots) {
-      const mine = lines.filter((line) => line[kind][part]).map((line) => this.line(line, line[kind][part]));
+      const mine = lines.filter((line) => line[kind][part]).map((line) => ({
+        ...this.line(line, line[kind][part]), measured: line.measured?.[kind]?.[part], asked: line.asked,
+      }));
       figure.hidden = !mine.length;
-      if (kind === "error" && mine.length) figure.querySelector("small").textContent = `against ${[...new Set(mine.map((l) => l.against))].join(", ")}, deg/s`;
+      if (kind === "error" && mine.length) figure.querySelector("small").textContent = `against ${[...new Set(mine.map((l) => l.against))].join(", ")}, °/s`;
       plot.set(mine, marks);
     }
     this.trackFigure.hidden = !answer.tracks.length;
@@ -58,28 +65,18 @@ export class Overlay {
     this.hooks.data(answer);
   }
 
-  color(session) {
-    return COLORS[session];
-  }
-
   line(line, part) {
-    const tacho = line.kind === "tacho" || line.kind === "truth";
-    const alone = this.ids.length === 1; // then colours tell lines apart, not sessions
-    const rates = this.answer.lines.filter((l) => l.session === line.session && l.kind === line.kind);
-    const place = rates.findIndex((l) => l.key === line.key);
+    const alone = this.ids.length === 1;
     return {
-      ...part, high: part.high ?? part.low, t0: line.t0, dt: line.dt, against: line.against,
-      color: tacho && alone ? "#888888" : alone ? COLORS[place % 4] : COLORS[line.session],
-      dash: alone ? DASHES[place % 4] : DASHES[line.session], width: tacho ? 1 : 1.5,
-      alpha: tacho ? 0.65 : 1 / (1 + 0.5 * (alone ? 0 : place)), hidden: this.hidden.has(line.id),
+      ...part, high: part.high ?? part.low, t0: line.t0, dt: line.dt, against: line.against, color: line.colour,
+      dash: alone ? (line.reference ? [6, 4] : []) : DASHES[line.session], width: line.reference ? 1 : 1.5,
+      alpha: (line.reference ? 0.8 : 1) * SHADES[line.session], hidden: this.hidden.has(line.id),
       short: alone ? line.title : `${LETTERS[line.session]} ${line.title}`,
     };
   }
 
-  // Of one session alone colours tell its tracks apart, else the sessions.
   trackLook(track) {
-    const place = this.ids.length === 1 ? this.answer.tracks.findIndex((t) => t.key === track.key) : track.session;
-    return { color: COLORS[place % 4], dash: DASHES[place % 4], dots: track.title === "gnss" };
+    return { color: track.colour, dash: DASHES[track.session], dots: track.dots, alpha: SHADES[track.session] };
   }
 
   showLegend(lines, tracks) {

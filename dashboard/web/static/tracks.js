@@ -1,5 +1,5 @@
 // North over east, drawn by uPlot, both axes to one scale.
-import { axis, onTheme } from "/static/chart.js";
+import { axis, faded, onTheme } from "/static/chart.js";
 
 const { uPlot } = window;
 const LEFT = 58, BOTTOM = 28, TOP = 8, RIGHT = 10; // px around what is drawn
@@ -45,7 +45,7 @@ export class Tracks {
       axes: [axis(" m", { space: 70, size: BOTTOM }), axis("", { space: 50, size: LEFT })],
       series: [{}, ...this.tracks.map((track) => ({
         label: track.title, facets: [{ scale: "x", auto: true }, { scale: "y", auto: true }],
-        stroke: track.color, fill: track.color, width: 1.6, dash: track.dash?.length ? track.dash : undefined,
+        stroke: faded(track.color, track.alpha), fill: faded(track.color, track.alpha), width: 1.6, dash: track.dash?.length ? track.dash : undefined,
         points: { show: false }, paths: path(track.dots),
       }))],
     }, [null, ...this.tracks.map((track) => [track.east, track.north])], this.root);

@@ -1,0 +1,155 @@
+"""What browsers cost: bytes per second of one at the first page, and the dashboard's CPU.
+
+    python tests/bench/bench_browsers.py [browsers, default 20] [seconds, default 20]
+
+The whole demo runs; browsers are WebSocket clients of the front door, signed in by its link, that
+read everything as viser's page does. Bytes are told apart by the kind of message. CPU is a share of
+one core: of the dashboard without a browser, with one, with all of them.
+"""
+
+import json
+import secrets
+import sys
+import tempfile
+import threading
+import time
+from collections import Counter
+from pathlib import Path
+
+import httpx
+import msgspec
+import psutil
+import viser
+import websockets.sync.client
+import zstandard
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from support.front_door import CAMERA, message
+from support.stack import RunningDemo
+
+from dashboard.web.users import add_user, issue_link_token
+from gyrofree.config import load
+
+SETTLE_S = 35.0  # until the default window of 30 s is full
+OPENING_S = 4.0  # a browser that has just come is sent the whole scene
+PER_USER = 10  # scenes that one user may have open, and some to spare
+POSES = {"SetOrientationMessage", "SetPositionMessage", "SceneNodeUpdateMessage"}
+
+
+class Browser:
+    """One reader of the scene; `bytes` by kind of message while `counting`."""
+
+    def __init__(self, demo: RunningDemo, users: Path, name: str) -> None:
+        self.bytes: Counter[str] = Counter()
+        self.frames, self.counting = 0, False
+        with httpx.Client(base_url=demo.url, headers={"origin": demo.url}) as client:
+            token = issue_link_token(users, name)
+            client.post("/login/link", data={"token": token})
+            cookies = "; ".join(f"{name}={value}" for name, value in client.cookies.items())
+        self._socket = websockets.sync.client.connect(
+            demo.url.replace("http", "ws") + "/scene",
+            additional_headers={"cookie": cookies},
+            origin=demo.url,
+            subprotocols=[f"viser-v{viser.__version__}"],
+            max_size=None,
+            compression=None,
+            proxy=None,
+        )
+        self._socket.send(message("ViewerCameraMessage", **CAMERA))  # now it counts as a viewer
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
+
+    def _read(self) -> None:
+        try:
+            for frame in self._socket:
+                if self.counting:
+                    self.frames += 1
+                    self._count(frame)
+        except (websockets.ConnectionClosed, OSError):
+            return
+
+    def _count(self, frame: bytes) -> None:
+        packed = int.from_bytes(frame[8:16], "little")
+        told = msgspec.msgpack.decode(zstandard.decompress(frame[16 : 16 + packed]))
+        sizes = told["binaryBufferLengths"]
+        rest = Counter()
+        for one in told["messages"]:
+            kind = _kind(one)
+            arrays = list(_arrays(one))
+            self.bytes[kind] += sum(sizes[k] for k in arrays)
+            rest[kind] += len(msgspec.msgpack.encode(one))
+        for kind, size in rest.items():  # its share of the packed part
+            self.bytes[kind] += round(packed * size / max(1, rest.total()))
+
+    def close(self) -> None:
+        """Go."""
+        self._socket.close()
+        self._thread.join(5.0)
+
+
+def _kind(message: dict) -> str:
+    kind = message["type"]
+    if kind == "GuiUpdateMessage":
+        return "charts" if "data" in message["updates"] else "tables"
+    return "poses" if kind in POSES else kind
+
+
+def _arrays(part: object):
+    if isinstance(part, dict):
+        if "__binary_index" in part:
+            yield part["__binary_index"]
+        for inner in part.values():
+            yield from _arrays(inner)
+    elif isinstance(part, (list, tuple)):
+        for inner in part:
+            yield from _arrays(inner)
+
+
+def cpu(process: psutil.Process, seconds: float) -> float:
+    """Percent of one core."""
+    before, began = sum(process.cpu_times()[:2]), time.monotonic()
+    time.sleep(seconds)
+    return 100.0 * (sum(process.cpu_times()[:2]) - before) / (time.monotonic() - began)
+
+
+def main(browsers: int = 20, seconds: float = 20.0) -> None:
+    """Run and print one JSON line."""
+    with tempfile.TemporaryDirectory() as folder, RunningDemo(Path(folder)) as demo:
+        time.sleep(SETTLE_S)
+        process = demo.children()["dashboard"]
+        alone = cpu(process, seconds)
+        users = load(demo.config).dashboard.users
+        for k in range(0, browsers, PER_USER):
+            add_user(users, f"bench-{k}", secrets.token_urlsafe(24), "viewer")
+        looking = [Browser(demo, users, "bench-0")]
+        time.sleep(OPENING_S)
+        looking[0].counting, began = True, time.monotonic()
+        first = cpu(process, seconds)
+        span, looking[0].counting = time.monotonic() - began, False
+        shares = {
+            kind: round(size / span / 1e3, 1) for kind, size in looking[0].bytes.most_common()
+        }
+        while len(looking) < browsers:
+            name = f"bench-{len(looking) // PER_USER * PER_USER}"
+            looking.append(Browser(demo, users, name))
+        time.sleep(OPENING_S)
+        many = cpu(process, seconds)
+        for browser in looking:
+            browser.close()
+    row = {
+        "bench": "browsers",
+        "kB_per_s": round(sum(shares.values()), 1),
+        "kB_per_s_by_kind": shares,
+        "frames_per_s": round(looking[0].frames / span, 1),
+        "cpu_percent": {
+            "none": round(alone, 1),
+            "first_more": round(first - alone, 1),
+            f"{browsers}": round(many, 1),
+        },
+    }
+    print(json.dumps(row))
+
+
+if __name__ == "__main__":
+    main(*(int(word) for word in sys.argv[1:3]))
