@@ -12,8 +12,8 @@ from dashboard.web.front import Front, front_of
 from dashboard.web.schemas import Line, Strict
 from dashboard.web.session_api import JobOut, start_job
 from dashboard.web.uploads import FILES, Upload, UploadError, samples_and_fixes
-from logs.preview import TARGETS, look, rewritten
 from logs.sheet import LogError
+from logs.tables.preview import TARGETS, look, rewritten
 from messages import text
 
 routes = APIRouter(prefix="/api")

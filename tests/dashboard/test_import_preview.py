@@ -7,7 +7,7 @@ from support.front_door import open_door, wait_for
 
 from dashboard.web.jobs import Jobs
 from gyrofree.running import simulate_csv
-from logs.preview import guess
+from logs.tables.preview import guess
 
 
 @pytest.fixture(scope="module")
