@@ -115,7 +115,7 @@ docs: setup
 	@touch $@
 
 site: .make/site
-	@NO_MKDOCS_2_WARNING=1 .make/site/bin/mkdocs build --quiet --strict
+	@said=$$(NO_MKDOCS_2_WARNING=1 .make/site/bin/mkdocs build --strict 2>&1) || { echo "$$said"; exit 1; } # --quiet would count no warning
 	@echo "build/site/index.html"
 
 pictures: setup dev system-packages

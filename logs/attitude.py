@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from inertial.attitude.filters import ATTITUDES
 from inertial.timing import Timing
 from logs.attitude_log import Trial, read_trials
-from logs.series import check_form, of_attitude, write
 from logs.sheet import LogError
+from logs.tables.series import check_form, of_attitude, write
 from messages.text import drawn
 
 Array = NDArray[np.float64]

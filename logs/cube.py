@@ -29,8 +29,8 @@ from logs.cube_parts import Monitored, Part, cut, monitored
 from logs.cube_run import EstimatorRun, reference
 from logs.cube_score import bound_of, notes_of, score
 from logs.quantities import refuse, said_of
-from logs.series import check_form, of_cube, write
 from logs.sheet import LogError
+from logs.tables.series import check_form, of_cube, write
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]

@@ -28,7 +28,7 @@ from inertial.rotation import rotation_vector, to_matrix
 from logs.drive_log import DriveLog, DriveTruth, read_drive_log
 from logs.drive_result import SETTLED, Result, of_filter, of_smoother
 from logs.quantities import said_of
-from logs.series import check_form, of_drive, write
+from logs.tables.series import check_form, of_drive, write
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]

@@ -2,7 +2,7 @@
 estimated again.
 """
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, HTTPException, Query, Request
 from pydantic import BaseModel, Field
@@ -12,6 +12,8 @@ from dashboard.web.front import Front, front_of
 from dashboard.web.schemas import Line, Strict
 from dashboard.web.session_api import JobOut, start_job
 from dashboard.web.uploads import FILES, Upload, UploadError, samples_and_fixes
+from logs.sheet import LogError
+from logs.tables.preview import TARGETS, look, rewritten
 from messages import text
 
 routes = APIRouter(prefix="/api")
@@ -29,6 +31,13 @@ class UploadOut(BaseModel):
     piece_bytes: int = Field(description="largest piece that is taken at once")
 
 
+class LookOut(BaseModel):
+    files: dict[str, dict[str, Any]] = Field(
+        description="encoding, separator, decimal sign, first rows, columns with a guess"
+    )
+    targets: list[str] = Field(description="what a column can be meant as")
+
+
 class PieceOut(BaseModel):
     bytes: int = Field(description="of this file so far")
 
@@ -36,6 +45,12 @@ class PieceOut(BaseModel):
 class ImportOrder(Strict):
     device: str = Field(default="log", pattern=NAMED)
     name: Added = Field(default="import", description="added to the session's id")
+    start: str = Field(default="", max_length=40, description="when it was recorded, UTC, ISO 8601")
+    columns: dict[str, dict[str, str]] = Field(
+        default={},
+        max_length=4,
+        description="by file: column -> its meaning, one of `targets` of look; absent: as named",
+    )
 
 
 class RerunOrder(Strict):
@@ -97,18 +112,47 @@ async def take_piece(
         return PieceOut(bytes=have + len(body))
 
 
+@routes.get("/imports/{upload}/look", summary="How the files sent are written, and their columns")
+def look_at_import(request: Request, upload: int, who: SignedIn) -> LookOut:
+    found = _upload(front_of(request), upload, who.name)
+    files = {}
+    for path in sorted(found.folder.iterdir()):
+        try:
+            files[path.name] = look(path)
+        except (LogError, OSError) as error:
+            raise HTTPException(409, _without(found, error)) from None
+    return LookOut(files=files, targets=list(TARGETS))
+
+
+def _without(found: Upload, error: Exception) -> str:
+    """A message without the server's folders."""
+    return str(error).replace(f"{found.folder}/", "")
+
+
 @routes.post("/imports/{upload}/finish", summary="Make a session of the files sent (operator)")
 def finish_import(request: Request, upload: int, body: ImportOrder, who: Operator) -> JobOut:
     front = front_of(request)
     found = _upload(front, upload, who.name)
     try:
+        for name, columns in body.columns.items():
+            path = found.folder / text.composed(name)
+            if path not in list(found.folder.iterdir()):
+                raise UploadError(f"{text.plain(name, 80)}: no such file was sent")
+            mapped = path.with_name(".mapped")
+            rewritten(path, columns, mapped)
+            mapped.replace(path)
         samples, fixes = samples_and_fixes(sorted(found.folder.iterdir()))
-    except UploadError as error:
-        raise HTTPException(409, str(error)) from None
+    except (UploadError, LogError, OSError) as error:
+        raise HTTPException(409, _without(found, error)) from None
     order = ["import", str(samples), "--device", body.device, "--name", body.name]
     order += ["--gnss", str(fixes)] if fixes else []
+    order += ["--start", body.start] if body.start else []
     found.reading = True
-    end = {"makes": "session", "then": lambda: front.uploads.forget(upload)}
+    end = {
+        "makes": "session",
+        "then": lambda: front.uploads.forget(upload),
+        "hide": (f"{found.folder}/", f"{front.catalogue.root}/"),
+    }
     try:
         return start_job(front, "import", samples.name, order, who.name, **end)
     except HTTPException:

@@ -93,9 +93,10 @@ class Jobs:
         accept: tuple[int, ...] = (0,),
         makes: str = "files",
         then: Callable[[], None] = lambda: None,
+        hide: Sequence[str] = (),
     ) -> Job:
         """Queue `<command> <arguments>`; exit codes in `accept` are well; `then` is called at its
-        end. Raises ControlError.
+        end; `hide` are folders of this machine that no message shows. Raises ControlError.
 
         One that makes `files` gets `--out <folder>`; one that makes a `session` prints its id.
         """
@@ -107,7 +108,7 @@ class Jobs:
             self._jobs[number] = job
             while len(self._jobs) > KEPT and next(iter(self._jobs.values())).ended is not None:
                 shutil.rmtree(self._jobs.popitem(last=False)[1].out, ignore_errors=True)
-        work = (job, list(arguments), accept, makes, then)
+        work = (job, list(arguments), accept, makes, then, tuple(hide))
         threading.Thread(target=self._run, args=work, name=f"job {number}", daemon=True).start()
         return job
 
@@ -129,6 +130,7 @@ class Jobs:
         accept: tuple[int, ...],
         makes: str,
         then: Callable[[], None],
+        hide: Sequence[str] = (),
     ) -> None:
         with self._turn:
             if self._closed:
@@ -145,6 +147,8 @@ class Jobs:
                 job.message = str(error) or type(error).__name__
             finally:
                 then()
+                for folder in hide:
+                    job.message = job.message.replace(folder, "")
                 job.message = plain(job.message)
                 job.ended = time.monotonic()
                 job.state = "done" if well else "failed"

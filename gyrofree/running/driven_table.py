@@ -130,8 +130,8 @@ class TableDesk:
                     self._command(self._order[0], float(value) * DEGREE)
                 case "SOUR:RATE":
                     self._command(float(value) * DEGREE, self._order[1])
-                case "OUTP:STOP":
-                    self._command(0.0, None)
+                case "OUTP:STOP":  # also of a profile: whoever drives it, it shall stand
+                    self._by_line, self._order = True, (0.0, None)
                 case "OUTP:POS":
                     self._wanted_up = FACES[value]
                 case _:

@@ -70,10 +70,23 @@ class Service:
         if order.command.action == COMMAND.ACTION_STOP and conductor is not None:
             problem = conductor.emergency()
             order.answer(pb.Reply(ok=not problem, message=problem or "stopped"))
+        elif order.command.action == COMMAND.ACTION_STOP and order.device in self._tables:
+            order.answer(self._stop_alone(order.device))
+            return
         elif len(self._orders) > 100:
             order.refuse("too many orders wait")
             return
         self._orders.append(order)
+
+    def _stop_alone(self, device: str) -> pb.Reply:
+        """An emergency stop while nothing runs: whoever drives the table, it shall stand."""
+        try:
+            self._tables[device].stop()
+        except TableError as error:
+            log.error("emergency stop: %s", error)
+            text = f"THE TABLE DID NOT TAKE THE STOP, switch it off: {error}"
+            return pb.Reply(ok=False, message=text)
+        return pb.Reply(ok=True, message="the table was told to stop; no procedure runs")
 
     def _on_data(self, device: str, message: object) -> None:
         queue = self._queues.get(device)

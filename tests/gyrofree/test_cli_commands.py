@@ -21,6 +21,7 @@ SERVICES = {
     "dashboard",
     "simulate",
     "play",
+    "procedures",
 }
 ORDERS = {
     "users add",
@@ -29,6 +30,11 @@ ORDERS = {
     "config default",
     "config reference",
     "completion",
+    "users token create",
+    "users token revoke",
+    *(f"procedure {verb}" for verb in ("abort", "next", "repeat", "run", "stop")),
+    "procedure check",
+    "procedure show",
 }  # they do something, and have no result to print
 
 

@@ -178,6 +178,18 @@ def test_open_steps_are_confirmed_and_poses_are_followed(bench):
     assert [s["segment"] is not None for s in said["procedure"]["steps"]] == [False, True, True]
 
 
+def test_an_emergency_stop_without_a_run_stands_the_table(bench):
+    reply = bench.order("STOP")
+    assert reply.ok and "no procedure runs" in reply.message
+    end = time.monotonic() + 20.0
+    while "the table is driven" not in bench.demo.text().rpartition("left to its profile")[2]:
+        assert time.monotonic() < end
+        time.sleep(0.1)
+    while bench.truth.omega_ib_b_radps[2] != 0.0:
+        assert time.monotonic() < end
+        time.sleep(0.1)
+
+
 def test_an_order_that_cannot_be_says_why(bench):
     assert "did you mean 'short'" in bench.order("START", procedure="shrt").message
     assert bench.order("REPEAT").message == "no procedure runs on cube"

@@ -1,5 +1,6 @@
 // The list of sessions: replay, and up to four of them over one another.
-import { call, ended, send, toast } from "/static/rest.js";
+import "/static/imports.js";
+import { call, toast } from "/static/rest.js";
 
 document.addEventListener("click", async (event) => {
   const button = event.target instanceof Element ? event.target.closest("[data-replay]") : null;
@@ -36,23 +37,3 @@ for (const box of boxes) {
 showChosen();
 compare.addEventListener("click", () => location.assign(`/compare?ids=${chosen.join(",")}`));
 
-document.getElementById("import")?.addEventListener("submit", async (event) => {
-  event.preventDefault();
-  const form = event.target, button = form.querySelector("button"), state = document.getElementById("import-state");
-  button.disabled = true;
-  try {
-    const { upload, piece_bytes: piece } = await call("imports", {});
-    for (const file of form.files.files) {
-      for (let at = 0; at < file.size; at += piece) {
-        state.textContent = `Sending ${file.name}, ${Math.round((100 * at) / file.size)} %`;
-        await send(`imports/${upload}/files/${encodeURIComponent(file.name)}?at=${at}`, file.slice(at, at + piece));
-      }
-    }
-    const job = await ended(await call(`imports/${upload}/finish`, { device: form.device.value, name: form.name.value }), state);
-    location.assign(`/sessions/${job.made}`);
-  } catch (error) {
-    state.textContent = "";
-    toast(error.message);
-    button.disabled = false;
-  }
-});

@@ -1,0 +1,1 @@
+"""Logs as tables: what estimators said, and foreign files before they are read."""
