@@ -19,11 +19,11 @@ SURE = 3.0  # standard errors of its own
 ROBUST = 1.4826  # of a normal distribution: standard deviation over median absolute deviation
 COLUMNS = (
     ("scale_factor_error_ppm", "scale factor error", "ppm"),
-    ("rate_bias_dps", "rate bias", "deg/s"),
+    ("rate_bias_dps", "rate bias", "°/s"),
     ("asymmetry_ppm", "asymmetry", "ppm"),
     ("linearity_ppm", "linearity", "ppm"),
     ("hysteresis_ppm", "hysteresis", "ppm"),
-    ("rate_rms_z_dps", "rate RMS", "deg/s"),
+    ("rate_rms_z_dps", "rate RMS", "°/s"),
     ("noise_mg", "vibration at rest", "mg"),
     ("random_walk_mps_sqrt_s", "velocity random walk", "m/s/√s"),
 )

@@ -18,6 +18,7 @@ from dashboard.scene.panels.motion.errors import Errors
 from dashboard.scene.panels.motion.innovations import Innovations
 from dashboard.scene.panels.motion.race import Race
 from dashboard.scene.panels.motion.rates import Rates
+from dashboard.scene.panels.motion.spectrum import Spectrum
 from dashboard.scene.panels.motion.tilt import Tilt
 from dashboard.scene.panels.navigation.filters import Navigation
 from dashboard.scene.panels.navigation.horizon import Horizon
@@ -35,6 +36,7 @@ PAGES: tuple[type[Panel], ...] = (
     Axes,
     Health,
     Innovations,
+    Spectrum,
     Link,
     Board,
     Calibration,
