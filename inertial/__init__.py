@@ -30,5 +30,6 @@ Index, in the order in which the data pass:
     core          the hot loops in C++20, bound by nanobind
     timing        period, numbers and holes of a row of time stamps
     plausible     are the numbers what their units say?
+    doubts        is a setting wrong? what rates and gravity say of pulses, sizes, axes
     toml_file     files with a version, read strictly and written whole
 """

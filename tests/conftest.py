@@ -34,7 +34,9 @@ def free_port() -> int:
 
 
 # Faults that are known and not mended: each test stands as it should hold; here is why it fails.
-KNOWN_FAULTS: dict[str, str] = {}
+KNOWN_FAULTS: dict[str, str] = {
+    "test_a_link_shows_another_person_the_same": "the cause is not found yet",
+}
 
 
 @pytest.hookimpl(trylast=True)

@@ -84,7 +84,7 @@ def simulate(
     simulated.
     """
     settings = settings_of(config)
-    from inertial.simulation.profile_file import profile_of
+    from sessions.procedure.profile_file import profile_of
 
     faults = faults_of(fault)
     try:

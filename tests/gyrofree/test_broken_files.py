@@ -27,7 +27,13 @@ LONGEST_S = 30  # of one call, of the processor: a command that works for ever i
 WAITS_S = 300  # of the clock: so is one that waits for ever
 OUTPUTS = {"out", "plot", "folder", "layout_out", "link", "csv", "port_link"}
 FILES = {"session", "sessions", "layout", "layouts", "log", "imu", "gnss"}  # named by a text
-VALUES = {"name": "anna", "role": "viewer", "text": "a remark"}  # of what is no file
+VALUES = {  # of what is no file
+    "name": "anna",
+    "role": "viewer",
+    "text": "a remark",
+    "user": "anna",
+    "token": "0123456789ab",
+}
 GOOD = {  # of a file that is wanted beside the broken one
     "log": "cube.csv",
     "logs": "cube.csv",

@@ -53,7 +53,8 @@ def test_services_below_the_supervisor_start_in_it(hostile, free_port, tmp_path)
     config.write_text(
         f'[bus]\nrouter = "tcp/127.0.0.1:{free_port}"\nlisten = ["tcp/127.0.0.1:{free_port}"]\n'
         f'[gateway]\njournal = "{tmp_path}/journal"\n[recorder]\nroot = "{tmp_path}/sessions"\n'
-        '[estimator]\nrate = ["least-squares"]\nnavigators = ["kf"]\nattitudes = ["vqf"]\n'
+        'auto_start = true\n[estimator]\nrate = ["least-squares"]\n'
+        'navigators = ["kf"]\nattitudes = ["vqf"]\n'
     )
     text = io.StringIO()
     supervisor = Supervisor(Console(file=text, width=200))

@@ -137,7 +137,7 @@ def test_a_run_ends_with_a_report_of_its_steps_and_the_same_bytes(bench):
     assert step["segment"]["end"] - step["segment"]["begin"] == pytest.approx(2.0, abs=0.01)
     assert step["standard_error_radps"] > 0.0
     checks = {check["name"]: check for check in said["checks"]}
-    assert checks["step 2, +90 deg/s: rate_error_dps"]["passed"] is True
+    assert checks["step 2, +90 °/s: rate_error_dps"]["passed"] is True
     assert checks["hysteresis_ppm"]["passed"] is None and said["verdict"] == "incomplete"
     assert b"SN-1" in first[".html"] and m.sha256.encode() in first[".html"]
 

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inertial.simulation.profile_file import profile_of
 from sessions.procedure import library
 from sessions.procedure.batch import COLUMNS, Cell, Unit, marked, remarks
 from sessions.procedure.library import ProcedureError, find, names, of_text
 from sessions.procedure.model import DEG
+from sessions.procedure.profile_file import profile_of
 from sessions.procedure.run import Journal, unfinished
 from sessions.procedure.table import TableError, TextTable, described
 
