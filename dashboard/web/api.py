@@ -28,6 +28,7 @@ from dashboard.web.schemas import (
 )
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import STATUS
 from messages.text import composed
 from sessions.library.catalogue import SessionError, SessionInfo
 
@@ -132,6 +133,8 @@ def order_recorder(
         raise HTTPException(503, str(error)) from None
     if status.recording != (action == pb.RecorderCommand.ACTION_START):
         raise HTTPException(409, status.message or "the recorder did not do it")
+    if front.store is not None:  # what it says next on the bus may take a second
+        front.store.put(STATUS, "", "", status)
     return recording_out(front).model_copy(update={"available": True} | recorder_fields(status))
 
 

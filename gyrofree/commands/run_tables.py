@@ -174,8 +174,7 @@ def _rest(result: dict[str, Any], kind: str) -> None:
     """What else a result says."""
     if isinstance(found := result.get("axes"), dict):
         say(f"axes: {axes(found)}")
-    gaps = result.get("gaps")
-    if isinstance(gaps, dict) and gaps["count"]:
+    if isinstance(gaps := result.get("gaps"), dict):
         say(f"gaps: {gaps['count']}, missing samples: {gaps['missing_samples']}")
     for name, log in (result.get("logs") or {}).items():
         say(

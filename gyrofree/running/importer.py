@@ -78,9 +78,10 @@ def start_of(text: str) -> float | None:
 
 
 def stamp(source: BoardLog, start_s: float | None = None) -> str:
-    """The beginning of a session's id: when the log began."""
-    first_s = zero_ns_of(source, start_s) / 1e9 + float(source.t_s[0]) - origin_of(source)
-    return datetime.fromtimestamp(first_s, UTC).strftime("%Y%m%d-%H%M%S")
+    """The beginning of a session's id: the date of the log's origin, so that a log without one is
+    called the same whenever its first sample was.
+    """
+    return datetime.fromtimestamp(zero_ns_of(source, start_s) / 1e9, UTC).strftime("%Y%m%d-%H%M%S")
 
 
 def origin_of(source: BoardLog) -> float:

@@ -21,7 +21,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from inertial.simulation.profiles import DEGREE, Profile, Ramp, named
 from inertial.toml_file import parsed, text_of
 
-FASTEST = 2000.0  # deg/s: +-16 g of an axis 10 cm from the centre
+FASTEST = 2000.0  # °/s: +-16 g of an axis 10 cm from the centre
 SHORTEST = 0.01  # s
 MOST = 10_000  # pieces
 COLUMNS = ("t_s", "rate_dps")
@@ -65,7 +65,7 @@ def _of_csv(path: Path) -> Profile:
         except (ValueError, IndexError):
             raise ValueError(f"{path}: row {number}: {row}: want two numbers") from None
         if not (math.isfinite(t) and abs(rate) <= FASTEST):
-            raise ValueError(f"{path}: row {number}: want at most {FASTEST:g} deg/s, all finite")
+            raise ValueError(f"{path}: row {number}: want at most {FASTEST:g} °/s, all finite")
         if points and t - points[-1][0] < SHORTEST:
             before = points[-1][0]
             raise ValueError(f"{path}: row {number}: t_s = {t:g} after {before:g}: want it later")
@@ -93,15 +93,15 @@ def _of_toml(path: Path) -> Profile:
 
 
 def _made(path: Path, name: str, pieces: list[tuple[float, float, float]]) -> Profile:
-    """A profile of (seconds, from, to in deg/s); raises ValueError for a jump."""
+    """A profile of (seconds, from, to in °/s); raises ValueError for a jump."""
     rate = 0.0
     for number, (_, begin, end) in enumerate(pieces, 1):
         if abs(begin - rate) > 1e-9:
             raise ValueError(
-                f"{path}: piece {number} begins at {begin:g} deg/s and the one before ends at"
+                f"{path}: piece {number} begins at {begin:g} °/s and the one before ends at"
                 f" {rate:g}: the rate cannot jump"
             )
         rate = end
     if abs(rate) > 1e-9:
-        raise ValueError(f"{path}: ends at {rate:g} deg/s; want 0, so that it can be repeated")
+        raise ValueError(f"{path}: ends at {rate:g} °/s; want 0, so that it can be repeated")
     return Profile(name, [Ramp(s, a * DEGREE, b * DEGREE) for s, a, b in pieces])

@@ -15,7 +15,7 @@ from support.front_door import open_door
 from dashboard.data.store import Store
 from dashboard.desk import Desk
 from dashboard.scene.panels import PAGES
-from dashboard.scene.service import start
+from dashboard.scene.service import OWN_INPUTS, start
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 
@@ -80,7 +80,14 @@ def door(tmp_path_factory):
     try:
         with (
             fed(store),
-            open_door(folder, scene=False, scene_at=handle.port, store=store, desk=desk) as opened,
+            open_door(
+                folder,
+                scene=False,
+                scene_at=handle.port,
+                store=store,
+                desk=desk,
+                open_labels=OWN_INPUTS,
+            ) as opened,
         ):
             yield opened
     finally:

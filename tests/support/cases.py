@@ -6,6 +6,7 @@ each command said is kept, so that an expectation (case_expectations.py) can be 
 
 import csv
 import json
+import math
 import os
 import re
 import shutil
@@ -37,16 +38,26 @@ class Command:
         return self.out + self.err
 
     def row(self, name: str) -> list[str]:
-        """Cells of the table's row of this name, without the name; empty without such a row."""
+        """Cells of the table's row of this name, without the name; empty without such a row. The
+        default filter's name ends in a star.
+        """
         for line in self.out.splitlines():
-            cells = [cell.strip() for cell in line.split("│")[1:-1]]
-            if cells and cells[0].split()[:1] == [name]:
-                return cells[1:]
+            first, *cells = line.split() or [""]
+            if first.removesuffix("*") == name:
+                return cells
         return []
 
-    def figures(self, name: str) -> list[float]:
-        """Numbers of the first cell of a row."""
-        return [float(word) for word in (self.row(name) or ["-"])[0].split() if word != "-"]
+    def rates(self, name: str) -> tuple[list[float], float]:
+        """RMS errors x y z of a cube's estimator, rad/s, and the least share that is
+        called valid, %; behind them stand angle, NEES and time.
+        """
+        assert "deg/s" in self.out, self.out
+        cells = self.row(name)
+        shares, errors = cells[:-6], cells[-6:-3]
+        return (
+            [math.radians(float(cell)) for cell in errors if cell != "-"],
+            min((float(cell.lstrip("<>")) for cell in shares if cell != "-"), default=0.0),
+        )
 
 
 @dataclass(frozen=True)

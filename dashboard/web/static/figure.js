@@ -25,7 +25,8 @@ export function robust(lines, a, b) {
   points.sort((p, q) => p[0] - q[0]);
   const at = (share) => points[Math.round(share * (points.length - 1))][0];
   const low = at(0.02), high = at(0.98), width = high - low;
-  if (!(width > 0)) return null;
+  // rounding alone is no width: uPlot has no ticks so small
+  if (!(width > 1e-9 * Math.max(Math.abs(low), Math.abs(high), 1e-3))) return null;
   const settled = ([, x]) => x < b - FRESH * (b - a);
   const above = points.filter(([y]) => y > high + FAR * width), below = points.filter(([y]) => y < low - FAR * width);
   const odd = [above, below].flatMap((some) => (places(some) <= FEW && some.every(settled) ? some : []));

@@ -54,6 +54,9 @@ function look() {
   const text = frame.contentDocument?.querySelector(".gf-state")?.dataset.state;
   if (text && text !== last) {
     last = text;
+    for (const area of frame.contentDocument.querySelectorAll("[data-scrollarea-viewport]:not([tabindex])")) {
+      area.tabIndex = 0; // what scrolls is reached by the keyboard
+    }
     state = JSON.parse(text);
     for (const listener of listeners) listener(state);
   }

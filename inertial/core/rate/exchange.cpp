@@ -42,8 +42,8 @@ void Frame::carry_biases(const Axes& axes) {
 // All that was made with an axis that cannot be believed is in doubt: the axes that stay are taken
 // through the last standstill and what followed it. Without one the rate is unknown.
 void Frame::from_rest(const Constants& c) {
-  const SinceRest past = since_rest_;
-  if (!past.known()) return restart();
+  if (!since_rest_.known()) return restart();
+  const SinceRest& past = since_rest_;
   const Block& rest = past.rest();
   const Measurement mean = c.sensor.measure(Vector<MOST_AXES>(rest.mean()).data());
   const double dt = rest.seconds / rest.samples;

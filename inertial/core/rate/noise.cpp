@@ -3,6 +3,7 @@
 namespace gyrofree::rate {
 namespace {
 
+constexpr double THIRD_DIFFERENCE = 20.0;  // variance of one of white noise over the noise's own
 constexpr double NOISE_CLIP = 6.0;    // of one ratio over the mean so far: a jolt is no noise
 
 }  // namespace
@@ -19,14 +20,17 @@ double Noise::Mean::believed(double slack) const {
   return value < limit ? 1.0 : value;
 }
 
-void Noise::observe(const Sensor& s, const Measurement& third_difference) {
-  double quiet = 0.0, force = 0.0;
-  for (int k = 0; k < 3; ++k) {
-    quiet += square(third_difference(ALPHA_M + k)) / s.R_alpha(k, k);
-    force += square(third_difference(FORCE_M + k)) / s.R_p(k, k);
-  }
+double quiet_ratio(const Sensor& s, const Measurement& third_difference) {
+  double quiet = 0.0;
+  for (int k = 0; k < 3; ++k) quiet += square(third_difference(ALPHA_M + k)) / s.R_alpha(k, k);
   for (int k = 0; k < s.m; ++k) quiet += square(third_difference(PRODUCTS_M + k)) / s.R_c(k, k);
-  quiet_.add(quiet / (THIRD_DIFFERENCE * (3 + s.m)));
+  return quiet / (THIRD_DIFFERENCE * (3 + s.m));
+}
+
+void Noise::observe(const Sensor& s, const Measurement& third_difference) {
+  double force = 0.0;
+  for (int k = 0; k < 3; ++k) force += square(third_difference(FORCE_M + k)) / s.R_p(k, k);
+  quiet_.add(quiet_ratio(s, third_difference));
   force_.add(force / (THIRD_DIFFERENCE * 3));
 }
 

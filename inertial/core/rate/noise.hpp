@@ -12,7 +12,8 @@ namespace gyrofree::rate {
 
 constexpr int DIFFERENCED = 4;  // samples of one third difference
 
-constexpr double THIRD_DIFFERENCE = 20.0;  // variance of one of white noise over the noise's own
+// Mean square of a third difference of omega' and c over what configured noise makes of it.
+double quiet_ratio(const Sensor& s, const Measurement& third_difference);
 
 class Noise {
  public:

@@ -11,7 +11,10 @@ void Block::add(const Block& other) {
 void SinceRest::take(const Sensor& s, const double* a, double dt, bool still, const Filter& f) {
   if (still && !standing_) forget();
   standing_ = still;
-  if (!still && !known()) return forget();
+  if (!still && !known()) {
+    if (count_ > 0) forget();  // not at every sample: it is large
+    return;
+  }
   if (still) {
     angle_ = f.x(ANGLE);
     angle_variance_ = f.P(ANGLE, ANGLE);

@@ -36,19 +36,13 @@ void Watch::take(const Sensor& s, const double* a, double dt) {
   ++count;
   ++filled;
   if (filled < DIFFERENCED) return;
-  const long last = newest();
-  measured.observe(s, y(last) - y(last - 3) + 3.0 * (y(last - 2) - y(last - 1)));
+  measured.observe(s, third_difference(newest()));
 }
 
 bool Watch::rough(const Sensor& s, int n) const {
   constexpr double FAR = 40.0;  // of the mean square of third differences, over noise alone
-  for (long last = newest(); last > newest() - n && last - newest() + filled >= DIFFERENCED; --last) {
-    const Measurement e = y(last) - y(last - 3) + 3.0 * (y(last - 2) - y(last - 1));
-    double ratio = 0.0;
-    for (int k = 0; k < 3; ++k) ratio += square(e(ALPHA_M + k)) / s.R_alpha(k, k);
-    for (int k = 0; k < s.m; ++k) ratio += square(e(PRODUCTS_M + k)) / s.R_c(k, k);
-    if (ratio > FAR * THIRD_DIFFERENCE * (3 + s.m)) return true;
-  }
+  for (long last = newest(); last > newest() - n && last - newest() + filled >= DIFFERENCED; --last)
+    if (quiet_ratio(s, third_difference(last)) > FAR) return true;
   return false;
 }
 

@@ -57,6 +57,8 @@ class Watch {
   const Noise& noise() const { return measured; }
 
  private:
+  // y_k - 3 y_(k-1) + 3 y_(k-2) - y_(k-3) up to that sample.
+  Measurement third_difference(long last) const { return y(last) - y(last - 3) + 3.0 * (y(last - 2) - y(last - 1)); }
   double scatter(const Sensor& s, int window);
   Measurement mean(int window, int ago = 0) const;
   double moved(const Sensor& s, const StillLimits& c, int window) const;
