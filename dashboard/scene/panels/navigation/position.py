@@ -101,6 +101,11 @@ def _cube_note(s: Snapshot) -> Markup:
     for name in names:
         m = rates.row(s.device.get("rate", name).message, -1)
         if len(m.p_n_m) == 3:
-            items.append((f"distance, {estimator_title(name)}", number(float(np.linalg.norm(m.p_n_m)), 1, "m")))
+            items.append(
+                (
+                    f"distance, {estimator_title(name)}",
+                    number(float(np.linalg.norm(m.p_n_m)), 1, "m"),
+                )
+            )
     text = "Inertial navigation from the start without any aid: it drifts by nature."
     return note(text) + rows(items)
