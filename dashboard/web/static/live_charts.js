@@ -63,7 +63,8 @@ function look() {
     }
     // The scene keeps a chart's zoom as a share of its time axis, and reads that from a chart just made before the axis
     // has its limits: one second of thirty is then shown for good. Nobody can have zoomed a chart that is so new.
-    if (Date.now() - known.get(chart) < NEW_MS) chart.setScale("x", { min: t[0], max: t[t.length - 1] });
+    const spans = chart.scales.x?.distr !== 3 && t[t.length - 1] > t[0];
+    if (spans && Date.now() - known.get(chart) < NEW_MS) chart.setScale("x", { min: t[0], max: t[t.length - 1] });
   }
   if (cursors.at) cursors.refresh();
 }

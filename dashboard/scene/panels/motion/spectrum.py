@@ -1,7 +1,9 @@
 """Power spectral density and Allan deviation of one signal, of the window that is shown."""
 
+import math
 import time
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import viser
@@ -86,6 +88,19 @@ def density(y: Array, period: float) -> tuple[Array, Array]:
     return f[1:], p[1:]
 
 
+def _scales(x: Array) -> dict[str, Any]:
+    """Logarithmic scales, x over whole decades.
+
+    Left to itself the chart keeps its limits in shares of the data's span, and these lead to
+    negative ones while the span grows; on a logarithmic axis the search for its ticks does not end
+    then.
+    """
+    low = math.floor(math.log10(x[0]))
+    high = max(math.ceil(math.log10(x[-1])), low + 1)
+    across = {"time": False, "distr": 3, "auto": False, "range": (10.0**low, 10.0**high)}
+    return {"x": across, "level": {"distr": 3}}
+
+
 class Spectrum(Panel):
     """Welch's spectrum and the overlapping Allan deviation of the signal that is chosen."""
 
@@ -148,7 +163,10 @@ class Spectrum(Panel):
             return
         if self._headings[key].content != heading:
             self._headings[key].content = heading
-        self._plots[key].data = data
+        plot = self._plots[key]
+        if plot.scales != (scales := _scales(data[0])):
+            plot.scales = scales
+        plot.data = data
 
     def _plot(self, data: tuple[Array, Array], order: float) -> viser.GuiUplotHandle:
         points = {"show": False}
@@ -156,7 +174,7 @@ class Spectrum(Panel):
         return self.client.gui.add_uplot(
             data,
             series=({"label": "x"}, line),
-            scales={"x": {"time": False, "distr": 3}, "level": {"distr": 3}},
+            scales=_scales(data[0]),
             axes=({"size": 26}, {"size": 62, "scale": "level"}),
             legend={"show": False},
             height=230,
