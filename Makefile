@@ -82,7 +82,7 @@ system-packages:
 
 # The browser draws in software and wants the machine for itself, so it comes after the others.
 test: setup dev system-packages site
-	$(BIN)/python -m pytest -n auto --dist loadfile -m "not browser"
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "not browser"
 	$(BIN)/python -m pytest -m browser
 
 # The inputs that once failed, from $GYROFREE_CASES or ../shared/cases; `make test` runs them too.

@@ -21,6 +21,7 @@ import zenoh
 from pynmeagps import GET, NMEAMessage
 
 from gateway.virtual.board_link import PtyLink, TcpLink
+from gateway.virtual.satellites import of_sky
 from gateway.virtual.virtual_board import (
     SIMULATED,
     BoardAccel,
@@ -203,9 +204,8 @@ def _receiver(seed: int) -> Iterator[BoardBytes]:
     )  # the sky is another in each run
     for number in itertools.count():
         noise = draw.normal(0.0, 1.0, 3) * GPS_SIGMA
-        yield BoardBytes(
-            number * GPS_PERIOD + 0.005, sentences(noise, datetime.datetime.now(datetime.UTC))
-        )
+        utc = datetime.datetime.now(datetime.UTC)
+        yield BoardBytes(number * GPS_PERIOD + 0.005, sentences(noise, utc) + of_sky(utc, PLACE))
 
 
 def _rider(test: TableTest, seed: int) -> Iterator[BoardBytes]:
@@ -216,9 +216,8 @@ def _rider(test: TableTest, seed: int) -> Iterator[BoardBytes]:
         p, v = centre(test, t)
         p, v = p + draw.normal(size=3) * ARM_SIGMA_P, v + draw.normal(size=3) * ARM_SIGMA_V
         noise = np.array([p[0], p[1], -p[2]])
-        yield BoardBytes(
-            t + 0.005, sentences(noise, datetime.datetime.now(datetime.UTC), (v[0], v[1]))
-        )
+        utc = datetime.datetime.now(datetime.UTC)
+        yield BoardBytes(t + 0.005, sentences(noise, utc, (v[0], v[1])) + of_sky(utc, PLACE))
 
 
 def _table(

@@ -114,7 +114,12 @@ def give(
     key = kind.key(prefix, device)
     patience_s = kind.patience_s if timeout_s is None else timeout_s
     try:
-        replies = session.get(key, payload=command.SerializeToString(), timeout=patience_s)
+        replies = session.get(
+            key,
+            payload=command.SerializeToString(),
+            timeout=patience_s,
+            consolidation=zenoh.ConsolidationMode.NONE,  # the first answer, at once
+        )
         for reply in replies:
             return _read(reply, kind, patience_s)
     except zenoh.ZError as error:
@@ -158,10 +163,12 @@ class Order(Generic[C, A]):
     def answer(self, message: A) -> None:
         """It has been carried out, or the message says why not."""
         self._query.reply(str(self._query.key_expr), message.SerializeToString())
+        self._query.drop()  # the asker waits until nobody holds it
 
     def refuse(self, reason: str) -> None:
         """It is not looked at, for this reason."""
         self._query.reply_err(reason.encode())
+        self._query.drop()
 
 
 def take(

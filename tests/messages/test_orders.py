@@ -1,5 +1,6 @@
 """Orders over a real router: every way in which one can end has its own words."""
 
+import contextlib
 import threading
 import time
 
@@ -36,12 +37,12 @@ def taking(bus):
         yield lambda kind, handler, device="": orders.take(session, "t", kind, handler, device)
 
 
-def known(asker, kind, device="", **fields):
+def known(asker, kind, device="", timeout_s=None, **fields):
     """Give an order as soon as somebody is there to take it."""
     end = time.monotonic() + PATIENCE
     while True:
         try:
-            return orders.give(asker, "t", kind, kind.command(**fields), device)
+            return orders.give(asker, "t", kind, kind.command(**fields), device, timeout_s)
         except orders.NoAnswer:
             assert time.monotonic() < end, "nobody took the order"
             time.sleep(0.02)
@@ -75,6 +76,20 @@ def test_an_answer_may_come_later_from_another_thread(asker, taking):
     thread.start()
     assert known(asker, orders.ESTIMATOR, "car").message == "for car"
     thread.join(PATIENCE)
+
+
+@pytest.mark.timeout(5 * PATIENCE)  # less than who asks has time for
+@pytest.mark.parametrize("said", [pb.Reply(ok=True), None])
+def test_an_answer_does_not_wait_until_the_order_is_forgotten(asker, taking, said):
+    kept = []
+
+    def handler(order):
+        kept.append(order)  # a worker does until its next message
+        order.answer(said) if said else order.refuse("not now")
+
+    taking(orders.BOARD, handler, "cube")
+    with contextlib.nullcontext() if said else pytest.raises(orders.Refused):
+        assert known(asker, orders.BOARD, "cube", timeout_s=10 * PATIENCE) == said
 
 
 def test_a_refusal_is_passed_on_as_it_was_said(asker, taking):

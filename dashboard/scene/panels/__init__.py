@@ -24,6 +24,7 @@ from dashboard.scene.panels.motion.tilt import Tilt
 from dashboard.scene.panels.navigation.filters import Navigation
 from dashboard.scene.panels.navigation.horizon import Horizon
 from dashboard.scene.panels.navigation.position import Position
+from dashboard.scene.panels.navigation.sky import SkyPanel
 from dashboard.scene.panels.session.record import Record
 from dashboard.scene.panels.session.timeline import Timeline
 
@@ -46,6 +47,7 @@ PAGES: tuple[type[Panel], ...] = (
     LayoutBench,
     Position,
     Navigation,
+    SkyPanel,
     Horizon,
     Errors,
 )
