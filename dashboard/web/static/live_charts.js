@@ -6,12 +6,11 @@ import { dress } from "/static/figure.js";
 import { ask, choose, state, whenStated, zoomed } from "/static/view.js";
 
 const LOOK_MS = 250;
-const NEW_MS = 3000;
 const LEAST_S = 0.01; // of a zoom
 const EDGE = /[+−]3σ$/;
 const NAMELESS = "Value"; // what uPlot calls a series without a label
 const frame = document.getElementById("scene");
-const known = new WeakMap(); // chart -> when it was first seen
+const known = new WeakSet(); // charts that have their tools
 const banner = document.getElementById("zoomed");
 let stretch = "";
 
@@ -71,7 +70,7 @@ function press(event, chart) {
 }
 
 function equip(chart) {
-  known.set(chart, Date.now());
+  known.add(chart);
   if (!chart.scales.y) return;
   dress(chart, () => describe(chart));
   cursors.add(chart, chart.root, () => describe(chart));
@@ -91,7 +90,7 @@ function look() {
     // The scene keeps a chart's zoom as a share of its time axis, and reads that from a chart just made before the axis
     // has its limits: one second of thirty is then shown for good. Over time, what is sent is what is to be seen.
     const { min, max } = chart.scales.x, off = min !== t[0] || max !== t[t.length - 1];
-    if (off && (chart.scales.y || Date.now() - known.get(chart) < NEW_MS)) chart.setScale("x", { min: t[0], max: t[t.length - 1] });
+    if (off && chart.scales.y && t[t.length - 1] > t[0]) chart.setScale("x", { min: t[0], max: t[t.length - 1] });
   }
   if (cursors.at) cursors.refresh();
 }

@@ -1,7 +1,9 @@
 """Power spectral density and Allan deviation of one signal, of the window that is shown."""
 
+import math
 import time
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import viser
@@ -81,6 +83,19 @@ def samples(s: Snapshot, signal: Channel | str) -> tuple[Array, Array, str]:
     return np.asarray(t), np.asarray(signal.of(rows)), signal.unit
 
 
+def _scales(x: Array) -> dict[str, Any]:
+    """Logarithmic scales, x over whole decades.
+
+    Left to itself the chart keeps its limits in shares of the data's span, and these lead to
+    negative ones while the span grows; on a logarithmic axis the search for its ticks does not end
+    then.
+    """
+    low = math.floor(math.log10(x[0]))
+    high = max(math.ceil(math.log10(x[-1])), low + 1)
+    across = {"time": False, "distr": 3, "auto": False, "range": (10.0**low, 10.0**high)}
+    return {"x": across, "level": {"distr": 3}}
+
+
 class Spectrum(Panel):
     """Welch's spectrum and the overlapping Allan deviation of the signal that is chosen."""
 
@@ -145,7 +160,10 @@ class Spectrum(Panel):
             return
         if self._headings[key].content != heading:
             self._headings[key].content = heading
-        self._plots[key].data = data
+        plot = self._plots[key]
+        if plot.scales != (scales := _scales(data[0])):
+            plot.scales = scales
+        plot.data = data
 
     def _plot(self, data: tuple[Array, Array], order: float) -> viser.GuiUplotHandle:
         points = {"show": False}
@@ -153,7 +171,7 @@ class Spectrum(Panel):
         return self.client.gui.add_uplot(
             data,
             series=({"label": "x"}, line),
-            scales={"x": {"time": False, "distr": 3}, "level": {"distr": 3}},
+            scales=_scales(data[0]),
             axes=({"size": 26}, {"size": 62, "scale": "level"}),
             legend={"show": False},
             height=230,
