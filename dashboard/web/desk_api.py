@@ -9,10 +9,13 @@ from fastapi import APIRouter, Depends, HTTPException, Request
 from pydantic import BaseModel, Field
 
 from dashboard.data.alarms import drives
+from dashboard.data.channels import channels
 from dashboard.data.store import Store
 from dashboard.web.auth import Role
 from dashboard.web.front import Asker, asker, front_of, needs
 from dashboard.web.schemas import Lines, Strict
+from dashboard.web.views import LONGEST
+from logs.figures.quantity import HINTS
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
 from messages.text import plain
@@ -49,11 +52,45 @@ class StopOut(BaseModel):
 
 
 class ViewIn(Strict):
-    view: str = Field(max_length=500, description="the live page's link after the question mark")
+    view: str = Field(
+        max_length=LONGEST, description="the live page's link after the question mark"
+    )
 
 
 class ViewOut(BaseModel):
     view: str
+
+
+class NamedOut(BaseModel):
+    name: str
+    unit: str
+    who: str = Field(description="an estimator or an instrument; of a function, what it does")
+
+
+class ChannelsOut(BaseModel):
+    channels: list[NamedOut] = Field(description="what an expression may name")
+    functions: list[NamedOut]
+
+
+@routes.get("/devices/{device}/channels", summary="What an expression over a device may name")
+def named_channels(request: Request, device: str, who: SignedIn) -> ChannelsOut:
+    store = front_of(request).store
+    if store is None:
+        raise HTTPException(503, "this dashboard has no connection to the bus")
+    with store.lock:
+        found = store.device(device)
+        if found is None:
+            raise HTTPException(404, "nothing has been heard of such a device")
+        known = list(channels(found).values())
+    return ChannelsOut(
+        channels=[NamedOut(name=one.name, unit=one.unit, who=one.who) for one in known],
+        functions=functions(),
+    )
+
+
+def functions() -> list[NamedOut]:
+    """What an expression may call."""
+    return [NamedOut(name=name, unit="", who=hint) for name, hint in HINTS.items()]
 
 
 @routes.post("/devices/{device}/notes", summary="Keep a note or a mark of this moment (operator)")

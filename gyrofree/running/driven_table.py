@@ -158,9 +158,9 @@ class TableDesk:
         if not self._by_line:
             raise ValueError("in local mode; send SYST:REM first")
         if not abs(omega) < 720.5 * DEGREE:
-            raise ValueError(f"{omega / DEGREE:g} deg/s: at most 720")
+            raise ValueError(f"{omega / DEGREE:g} °/s: at most 720")
         if acceleration is not None and not 0.0 < acceleration < 200.5 * DEGREE:
-            raise ValueError(f"{acceleration / DEGREE:g} deg/s^2: want 0 to 200")
+            raise ValueError(f"{acceleration / DEGREE:g} °/s^2: want 0 to 200")
         self._order = (omega, acceleration)
 
     # --- the motion

@@ -42,6 +42,7 @@ class Snapshot:
     now: float  # time.monotonic(), s; of a replay that is paused, when it was
     dark: bool
     cursors: tuple[float, float] | tuple[()] = ()  # s, of the stretch that is measured
+    derived: tuple[str, ...] = ()  # expressions of this browser, as people typed them
 
     def rows(self, topic: str, estimator: str = "") -> tuple[np.ndarray, np.ndarray]:
         """Times (n,) s and rows (n,) of a topic inside the window; columns by name (tables.py)."""
