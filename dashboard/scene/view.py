@@ -24,7 +24,7 @@ TRACK_S = 0.2  # trajectories grow five times a second
 # a replay that begins this near to the opening of a page was asked for by the person at it
 ASKED_FOR_S = 60.0
 ASK, ROLE = "Show", "Role"  # labels of what the page and the relay write into
-VIEWER, OPERATORS = "viewer", ("operator", "admin")  # what the relay says
+VIEWER, OPERATORS = "viewer", ("operator", "admin")  # what the relay says, and after it the name
 FIRST = {"nav": "position", "attitude": "tilt", "rate": "rates"}  # page, by what moves a body
 # Labels of the inputs that change this browser's own view only; anybody may use them, and an order
 # may not have a label that stands here.
@@ -71,6 +71,11 @@ class View:
         """Inputs that do more than change this browser's own view."""
         pages = (handle for page in self._pages for handle in page.orders)
         return *self._timeline.orders, *pages, self._role
+
+    @property
+    def _rank(self) -> str:
+        """Role of who looks; empty until the relay has said it."""
+        return self._role.value.partition(" ")[0]
 
     # --- ticks
 
@@ -205,7 +210,7 @@ class View:
             for what in wish.do:
                 if what == "camera":
                     self._reset_camera()
-                if self._role.value in OPERATORS:  # an order, by an input that is anybody's
+                if self._rank in OPERATORS:  # an order, by an input that is anybody's
                     self._timeline.do(what)
             self._say_state(self._device())
 
@@ -249,15 +254,17 @@ class View:
     def _set_rights(self) -> None:
         """A viewer sees the orders, and that and why they are not his."""
         with self._lock:
-            barred = self._role.value == VIEWER
+            barred = self._rank == VIEWER
             self._timeline.bar(barred)
+            for page in self._pages:
+                page.user = self._role.value.partition(" ")[2]
             for handle in self.orders:
                 if handle is not self._role and not isinstance(handle, viser.GuiButtonGroupHandle):
                     handle.disabled = barred
             self._say_rights()
 
     def _say_rights(self) -> None:
-        barred = self._role.value == VIEWER and bool(self._pages[self._page].orders)
+        barred = self._rank == VIEWER and bool(self._pages[self._page].orders)
         text = "You look as viewer: what gives orders is greyed, it takes the role operator."
         if barred:
             self._rights.content = str(alert(text))
