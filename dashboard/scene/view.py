@@ -50,7 +50,7 @@ class View:
         self._device_chosen = False  # by the person, or by the replay that it began
         self._opened_at = time.monotonic()
         self._generation = -1
-        self._span, self._size = Span(), "l"
+        self._span, self._size, self._rank = Span(), "l", ""
         self._derived: list[str] = []  # lines of expression.py
         self._tracks_at = 0.0
         self._lock = threading.RLock()  # callbacks of the browser against the loops
@@ -71,11 +71,6 @@ class View:
         """Inputs that do more than change this browser's own view."""
         pages = (handle for page in self._pages for handle in page.orders)
         return *self._timeline.orders, *pages, self._role
-
-    @property
-    def _rank(self) -> str:
-        """Role of who looks; empty until the relay has said it."""
-        return self._role.value.partition(" ")[0]
 
     # --- ticks
 
@@ -254,10 +249,11 @@ class View:
     def _set_rights(self) -> None:
         """A viewer sees the orders, and that and why they are not his."""
         with self._lock:
+            self._rank, _, user = self._role.value.partition(" ")
             barred = self._rank == VIEWER
             self._timeline.bar(barred)
             for page in self._pages:
-                page.user = self._role.value.partition(" ")[2]
+                page.user = user
             for handle in self.orders:
                 if handle is not self._role and not isinstance(handle, viser.GuiButtonGroupHandle):
                     handle.disabled = barred
