@@ -21,7 +21,7 @@ _environment = jinja2.Environment(
 def to_html(document: Document) -> str:
     """The page; pictures are inside."""
     pictures = [
-        (k, picture.caption, base64.b64encode(picture.png).decode())
+        (k, picture.caption, picture.kind, base64.b64encode(picture.png).decode())
         for k, picture in enumerate(document.pictures, 1)
     ]
     return _environment.get_template("report.html").render(document=document, pictures=pictures)
