@@ -19,8 +19,8 @@ from dashboard.desk import Desk
 from dashboard.scene.panels import PAGES
 from dashboard.scene.service import start
 from dashboard.scene.view import View
-from dashboard.terms import TERMS, glossary_link
 from dashboard.web.frame.scene_page import policy, script_hashes
+from logs.figures.words import TERMS, glossary_link
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 from sessions.library.annotations import Annotations, SessionNote
