@@ -18,7 +18,7 @@ from estimator.saved_state import SavedState, version
 from estimator.settings import EstimatorSettings
 from estimator.worker import Worker
 from messages.bus import orders
-from messages.bus.fencing import Claim, Fence, claim, heard_of
+from messages.bus.fencing import CLAIMED_ESTIMATES, Claim, Fence, claim, heard_of
 from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client
 from messages.clock import elapsed_ns
 from messages.contract.door import Door
@@ -46,7 +46,7 @@ def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) ->
         if stop.is_set():
             return
         raise
-    bases = [f"{bus.prefix}/{name}/estimates" for name in _leader(settings)]
+    bases = [f"{bus.prefix}/{name}/{CLAIMED_ESTIMATES}" for name in _leader(settings)]
 
     def refused(other: str) -> None:
         log.error(
@@ -88,10 +88,10 @@ def _serve(
     """Estimate until `stop`, or until another has claimed the same."""
     spool = _open_spool(settings)
     publishers = Publishers(session, bus.prefix, spool)
-    publishers.number = claimed.number
     if spool is not None:
         spool.journal.outrun(claimed.number - 1)
-        publishers.number = spool.journal.run
+        claimed.raise_to(spool.journal.run)
+    publishers.number = claimed.number
     asker = Asker(session, bus.prefix, lambda question, reply: worker.answered(question, reply))
     saved = SavedState(settings.journal, settings, version()) if spool is not None else None
     worker = _worker(Pipeline(settings), publishers, asker, saved, settings)
