@@ -26,6 +26,7 @@ AXIS_WORDS = {
 }
 MOST = 12  # of one device
 TURNS_RADPS = 0.035  # 2 deg/s: beyond it a rate is no standstill
+PROCEDURES_SILENT_S = 3.0  # s without a word of who drives a table
 RECORDER_STALE_S = 5.0  # s without a word of the recorder while it records
 _COUNTS = re.compile(r"fixes (\w+) (\d+)")
 
@@ -66,7 +67,7 @@ def alarms(store: Store, device: Device, now: float | None = None) -> list[Alarm
     now = time.monotonic() if now is None else now
     if store.replay.state(device.name, time.monotonic()) == "ended":
         return []
-    found = [*_link(device, now), *_board(device, now), *_axes(device, now)]
+    found = [*_table(device, now), *_link(device, now), *_board(device, now), *_axes(device, now)]
     found += [*_estimators(device, now), *_sight(device, now)]
     return found[:MOST]
 
@@ -84,6 +85,22 @@ def bench_alarms(store: Store, now: float | None = None) -> list[Alarm]:
         return []
     full = "no space" in text.lower() or "full" in text.lower()
     return [Alarm("recorder", "disk full" if full else "recording failed", text, "")]
+
+
+def drives(m: pb.ProcedureStatus) -> bool:
+    """Whether a procedure has a table in its hands: from its start until the table is let go."""
+    active = m.state in (pb.ProcedureStatus.STATE_RUNNING, pb.ProcedureStatus.STATE_HELD)
+    return bool(m.table) and (active or m.instruction.endswith("being closed"))
+
+
+def _table(device: Device, now: float) -> Iterator[Alarm]:
+    heard = device.get("procedure")
+    if heard is not None and drives(heard.message) and heard.age(now) > PROCEDURES_SILENT_S:
+        text = (
+            f"the procedures have been silent for {heard.age(now):.0f} s and"
+            f" {plain(heard.message.table, 60)} may still turn: stop it at the table"
+        )
+        yield Alarm("table", "the table is left alone", text, "procedure")
 
 
 def _link(device: Device, now: float) -> Iterator[Alarm]:
@@ -104,7 +121,11 @@ def _board(device: Device, now: float) -> Iterator[Alarm]:
     heard = device.get("board")
     if heard is None or device.stale("board", now=now):
         return
+    # The simulated table boots at the beginning of each of its tests: nobody has to look after it.
+    simulated = heard.message.header.source == pb.SOURCE_SIMULATED
     for fault in heard.message.faults:
+        if fault.name == "reboot" and simulated:
+            continue
         if fault.active or fault.name == "reboot":  # over as soon as it is known
             yield Alarm("board", plain(fault.name), plain(fault.text), "board")
 

@@ -12,7 +12,8 @@ from dashboard.web.users import write_private
 
 log = logging.getLogger(__name__)
 
-VIEW = re.compile(r"[A-Za-z0-9=&._%+-]{0,500}")  # as URLSearchParams writes it
+LONGEST = 6000  # characters, with a person's own curves
+VIEW = re.compile(rf"[A-Za-z0-9=&._%+*-]{{0,{LONGEST}}}")  # as URLSearchParams writes it
 
 
 class Views:

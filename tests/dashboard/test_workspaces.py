@@ -290,7 +290,8 @@ def test_a_viewer_sees_orders_disabled_and_why(view, store):
     view.tick_panels()
     assert view._rights.visible and "role operator" in view._rights.content
     assert "role operator" in view._timeline._state.content
-    view._role.value = "operator"
+    view._role.value = "operator otto"
+    assert {page.user for page in view._pages} == {"otto"}
     assert not any(handle.disabled for handle in others) and not view._rights.visible
     assert all(one.visible for one in groups)
 

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from dashboard.data.ring import gap_limit
 from dashboard.scene.drawing import series
 from dashboard.scene.drawing.page import tag
 from dashboard.scene.drawing.palette import number, rgba
@@ -207,7 +208,7 @@ class Chart:
                     "strip": {"range": (0, 1 / LATE_HEIGHT)},
                 },
                 axes=(
-                    {"size": 26, "font": "11px sans-serif"},
+                    {"size": 38, "font": "11px sans-serif"},  # with the origin below the numbers
                     {"size": 46, "font": "11px sans-serif"},
                 ),
                 legend={"show": False},
@@ -288,7 +289,7 @@ def _data(
     t, y = curves[primary].t, curves[primary].y
     if not np.isfinite(y).any():
         t = t[:0]  # samples without a value are no values: all of it is a gap
-    pause = max(series.gap_limit(t), 2.5 * (edges[1] - edges[0]))
+    pause = max(gap_limit(t), 2.5 * (edges[1] - edges[0]))
     out.append(series.gap_mask(t, edges, pause).astype(np.uint8))
     return tuple(out)
 

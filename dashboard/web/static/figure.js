@@ -115,16 +115,18 @@ function drawOdd(u) {
   });
 }
 
+// Below the numbers of the time axis: what they count, and from when.
 function drawOrigin(u, { origin }) {
   if (!origin) return;
-  pen(u, (c, box, px) => {
-    c.fillStyle = ink(u);
-    c.globalAlpha = 0.6;
-    c.font = `${10 * px}px ${FACE}`;
-    c.textAlign = "right";
-    c.textBaseline = "bottom";
-    c.fillText(origin, box.right - 3 * px, box.bottom - 2 * px);
-  });
+  const c = u.ctx, { left, width } = u.bbox, px = devicePixelRatio;
+  c.save();
+  c.fillStyle = ink(u);
+  c.globalAlpha = 0.75;
+  c.font = `${11 * px}px ${FACE}`;
+  c.textAlign = "right";
+  c.textBaseline = "bottom";
+  c.fillText(origin, left + width, c.canvas.height - 2 * px, width);
+  c.restore();
 }
 
 // ---- the figure for a paper: white, black axes, units, legend

@@ -1,15 +1,17 @@
 // The charts inside the scene's frame, which has the same origin: they get the tools of figure.js and cursors.js. What
 // they show stands in the heading above each (data-chart); see dashboard/scene/drawing/chart.py.
 import { Cursors } from "/static/cursors.js";
+import { keyed, selectable } from "/static/drag.js";
 import { dress } from "/static/figure.js";
-import { ask } from "/static/view.js";
+import { ask, choose, state, whenStated, zoomed } from "/static/view.js";
 
-const LOOK_MS = 500;
-const NEW_MS = 3000;
+const LOOK_MS = 250;
+const LEAST_S = 0.01; // of a zoom
 const EDGE = /[+−]3σ$/;
 const NAMELESS = "Value"; // what uPlot calls a series without a label
 const frame = document.getElementById("scene");
-const known = new WeakMap(); // chart -> when it was first seen
+const known = new WeakSet(); // charts that have their tools
+const banner = document.getElementById("zoomed");
 let stretch = "";
 
 const cursors = new Cursors((a, b) => {
@@ -49,22 +51,60 @@ function describe(chart) {
   return { title, unit, origin, ranges, lines, measured: measured && asked(measured) ? measured : null };
 }
 
+// A zoom is the view's, so that its charts are drawn anew from every sample, stay while data come in, and are the same
+// on every page and in the link. Times of a chart are s on the device's axis; those of a zoom are UTC.
+function zoom(a, b) {
+  if (!state || !(b - a >= LEAST_S)) return;
+  choose({ zoom: zoomed([a + state.utc0, b + state.utc0]) });
+}
+const follow = () => choose({ zoom: "none" });
+
+function press(event, chart) {
+  if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
+  if (event.key === "0") { event.preventDefault(); return follow(); }
+  const to = keyed(event.key, [chart.scales.x.min, chart.scales.x.max], null);
+  if (!to) return;
+  event.preventDefault();
+  event.stopPropagation();
+  zoom(...to);
+}
+
+function equip(chart) {
+  known.add(chart);
+  if (!chart.scales.y) return;
+  dress(chart, () => describe(chart));
+  cursors.add(chart, chart.root, () => describe(chart));
+  const mine = (event) => event.stopImmediatePropagation(); // uPlot would zoom in what it has been sent
+  chart.over.addEventListener("mousedown", mine, true);
+  chart.over.addEventListener("dblclick", (event) => { mine(event); follow(); }, true);
+  selectable(chart, zoom);
+  chart.root.addEventListener("keydown", (event) => press(event, chart));
+}
+
 function look() {
   const charts = frame.contentWindow?.__viserTestpoints?.uplots ?? {};
   for (const { chart } of Object.values(charts)) {
     const t = chart.data?.[0];
     if (!t?.length) continue;
-    if (!known.has(chart)) {
-      known.set(chart, Date.now());
-      if (chart.scales.y) {
-        dress(chart, () => describe(chart));
-        cursors.add(chart, chart.root, () => describe(chart));
-      }
-    }
+    if (!known.has(chart)) equip(chart);
     // The scene keeps a chart's zoom as a share of its time axis, and reads that from a chart just made before the axis
-    // has its limits: one second of thirty is then shown for good. Nobody can have zoomed a chart that is so new.
-    if (Date.now() - known.get(chart) < NEW_MS) chart.setScale("x", { min: t[0], max: t[t.length - 1] });
+    // has its limits: one second of thirty is then shown for good. Over time, what is sent is what is to be seen.
+    const { min, max } = chart.scales.x, off = min !== t[0] || max !== t[t.length - 1];
+    if (off && chart.scales.y && t[t.length - 1] > t[0]) chart.setScale("x", { min: t[0], max: t[t.length - 1] });
   }
   if (cursors.at) cursors.refresh();
 }
 setInterval(look, LOOK_MS);
+
+const clock = (s) => new Date(s * 1000).toISOString().slice(11, 23);
+
+whenStated((now) => {
+  const is = now.zoom.length === 2;
+  banner.hidden = !is;
+  if (!is) return;
+  const [a, b] = now.zoom, long = (b - a).toPrecision(3);
+  banner.querySelector("span").textContent = now.kept
+    ? `Zoomed: ${clock(a)} to ${clock(b)} UTC, ${long} s · data keep coming in`
+    : `Zoomed: ${clock(a)} to ${clock(b)} UTC: data of that time are not held here any more`;
+});
+banner.querySelector("button").addEventListener("click", follow);
