@@ -215,6 +215,13 @@ def test_what_is_wrong_is_an_alarm_with_a_reason_and_a_page_that_exists(store):
     late = pb.EstimatorStatus(header=pb.Header(utc_ns=UTC), state="turning", behind_s=9.0)
     put(tp.ESTIMATOR, "cube-01", ORDER, late)
     assert {"axis", "link", "board", "late"} <= kinds(store) - before
+    sparse = pb.EstimatorStatus(
+        header=pb.Header(utc_ns=UTC), limit_hz=5.0, skipped_s=12.0, trouble="cannot be saved"
+    )
+    put(tp.ESTIMATOR, "cube-01", ORDER, sparse)
+    texts = [alarm.text for alarm in alarms(store, store.device("cube-01"))]
+    assert "cannot be saved" in texts
+    assert any("at most 5 estimates a second" in t and "12 s were passed over" in t for t in texts)
     for alarm in alarms(store, store.device("cube-01")):
         assert alarm.title and alarm.text and alarm.page in KEYS
     full = pb.RecorderStatus(recording=False, message="No space left on device: free some")
