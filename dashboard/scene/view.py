@@ -24,7 +24,7 @@ TRACK_S = 0.2  # trajectories grow five times a second
 # a replay that begins this near to the opening of a page was asked for by the person at it
 ASKED_FOR_S = 60.0
 ASK, ROLE = "Show", "Role"  # labels of what the page and the relay write into
-VIEWER, OPERATORS = "viewer", ("operator", "admin")  # what the relay says
+VIEWER, OPERATORS = "viewer", ("operator", "admin")  # what the relay says, and after it the name
 FIRST = {"nav": "position", "attitude": "tilt", "rate": "rates"}  # page, by what moves a body
 # Labels of the inputs that change this browser's own view only; anybody may use them, and an order
 # may not have a label that stands here.
@@ -50,7 +50,7 @@ class View:
         self._device_chosen = False  # by the person, or by the replay that it began
         self._opened_at = time.monotonic()
         self._generation = -1
-        self._span, self._size = Span(), "l"
+        self._span, self._size, self._rank = Span(), "l", ""
         self._derived: list[str] = []  # lines of expression.py
         self._tracks_at = 0.0
         self._lock = threading.RLock()  # callbacks of the browser against the loops
@@ -205,7 +205,7 @@ class View:
             for what in wish.do:
                 if what == "camera":
                     self._reset_camera()
-                if self._role.value in OPERATORS:  # an order, by an input that is anybody's
+                if self._rank in OPERATORS:  # an order, by an input that is anybody's
                     self._timeline.do(what)
             self._say_state(self._device())
 
@@ -249,15 +249,18 @@ class View:
     def _set_rights(self) -> None:
         """A viewer sees the orders, and that and why they are not his."""
         with self._lock:
-            barred = self._role.value == VIEWER
+            self._rank, _, user = self._role.value.partition(" ")
+            barred = self._rank == VIEWER
             self._timeline.bar(barred)
+            for page in self._pages:
+                page.user = user
             for handle in self.orders:
                 if handle is not self._role and not isinstance(handle, viser.GuiButtonGroupHandle):
                     handle.disabled = barred
             self._say_rights()
 
     def _say_rights(self) -> None:
-        barred = self._role.value == VIEWER and bool(self._pages[self._page].orders)
+        barred = self._rank == VIEWER and bool(self._pages[self._page].orders)
         text = "You look as viewer: what gives orders is greyed, it takes the role operator."
         if barred:
             self._rights.content = str(alert(text))

@@ -1,4 +1,6 @@
-"""REST of the live page: a person's notes on a device, and what he last had on the page."""
+"""REST of the live page: a person's notes on a device, what he last had on the page, and the
+emergency stop of tables that are driven.
+"""
 
 import time
 from typing import Annotated, Literal
@@ -6,6 +8,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Depends, HTTPException, Request
 from pydantic import BaseModel, Field
 
+from dashboard.data.alarms import drives
 from dashboard.data.channels import channels
 from dashboard.data.store import Store
 from dashboard.web.auth import Role
@@ -15,8 +18,10 @@ from dashboard.web.views import LONGEST
 from logs.figures.quantity import HINTS
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
+from messages.text import plain
 
 routes = APIRouter(prefix="/api")
+SWITCH_OFF = "THE TABLE MAY STILL TURN, switch it off by hand"
 
 SignedIn = Annotated[Asker, Depends(asker)]
 Same = Annotated[Asker, Depends(needs(Role.viewer))]
@@ -32,6 +37,17 @@ class NoteOut(BaseModel):
     at_s: float | None = Field(
         description="s since the recording or the replay began; none without one"
     )
+    message: str
+
+
+class TableOut(BaseModel):
+    device: str
+    table: str = Field(description="its name")
+    rate_radps: float = Field(description="that it was last said to turn at")
+    silent_s: float = Field(description="since the last word of the procedures")
+
+
+class StopOut(BaseModel):
     message: str
 
 
@@ -107,6 +123,43 @@ def note(request: Request, device: str, body: NoteIn, who: Operator) -> NoteOut:
         return NoteOut(at_s=None, message=f"{what} shown; not kept: nothing is being recorded")
     kept = "kept" if recorded else "shown; a replay is not recorded"
     return NoteOut(at_s=at_s, message=f"{what} at {at_s:.1f} s: {kept}")
+
+
+@routes.get("/tables", summary="Tables that a procedure drives now")
+def tables(request: Request, who: SignedIn) -> list[TableOut]:
+    store = front_of(request).store
+    if store is None:
+        return []
+    with store.lock:
+        found = [
+            (store.devices[name], store.devices[name].get("procedure")) for name in store.names()
+        ]
+        return [
+            TableOut(
+                device=device.name,
+                table=plain(heard.message.table),
+                rate_radps=heard.message.table_radps,
+                silent_s=heard.age(),
+            )
+            for device, heard in found
+            if heard is not None and drives(heard.message)
+        ]
+
+
+@routes.post("/devices/{device}/stop", summary="EMERGENCY STOP of its table (operator)")
+def stop(request: Request, device: str, who: Operator) -> StopOut:
+    """The table stops at once and the procedure ends; HTTP 503 where that is not certain."""
+    desk = front_of(request).desk
+    if desk is None:
+        raise HTTPException(503, f"{SWITCH_OFF}: this dashboard has no connection to the bus")
+    action = pb.ProcedureCommand.ACTION_STOP
+    try:
+        reply = desk.procedure(pb.ProcedureCommand(action=action, device=device, user=who.name))
+    except (OrderError, ValueError) as error:
+        raise HTTPException(503, f"{SWITCH_OFF}: {error}") from None
+    if not reply.ok:
+        raise HTTPException(503, reply.message)
+    return StopOut(message=reply.message)
 
 
 def recording(store: Store) -> bool:

@@ -96,8 +96,14 @@ class Service:
     # --- on the service's own thread
 
     def resume(self) -> None:
-        """Go on with what a crash cut off."""
-        for device, journal in unfinished(self._settings.root).items():
+        """Go on with what a crash cut off; first of all the tables that it left turning stand."""
+        left = unfinished(self._settings.root)
+        for device in left.keys() & self._tables.keys():
+            reply = self._stop_alone(device)
+            log.warning("%s: its procedure was cut off; %s", device, reply.message)
+        for device, journal in left.items():
+            if journal is None:
+                continue
             log.info("%s: going on with %s", device, journal.run.id)
             self._start(journal)
 

@@ -228,6 +228,13 @@ def test_what_is_wrong_is_an_alarm_with_a_reason_and_a_page_that_exists(store):
     late = pb.EstimatorStatus(header=pb.Header(utc_ns=UTC), state="turning", behind_s=9.0)
     put(tp.ESTIMATOR, "cube-01", ORDER, late)
     assert {"axis", "link", "board", "late"} <= kinds(store) - before
+    sparse = pb.EstimatorStatus(
+        header=pb.Header(utc_ns=UTC), limit_hz=5.0, skipped_s=12.0, trouble="cannot be saved"
+    )
+    put(tp.ESTIMATOR, "cube-01", ORDER, sparse)
+    texts = [alarm.text for alarm in alarms(store, store.device("cube-01"))]
+    assert "cannot be saved" in texts
+    assert any("at most 5 estimates a second" in t and "12 s were passed over" in t for t in texts)
     for alarm in alarms(store, store.device("cube-01")):
         assert alarm.title and alarm.text and alarm.page in KEYS
     full = pb.RecorderStatus(recording=False, message="No space left on device: free some")
@@ -296,7 +303,8 @@ def test_a_viewer_sees_orders_disabled_and_why(view, store):
     view.tick_panels()
     assert view._rights.visible and "role operator" in view._rights.content
     assert "role operator" in view._timeline._state.content
-    view._role.value = "operator"
+    view._role.value = "operator otto"
+    assert {page.user for page in view._pages} == {"otto"}
     assert not any(handle.disabled for handle in others) and not view._rights.visible
     assert all(one.visible for one in groups)
 

@@ -61,6 +61,7 @@ class Panel:
     title = ""
     workspace = ""  # key of one of dashboard.scene.workspaces.WORKSPACES
     desk: Desk  # set by the view: how a panel gives orders
+    user = ""  # set by the view: who is signed in, as the relay says
     own_inputs: tuple[str, ...] = ()  # labels of inputs that change this browser's own view only
     own_scene = False  # True: the page shows something else than the device in 3-D
 
