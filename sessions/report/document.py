@@ -3,6 +3,7 @@ here.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 
@@ -36,6 +37,17 @@ class Document:
     grids: list[Grid]
     pictures: list[Picture]
     provenance: list[tuple[str, str]] = field(default_factory=list)
+
+    def texts(self) -> Iterator[str]:
+        """All that it says beside numbers of its own."""
+        for row in (*self.facts, *self.checks):
+            yield from row
+        for grid in self.grids:
+            yield from (grid.title, *grid.head, grid.remark or "")
+            for row in grid.rows:
+                yield from row
+        for picture in self.pictures:
+            yield picture.caption
 
 
 @dataclass(frozen=True)
