@@ -155,13 +155,31 @@ def _estimators(device: Device, now: float) -> Iterator[Alarm]:
             doubted = m.message.startswith("settings: ")
             title = "is a setting wrong?" if doubted else called
             yield Alarm("settings" if doubted else "estimator", title, plain(m.message), page)
-    behind_s = max((device.behind_s(n) for n in device.estimators("estimator")), default=0.0)
-    if behind_s > BEHIND_STALE_S:
-        text = (
-            f"estimates are {behind_s:.0f} s behind their samples: its machine is too slow for all"
-            " that it is given; fewer estimators or boards, or a second machine"
-        )
-        yield Alarm("late", "estimates are late", text, page)
+    yield from _late(device, page)
+
+
+def _late(device: Device, page: str) -> Iterator[Alarm]:
+    """What the estimators' machine has no time or no room for."""
+    said = [device.get("estimator", name).message for name in device.estimators("estimator")]
+    trouble = next((plain(m.trouble) for m in said if m.trouble), "")
+    if trouble:
+        yield Alarm("disk", "state not saved", trouble, page)
+    behind_s = max((m.behind_s for m in said), default=0.0)
+    limit_hz = max((m.limit_hz for m in said), default=0.0)
+    if behind_s <= BEHIND_STALE_S and not limit_hz:
+        return
+    what = [f"estimates are {behind_s:.0f} s behind their samples"] if behind_s >= 0.5 else []
+    if limit_hz:
+        what.append(f"at most {limit_hz:g} estimates a second are published")
+    skipped_s = max(m.skipped_s for m in said)
+    if skipped_s:
+        what.append(f"samples of {skipped_s:.0f} s were passed over")
+    text = (
+        f"{', '.join(what)}: the estimators' machine is too slow for all that it is given; fewer"
+        " estimators or boards, or a second machine"
+    )
+    title = "estimates are late" if behind_s > BEHIND_STALE_S else "estimates are sparse"
+    yield Alarm("late", title, text, page)
 
 
 def _sight(device: Device, now: float) -> Iterator[Alarm]:

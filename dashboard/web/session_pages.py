@@ -3,6 +3,7 @@
 import json
 from dataclasses import dataclass
 from typing import Annotated
+from urllib.parse import parse_qs
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
@@ -62,6 +63,7 @@ def session_page(request: Request, session: str, who: SignedIn) -> HTMLResponse:
         photo=_photo(front, session),
         completeness=_completeness(manifest),
         formats=list(FORMATS),
+        derived=parse_qs(front.views.of(who.name, "session")).get("derived", [""])[0],
         can_replay=front.replay is not None and who.role >= Role.operator,
         can_change=who.role >= Role.operator,
         can_delete=who.role >= Role.admin,

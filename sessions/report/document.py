@@ -3,6 +3,7 @@ here.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 
@@ -38,6 +39,17 @@ class Document:
     provenance: list[tuple[str, str]] = field(default_factory=list)
     # what is to be signed, and who or when, as far as the recording says it
     signed: tuple[tuple[str, str], ...] = (("Tested by", ""), ("Approved by", ""), ("Date", ""))
+
+    def texts(self) -> Iterator[str]:
+        """All that it says beside numbers of its own."""
+        for row in (*self.facts, *self.checks):
+            yield from row
+        for grid in self.grids:
+            yield from (grid.title, *grid.head, grid.remark or "")
+            for row in grid.rows:
+                yield from row
+        for picture in self.pictures:
+            yield picture.caption
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from reportlab.platypus import (
     TableStyle,
 )
 
+from logs.figures.words import words_of
 from messages.text import html, paragraph
 from sessions.report.document import Document
 from sessions.report.grids import Grid
@@ -116,6 +117,9 @@ def _story(document: Document) -> list:
         story.append(KeepTogether([Spacer(0, 5 * mm), image, caption]))
     for grid in document.grids:
         story += _grid(grid)
+    words = words_of(list(document.texts()))
+    if words:
+        story += [_title("Words"), _pairs(list(words.items()))]
     story += [
         _title("Provenance"),
         _pairs(document.provenance),

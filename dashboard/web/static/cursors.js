@@ -165,7 +165,8 @@ export class Cursors {
       made.firstChild.style.color = line.color;
       table.append(made);
     }
-    const words = `A to B, ${a.toFixed(3)} s to ${b.toFixed(3)} s: ${(b - a).toFixed(3)} s, ${rough ? "of the points drawn" : "of every sample"}`;
+    const words = `A to B, ${a.toFixed(3)} s to ${b.toFixed(3)} s: ${(b - a).toFixed(3)} s, ${rough ? "of the points drawn" : `of ${figure.of ?? "every sample"}`}${figure.provisional ? "; provisional: the recording is still being read" : ""}`;
+    one.table.classList.toggle("provisional", Boolean(figure.provisional || rough));
     one.table.replaceChildren(cell("p", words), table);
   }
 }

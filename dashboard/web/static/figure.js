@@ -10,7 +10,8 @@ const FACE = "system-ui, 'DejaVu Sans', sans-serif";
 const number = (v) => (v === 0 ? "0" : Math.abs(v) >= 1e5 || Math.abs(v) < 1e-3 ? v.toExponential(2) : String(Number(v.toPrecision(4))));
 
 // Least and greatest to be shown of the lines within [a, b], and the points that lie far outside.
-export function robust(lines, a, b) {
+// `done`: nothing more comes, so the newest points are no beginning of something.
+export function robust(lines, a, b, done = false) {
   const points = [];
   for (const line of lines) {
     for (let k = 0; k < line.x.length; k++) {
@@ -27,7 +28,7 @@ export function robust(lines, a, b) {
   const low = at(0.02), high = at(0.98), width = high - low;
   // rounding alone is no width: uPlot has no ticks so small
   if (!(width > 1e-9 * Math.max(Math.abs(low), Math.abs(high), 1e-3))) return null;
-  const settled = ([, x]) => x < b - FRESH * (b - a);
+  const settled = ([, x]) => done || x < b - FRESH * (b - a);
   const above = points.filter(([y]) => y > high + FAR * width), below = points.filter(([y]) => y < low - FAR * width);
   const odd = [above, below].flatMap((some) => (places(some) <= FEW && some.every(settled) ? some : []));
   if (!odd.length) return null;
@@ -43,7 +44,8 @@ export function dress(u, describe) {
   const scale = u.scales.y, usual = scale.range;
   scale.range = (self, min, max, key) => {
     const { min: a, max: b } = self.scales.x;
-    u.odd = a < b ? robust(describe().lines(), a, b) : null;
+    const figure = describe();
+    u.odd = a < b ? robust(figure.lines(), a, b, figure.done) : null;
     if (!u.odd) return usual(self, min, max, key);
     const margin = 0.12 * (u.odd.max - u.odd.min);
     return [u.odd.min - margin, u.odd.max + margin];

@@ -1,4 +1,5 @@
 // The page of one session: plots, replay, report, export, notes, labels, deletion.
+import { Derived } from "/static/derived.js";
 import { Overlay } from "/static/overlay.js";
 import { call, ended, send, toast } from "/static/rest.js";
 
@@ -139,21 +140,43 @@ by("delete")?.addEventListener("click", (event) => guarded(event.target, async (
   location.assign("/sessions");
 }));
 
-// The session's own curves; a click sets the moment that a remark, or a replay, is about.
+// What is recorded over time; a click sets the moment that a remark, or a replay, is about.
 if (by("plots")) {
-  const overlay = new Overlay(by("plots"), [session], () => ({ everything: "true" }), {
+  const asked = new URLSearchParams(location.search).get("derived") ?? document.querySelector("main").dataset.derived;
+  let lines = asked.split(";").map((line) => line.trim()).filter(Boolean);
+  const overlay = new Overlay(by("plots"), [session], () => ({ everything: "true", ...(lines.length && { derived: lines.join(";") }) }), {
     state: (text, fault = false) => {
       by("plot-state").textContent = text;
       by("plot-state").className = fault ? "fault" : "dim";
     },
-    data: (answer) => { document.body.dataset.plotted = answer.state; },
+    data: (answer) => {
+      document.body.dataset.plotted = answer.state;
+      editor.show(answer.own);
+    },
     click: (t) => {
       if (t < 0) return;
       moment = Math.round(t * 100) / 100;
       if (by("note")) by("note").at_s.value = moment;
       if (by("replay")) by("replay").textContent = `Replay from ${moment} s`;
-      history.replaceState(null, "", `?t=${moment}`);
+      address({ t: moment });
     },
   });
+  const editor = new Derived(by("own-curves"), {
+    named: () => call(`${path}/channels`),
+    changed: (now) => {
+      lines = now;
+      address({ derived: lines.join(";") });
+      call("me/view", { view: new URLSearchParams({ derived: lines.join(";") }).toString(), page: "session" }).catch(() => {});
+      overlay.load(...overlay.group.window);
+    },
+  });
+  if (lines.length) by("own-curves").open = true;
   overlay.load();
+}
+
+// The link to what is seen.
+function address(fields) {
+  const query = new URLSearchParams(location.search);
+  for (const [key, value] of Object.entries(fields)) value === "" ? query.delete(key) : query.set(key, value);
+  history.replaceState(null, "", `?${query}`);
 }

@@ -91,7 +91,7 @@ def _offer(named: dict[str, Channel]) -> Markup:
     for one in named.values():
         of.setdefault(one.who, []).append(one)
     lines = [
-        (who, joined([tag("code", one.name, title=one.unit) for one in some], " "))
+        (who, joined([tag("span", one.name, class_="gf-name") for one in some], " "))
         for who, some in of.items()
     ]
     return joined([guide, rows(lines)])
