@@ -37,6 +37,8 @@ class Document:
     grids: list[Grid]
     pictures: list[Picture]
     provenance: list[tuple[str, str]] = field(default_factory=list)
+    # what is to be signed, and who or when, as far as the recording says it
+    signed: tuple[tuple[str, str], ...] = (("Tested by", ""), ("Approved by", ""), ("Date", ""))
 
     def texts(self) -> Iterator[str]:
         """All that it says beside numbers of its own."""
@@ -57,6 +59,7 @@ class Extra:
     facts: list[tuple[str, str]] = field(default_factory=list)
     grids: list[Grid] = field(default_factory=list)
     provenance: list[tuple[str, str]] = field(default_factory=list)
+    tested_by: str = ""
 
 
 def compose(
@@ -86,7 +89,17 @@ def compose(
         grids=[grid for grid in grids if grid is not None and grid.rows],
         pictures=drawn,
         provenance=extra.provenance + _provenance(found, manifest, sha256),
+        signed=(
+            ("Tested by", extra.tested_by),
+            ("Approved by", ""),
+            ("Date", _date(found) if extra.tested_by else ""),
+        ),
     )
+
+
+def _date(found: Analysis) -> str:
+    """Of the test, not of the report: the same recording gives the same bytes."""
+    return datetime.fromtimestamp(found.run.start_utc_s, UTC).strftime("%Y-%m-%d")
 
 
 def _facts(found: Analysis, manifest: Manifest | None, spec: Spec) -> list[tuple[str, str]]:

@@ -28,7 +28,7 @@ def _place(word: str) -> str:
 def to_html(document: Document) -> str:
     """The page; pictures are inside."""
     pictures = [
-        (k, picture.caption, base64.b64encode(picture.png).decode())
+        (k, picture.caption, picture.kind, base64.b64encode(picture.png).decode())
         for k, picture in enumerate(document.pictures, 1)
     ]
     words = words_of(list(document.texts()))

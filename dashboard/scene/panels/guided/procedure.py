@@ -182,8 +182,10 @@ def _report(m: pb.ProcedureStatus) -> Markup:
     if m.state in ACTIVE or not m.session or m.instruction.endswith("being closed"):
         return EMPTY
     way = f"/sessions/{m.session}"
-    link = tag("a", "Open the session and its report", href=way, target="_blank", rel="noopener")
-    return tag("p", link, class_="gf-note")
+    new = {"target": "_blank", "rel": "noopener"}
+    report = tag("a", "Open the report", href=f"{way}?report", **new)
+    session = tag("a", "the session, to add a photo of the unit", href=way, **new)
+    return tag("p", report, ", or ", session, class_="gf-note")
 
 
 def steps_of(m: pb.ProcedureStatus) -> Markup:
