@@ -215,7 +215,7 @@ class Chart:
                     "strip": {"range": (0, 1 / LATE_HEIGHT)},
                 },
                 axes=(
-                    {"size": 38, "font": "11px sans-serif"},  # with the origin below the numbers
+                    {"size": 42, "font": "11px sans-serif"},  # with the origin below the numbers
                     {"size": 46, "font": "11px sans-serif"},
                 ),
                 legend={"show": False},

@@ -157,16 +157,25 @@ function trace(line, a, b, X, Y) {
   return path;
 }
 
+// The place of a value on an axis from `from` to `to`, px, and its ticks; over decades where the chart's scale is.
+function placed(scale, from, to, most) {
+  const { min, max, distr } = scale;
+  if (distr !== 3) return [(v) => from + ((v - min) / (max - min)) * (to - from), steps(min, max, most)];
+  const [a, b] = [Math.log10(min), Math.log10(max)], decades = [];
+  for (let k = Math.ceil(a - 1e-9); k <= b + 1e-9; k++) decades.push([10 ** k, k >= -3 && k <= 4 ? String(Number((10 ** k).toPrecision(1))) : `1e${k}`.replace("-", "−")]);
+  return [(v) => from + ((Math.log10(v) - a) / (b - a)) * (to - from), decades];
+}
+
 export function svg(u, figure) {
-  const { min: a, max: b } = u.scales.x, { min: low, max: high } = u.scales.y;
-  const X = (t) => L + ((t - a) / (b - a)) * (W - L - R), Y = (v) => H - B - ((v - low) / (high - low)) * (H - T - B);
+  const across = u.scales.x, upright = u.scales[figure.high ?? "y"], { min: a, max: b } = across, { max: high } = upright;
+  const [X, along] = placed(across, L, W - R, 8), [Y, up] = placed(upright, H - B, T, 6);
   const out = [
     `<svg xmlns="http://www.w3.org/2000/svg" width="${W}" height="${H}" viewBox="0 0 ${W} ${H}" font-family="DejaVu Sans, Helvetica, Arial, sans-serif" font-size="11">`,
     `<title>${escape(figure.title)}</title><rect width="${W}" height="${H}" fill="#fff"/>`,
     `<clipPath id="box"><rect x="${L}" y="${T}" width="${W - L - R}" height="${H - T - B}"/></clipPath>`,
   ];
-  for (const [v, words] of steps(low, high, 6)) out.push(`<path d="M${L} ${Y(v).toFixed(2)}H${W - R}" stroke="#ddd" stroke-width="0.6"/>`, text(L - 6, Y(v) + 4, words, 'text-anchor="end"'));
-  for (const [v, words] of steps(a, b, 8)) out.push(`<path d="M${X(v).toFixed(2)} ${T}V${H - B}" stroke="#ddd" stroke-width="0.6"/>`, text(X(v), H - B + 15, words, 'text-anchor="middle"'));
+  for (const [v, words] of up) out.push(`<path d="M${L} ${Y(v).toFixed(2)}H${W - R}" stroke="#ddd" stroke-width="0.6"/>`, text(L - 6, Y(v) + 4, words, 'text-anchor="end"'));
+  for (const [v, words] of along) out.push(`<path d="M${X(v).toFixed(2)} ${T}V${H - B}" stroke="#ddd" stroke-width="0.6"/>`, text(X(v), H - B + 15, words, 'text-anchor="middle"'));
   out.push('<g clip-path="url(#box)">');
   for (const [t0, t1, words, kind] of figure.ranges) {
     if (t1 < a || t0 > b) continue;
@@ -197,7 +206,7 @@ export function svg(u, figure) {
     out.push(`<path d="M${x} ${T - 10}h18" stroke="${line.color}" stroke-width="2"${line.dash?.length ? ` stroke-dasharray="${line.dash.join(" ")}"` : ""}/>`, text(x + 22, T - 6, line.label));
   }
   out.push(text(L, T - 6, figure.title, 'font-weight="bold" font-size="12"'));
-  out.push(text((L + W - R) / 2, H - 12, `time, ${figure.origin || "s"}`, 'text-anchor="middle"'));
+  out.push(text((L + W - R) / 2, H - 12, figure.across || `time, ${figure.origin || "s"}`, 'text-anchor="middle"'));
   out.push(`<text transform="translate(16 ${(T + H - B) / 2}) rotate(-90)" text-anchor="middle">${escape(figure.unit)}</text></svg>`);
   return out.join("");
 }

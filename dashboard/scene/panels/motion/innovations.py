@@ -51,7 +51,7 @@ class Innovations(Panel):
                 nis, value, sigma = r["nis"], r["innovation"], r["innovation_sigma"]
                 dof = r["nis_dof"]
                 if message.innovation_unit:
-                    self._units[name] = message.innovation_unit
+                    self._units[name] = message.innovation_unit.replace("^2", "²")
                 unit = self._units.get(name, "")
                 labels = _PRODUCTS if value.shape[1] == 6 else []
             good = np.isfinite(nis)
