@@ -1,4 +1,5 @@
 // The page of one session: plots, replay, report, export, notes, labels, deletion.
+import { showMap, showSky } from "/static/map/session.js";
 import { Overlay } from "/static/overlay.js";
 import { call, ended, toast } from "/static/rest.js";
 
@@ -123,7 +124,10 @@ if (by("plots")) {
       if (by("note")) by("note").at_s.value = moment;
       if (by("replay")) by("replay").textContent = `Replay from ${moment} s`;
       history.replaceState(null, "", `?t=${moment}`);
+      showSky(path, moment);
     },
   });
   overlay.load();
+  showMap(path);
+  showSky(path, moment || 0);
 }
