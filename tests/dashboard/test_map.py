@@ -2,27 +2,38 @@
 browser.
 """
 
+import contextlib
 import hashlib
+import io
 import math
 import re
+import threading
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image
+from playwright.sync_api import expect, sync_playwright
 from support import tiles
 from support.feeder import ORIGIN, Feeder
-from support.front_door import open_door
+from support.front_door import open_door, wait_for
 
 import dashboard
 from dashboard.data.store import Store
 from dashboard.data.whereabouts import Known, ellipse, whereabouts
+from dashboard.desk import Desk
+from dashboard.scene.service import OWN_INPUTS, start
 from dashboard.web.map.archive import ArchiveError, open_archive
 from inertial.earth import ned_between, place_from_ned
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 
+CHROMIUM = "/usr/bin/chromium"
+SWIFTSHADER = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+GROUND = (18, 20, 22)  # of the page, dark
 VENDOR = Path(dashboard.__file__).parent / "web" / "static" / "vendor"
 
 
@@ -227,3 +238,129 @@ def test_what_is_not_known_says_why():
     store.put(tp.GNSS, "car-01", "", fix)
     told = whereabouts(store.device("car-01"), {"ekf": Known("x", 5)}, 0.0)
     assert "no satellite fix" in told["receiver"]["why"]
+
+
+# --- in a real browser
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with sync_playwright() as playwright:
+        yield playwright.chromium
+
+
+@contextlib.contextmanager
+def live(folder, path):
+    """A live page that a car goes on driving for."""
+    store, desk, ended = Store(), Desk(None, "gyrofree"), threading.Event()
+    feeder = Feeder(Into(store))
+
+    def drive():
+        k = 0
+        while not ended.wait(0.02):
+            feeder.drive(k * 0.02)
+            k += 1
+
+    handle, thread = (
+        start(SimpleNamespace(viser_port=0), store, desk),
+        threading.Thread(target=drive),
+    )
+    services = {"store": store, "desk": desk, "open_labels": OWN_INPUTS}
+    thread.start()
+    try:
+        with open_door(folder, scene=False, scene_at=handle.port, map=path, **services) as door:
+            yield door
+    finally:
+        ended.set()
+        thread.join()
+        handle.stop()
+
+
+def opened(chromium, door, flags):
+    """The map's page, what its console complained of, and who was asked besides us."""
+    browser = chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", *flags])
+    context = browser.new_context(viewport={"width": 1440, "height": 900}, color_scheme="dark")
+    with door.client("otto") as client:
+        cookies = [{"name": k, "value": v, "url": door.url} for k, v in client.cookies.items()]
+    context.add_cookies(cookies)
+    page, said, others = context.new_page(), [], []
+    page.set_default_timeout(90_000)
+    page.on("console", lambda m: m.type == "error" and said.append(m.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on(
+        "request",
+        lambda r: (
+            r.url.startswith(("http", "ws")) and door.url not in r.url and others.append(r.url)
+        ),
+    )
+    page.goto(f"{door.url}/?w=navigate&p=map&device=car-01")
+    return browser, page, said, others
+
+
+def serious(page, where):
+    """What axe-core finds that counts."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    found = axe.run(page, context=where).response["violations"]
+    return [one["id"] for one in found if one["impact"] in ("serious", "critical")]
+
+
+def colour_at(page, x, y):
+    """The tiles' colour at a point of the page: a byte each of red, green, blue."""
+    box = page.locator("#map").bounding_box()
+    clip = {"x": box["x"] + x, "y": box["y"] + y, "width": 1, "height": 1}
+    page.evaluate("document.querySelector('.map-canvas').style.visibility = 'hidden'")
+    shot = Image.open(io.BytesIO(page.screenshot(clip=clip))).convert("RGB").getpixel((0, 0))
+    page.evaluate("document.querySelector('.map-canvas').style.visibility = ''")
+    return shot
+
+
+DRAWN = """() => { const c = document.querySelector('.map-canvas'), seen = new Set();
+  const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+  for (let k = 0; k < d.length; k += 4) if (d[k + 3] > 250) seen.add(d.slice(k, k + 3).join());
+  return [...seen]; }"""
+
+
+@pytest.mark.browser
+@pytest.mark.timeout(300)
+def test_the_map_in_a_browser_with_vector_tiles_raster_tiles_and_none(tmp_path, chromium):
+    """One visit: nobody else is asked, nothing is against the policy, axe finds nothing."""
+    path = tiles.vector(tmp_path / "lab.pmtiles")
+    with live(tmp_path, path) as door:
+        browser, page, said, others = opened(chromium, door, SWIFTSHADER)
+        try:
+            _vector(page)
+            tiles.raster(path, (200, 40, 40))
+            page.reload()
+            page.locator("#map[data-tiles=raster]").wait_for()
+            wait_for(lambda: (at := colour_at(page, 30, 400))[0] > at[1] + 60, "raster tiles")
+            path.unlink()
+            page.reload()
+            page.locator(".map-note", has_text="is not there").wait_for()
+            wait_for(lambda: "50,150,216" in page.evaluate(DRAWN), "a way on the grid")
+            loaded = page.evaluate("performance.getEntriesByType('resource').map((r) => r.name)")
+            assert not any("maplibre" in name for name in loaded)
+        finally:
+            browser.close()
+        assert not others and not said
+
+
+def _vector(page):
+    page.locator("#map[data-tiles=vector]").wait_for()
+    page.locator(".map-legend li", has_text="INS/GNSS filter").wait_for()
+    wait_for(lambda: (at := colour_at(page, 30, 400)) != GROUND and at[2] > at[0] + 15, "tiles")
+    text = page.locator(".map-legend").inner_text()
+    assert "(2σ)" in text and "heading" in text and "RTK fixed, 14 satellites" in text
+    assert page.locator(".map-scale").inner_text().split()[1] in ("m", "cm", "km")
+    assert page.locator(".map-credit").inner_text() == "Tiles of the test"
+    assert not serious(page, "#map"), serious(page, "#map")
+    # following, the leading filter stays in the middle; a move by hand ends that
+    follow = page.locator(".map-tools button", has_text="Follow")
+    assert follow.get_attribute("aria-pressed") == "true"
+    page.locator(".map-board").focus()
+    page.keyboard.press("ArrowLeft")
+    expect(follow).to_have_attribute("aria-pressed", "false")
+    page.locator("#pages [data-key=sky]").click()
+    expect(page.locator("#map")).to_be_hidden()
+    scene = page.locator("#scene").element_handle().content_frame()
+    expect(scene.get_by_text("12 satellites in view, 10 used")).to_be_visible()
+    page.locator("#pages [data-key=map]").click()

@@ -44,6 +44,13 @@ function receiverInWords({ quality, satellites, accuracy_m, why }) {
   return [`${quality}, ${satellites} satellites`, accuracy_m ? `± ${metre(accuracy_m)} (2σ)` : "", why].filter(Boolean).join(" · ");
 }
 
+// The leading filter in a few words, which stand there also while the rest is folded.
+function titleOf({ ways: [lead], receiver }) {
+  if (!lead) return receiver.quality === "none" ? "No position" : `Receiver: ${receiver.quality}`;
+  const { ellipse, latitude_deg } = lead.now;
+  return `${lead.title}: ${latitude_deg === null ? "no position" : ellipse ? `± ${metre(ellipse[0])}` : "accuracy not known"}`;
+}
+
 function take(told) {
   if (known?.device !== told.device || known.run !== told.run) {
     known = blank(told.device, told.run);
@@ -67,8 +74,9 @@ function take(told) {
     said: [
       ...told.ways.map((way) => ({ colour: way.colour, title: way.title, text: inWords(way) })),
       { colour: "#8c8c8c", dots: true, title: "receiver", text: receiverInWords(told.receiver) },
-      ...(known.rejected.x.length ? [{ colour: "#d55e00", dots: true, title: "✕", text: "fixes that the leading filter did not believe" }] : []),
+      ...(known.rejected.x.length ? [{ title: "✕", text: "fixes that the leading filter did not believe" }] : []),
     ],
+    title: titleOf(told),
   });
 }
 

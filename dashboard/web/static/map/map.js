@@ -39,7 +39,7 @@ export class MapView {
     this.board = element("div", { className: "map-board", tabIndex: 0, role: "application" }, this.ground, this.canvas);
     this.board.setAttribute("aria-label", `${label}: arrows move it, plus and minus zoom`);
     this.list = element("ul");
-    this.legend = element("details", { className: "map-legend", open: innerWidth > 720 }, element("summary", { textContent: "What is drawn" }), this.list);
+    this.legend = element("details", { className: "map-legend", open: innerWidth > 1100 }, element("summary", { textContent: "What is drawn" }), this.list);
     this.follow = element("button", { type: "button", textContent: "Follow", title: "Keep the leading filter in the middle (key F)", hidden: !hooks.follow });
     const button = (text, title, act) => element("button", { type: "button", textContent: text, title, onclick: act, ariaLabel: title });
     this.tools = element("div", { className: "map-tools" },
@@ -49,7 +49,7 @@ export class MapView {
     this.note = element("p", { className: "map-note", role: "status" });
     this.credit = element("p", { className: "map-credit" });
     host.append(this.board, this.legend, this.tools, element("div", { className: "map-foot" },
-      element("p", { className: "map-scale" }, this.bar, this.length, element("span", { textContent: "north up" })), this.note, this.credit));
+      this.note, element("p", { className: "map-scale" }, this.bar, this.length, element("span", { textContent: "north up" })), this.credit));
     this.camera = new Camera(this.board, (byPerson) => this.moved(byPerson));
     this.follow.addEventListener("click", () => this.hooks.follow(!this.following));
     new ResizeObserver(() => this.resize()).observe(host);
@@ -155,11 +155,12 @@ export class MapView {
   showLegend() {
     const items = this.model.said ?? [];
     const qualities = [...new Set(this.model.fixes.quality)].filter((one) => one in QUALITIES);
-    const key = JSON.stringify([items, qualities]);
+    const key = JSON.stringify([items, qualities, this.model.title]);
     if (this.list.dataset.drawn === key) return;
     this.list.dataset.drawn = key;
+    this.legend.firstChild.textContent = this.model.title ?? "What is drawn";
     this.list.replaceChildren(...items.map(({ colour, title, text, dots }) => {
-      const sample = element("i", { className: dots ? "dots" : "" });
+      const sample = element("i", { className: dots ? "dots" : "", hidden: !colour });
       sample.style.color = colour;
       return element("li", {}, sample, element("b", { textContent: title }), element("span", { textContent: text }));
     }), ...(qualities.length ? [element("li", { className: "qualities" }, ...qualities.map((one) => {
