@@ -12,6 +12,7 @@ from sessions.library.curves import Curves
 from sessions.library.sky import sky_near
 
 POINTS = 4000  # of each way
+SVG = '<svg xmlns="http://www.w3.org/2000/svg"'
 Way = dict[str, Any]
 
 
@@ -47,5 +48,6 @@ def sky_at(path: Path, at_s: float, dark: bool) -> dict[str, Any] | None:
     if found is None:
         return None
     t_s, sky = found
-    drawn = str(sky_svg(sky.satellites, dark))
+    # on its own, not within a page, it has to say what it is
+    drawn = str(sky_svg(sky.satellites, dark)).replace("<svg", SVG, 1)
     return {"t_s": round(t_s, 2), "said": said(sky.satellites), "svg": drawn}

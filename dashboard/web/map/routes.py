@@ -20,6 +20,7 @@ routes = APIRouter(prefix="/api")
 SignedIn = Annotated[Asker, Depends(asker)]
 RANGE = re.compile(r"bytes=(\d{1,18})-(\d{1,18})")
 MOST_BYTES = 8 << 20  # of one range: a directory or a tile, never more than a part of the file
+ANOTHER = "the map file is another one now: load the page again"
 NO_FILE = "no map file: [dashboard] map in gyrofree.toml names one"
 
 
@@ -31,6 +32,7 @@ class MapOut(BaseModel):
     bounds: tuple[float, float, float, float] = Field(
         default=(0.0, 0.0, 0.0, 0.0), description="west, south, east, north, deg"
     )
+    tag: str = Field(default="", description="of this state of the file; `state` of its tiles")
     attribution: str = ""
     layers: list[str] = []
 
@@ -50,6 +52,7 @@ def about(request: Request, who: SignedIn) -> MapOut:
         kind=found.kind,
         zooms=found.zooms,
         bounds=found.bounds,
+        tag=found.tag.strip('"'),
         attribution=found.attribution,
         layers=list(found.layers),
     )
@@ -62,17 +65,23 @@ def about(request: Request, who: SignedIn) -> MapOut:
     response_class=Response,
     responses={304: {"description": "not changed"}, 416: {"description": "no such range"}},
 )
-def tiles(request: Request, who: SignedIn) -> Response:
+def tiles(
+    request: Request,
+    who: SignedIn,
+    state: Annotated[str, Query(max_length=64, description="tag of the file; empty: any")] = "",
+) -> Response:
     path = front_of(request).settings.map
     if path is None:
         raise HTTPException(404, NO_FILE)
     try:
         size, tag = tag_of(path)
+        if state and state != tag.strip('"'):
+            raise HTTPException(412, ANOTHER)
         if _has(request.headers.get("if-none-match", ""), tag):
             return Response(status_code=304, headers={"etag": tag})
         first, last = _range(request.headers.get("range", ""), size)
         if request.headers.get("if-range", tag) != tag:
-            raise HTTPException(412, "the map file is another one now: begin anew")
+            raise HTTPException(412, ANOTHER)
         with path.open("rb") as file:
             file.seek(first)
             data = file.read(last - first + 1)
@@ -84,7 +93,7 @@ def tiles(request: Request, who: SignedIn) -> Response:
         "content-range": f"bytes {first}-{last}/{size}",
         "accept-ranges": "bytes",
         "etag": tag,
-        "cache-control": "private, max-age=3600",
+        "cache-control": f"private, {'max-age=3600' if state else 'no-cache'}",
     }
     return Response(data, 206, headers, "application/octet-stream")
 

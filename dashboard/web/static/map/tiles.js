@@ -3,7 +3,7 @@ import { styleOf } from "/static/map/style.js";
 
 const HOME = "/static/vendor";
 const PIXEL_MS = 30_000; // in which MapLibre has to come up
-const FILE = new URL("/api/map/tiles", location.href).href;
+const fileOf = (info) => new URL(`/api/map/tiles?state=${info.tag}`, location.href).href; // cached bytes are of this state
 let library = null;
 
 function script(src) {
@@ -14,11 +14,11 @@ function script(src) {
   });
 }
 
-async function load() {
+async function load(file) {
   const [gl] = await Promise.all([import(`${HOME}/maplibre/maplibre-gl.mjs`), script(`${HOME}/pmtiles/pmtiles.js`)]);
   gl.setWorkerUrl(`${HOME}/maplibre/maplibre-gl-worker.mjs`);
   const protocol = new window.pmtiles.Protocol();
-  protocol.add(new window.pmtiles.PMTiles(FILE));
+  protocol.add(new window.pmtiles.PMTiles(file));
   gl.addProtocol("pmtiles", protocol.tile);
   return gl;
 }
@@ -34,11 +34,11 @@ export function hasWebgl() {
 export class Tiles {
   // say(text): what a person should know when tiles do not come.
   static async on(root, info, dark, say) {
-    const gl = await (library ??= load());
+    const gl = await (library ??= load(fileOf(info)));
     const tiles = new Tiles();
     tiles.info = info;
     tiles.map = new gl.Map({
-      container: root, style: styleOf(info, `pmtiles://${FILE}`, dark), interactive: false, attributionControl: false,
+      container: root, style: styleOf(info, `pmtiles://${fileOf(info)}`, dark), interactive: false, attributionControl: false,
       maxZoom: 24, fadeDuration: 0, renderWorldCopies: false,
     });
     tiles.map.on("error", ({ error }) => say(`Tiles do not come: ${error?.message ?? "no reason given"}`));
@@ -53,5 +53,5 @@ export class Tiles {
 
   resize() { this.map.resize(); }
 
-  theme(dark) { this.map.setStyle(styleOf(this.info, `pmtiles://${FILE}`, dark)); }
+  theme(dark) { this.map.setStyle(styleOf(this.info, `pmtiles://${fileOf(this.info)}`, dark)); }
 }
