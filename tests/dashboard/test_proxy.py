@@ -224,7 +224,7 @@ ODD = [
     "10 s",
     "1 h",
 ]
-ODD += ["x" * 2001, "9" * 6000, b"bytes", [], [1.0], {}, {"a": 1}]
+ODD += ["x" * 6001, "9" * 7000, b"bytes", [], [1.0], {}, {"a": 1}]
 TAKEN = {
     "button": [True, False],
     "box": [True, False],

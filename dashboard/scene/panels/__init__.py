@@ -14,6 +14,7 @@ from dashboard.scene.panels.guided.wiring import Wiring
 from dashboard.scene.panels.motion.acceleration import Acceleration
 from dashboard.scene.panels.motion.angle import Angle
 from dashboard.scene.panels.motion.axes import Axes
+from dashboard.scene.panels.motion.derived import Derived
 from dashboard.scene.panels.motion.errors import Errors
 from dashboard.scene.panels.motion.innovations import Innovations
 from dashboard.scene.panels.motion.race import Race
@@ -33,6 +34,7 @@ PAGES: tuple[type[Panel], ...] = (
     Angle,
     Tilt,
     Race,
+    Derived,
     ProcedurePanel,
     Axes,
     Health,
