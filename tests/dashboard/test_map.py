@@ -32,6 +32,7 @@ from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 
 CHROMIUM = "/usr/bin/chromium"
+MAP = "/?w=navigate&p=map&device=car-01"
 SWIFTSHADER = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 GROUND = (18, 20, 22)  # of the page, dark
 VENDOR = Path(dashboard.__file__).parent / "web" / "static" / "vendor"
@@ -295,7 +296,7 @@ def opened(chromium, door, flags):
             r.url.startswith(("http", "ws")) and door.url not in r.url and others.append(r.url)
         ),
     )
-    page.goto(f"{door.url}/?w=navigate&p=map&device=car-01")
+    page.goto(door.url + MAP)
     return browser, page, said, others
 
 
@@ -332,11 +333,11 @@ def test_the_map_in_a_browser_with_vector_tiles_raster_tiles_and_none(tmp_path, 
         try:
             _vector(page)
             tiles.raster(path, (200, 40, 40))
-            page.reload()
+            page.goto(door.url + MAP)
             page.locator("#map[data-tiles=raster]").wait_for()
             wait_for(lambda: (at := colour_at(page, 30, 400))[0] > at[1] + 60, "raster tiles")
             path.unlink()
-            page.reload()
+            page.goto(door.url + MAP)
             page.locator(".map-note", has_text="is not there").wait_for()
             wait_for(lambda: "50,150,216" in page.evaluate(DRAWN), "a way on the grid")
             loaded = page.evaluate("performance.getEntriesByType('resource').map((r) => r.name)")
@@ -365,4 +366,3 @@ def _vector(page):
     expect(page.locator("#map")).to_be_hidden()
     scene = page.locator("#scene").element_handle().content_frame()
     expect(scene.get_by_text("12 satellites in view, 10 used")).to_be_visible()
-    page.locator("#pages [data-key=map]").click()
