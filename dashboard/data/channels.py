@@ -14,7 +14,7 @@ from dashboard.data.device import Device
 from dashboard.data.ring import blank, gap_limit
 from dashboard.data.tables import TABLES
 from logs.figures.expression import Expression, evaluate, known_names, read, unit_of
-from logs.figures.names import line_title
+from logs.figures.names import axis_channel, line_title, slug
 from logs.figures.quantity import ExpressionError, Quantity
 from logs.figures.units import spelt, unit
 from messages.contract import gyrofree_pb2 as pb
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 DEG = 180.0 / np.pi
 SHOWN = {"rad/s": ("°/s", DEG), "rad": ("°", DEG)}  # unit of a table -> of the charts
 XYZ, NED = ("_x", "_y", "_z"), ("_north", "_east", "_down")
-TRIADS = tuple(f"{k // 3 + 1}_{'xyz'[k % 3]}" for k in range(48))
+TRIADS = tuple(axis_channel(k).removeprefix("a") for k in range(48))
 INPUTS = tuple(str(k + 1) for k in range(16))
 # topic: who it is where no estimator says so, and (column, word, what its components are called)
 NAMED = {
@@ -81,11 +81,6 @@ class Channel:
         """Its values (n,) of rows (n,) of the table."""
         values = rows[self.column]
         return self.factor * (values if self.part is None else values[:, self.part])
-
-
-def slug(name: str) -> str:
-    """An estimator's name as the beginning of a channel's."""
-    return "".join(letter if letter.isalnum() else "_" for letter in name.lower())
 
 
 def channels(device: Device) -> dict[str, Channel]:

@@ -15,6 +15,7 @@ from urllib.parse import parse_qs
 from dashboard.data.device import Device
 from dashboard.scene.panels.base import Panel
 from dashboard.scene.span import WINDOWS
+from logs.figures.words import meaning
 
 LAYERS = ("truth", "estimates", "sensors", "rate", "trajectory", "fixes", "ellipsoid", "grid")
 MOST_FIELDS = 24
@@ -50,7 +51,11 @@ def offered(pages: Sequence[type[Panel]], device: Device) -> list[dict[str, Any]
     found = []
     for room in WORKSPACES:
         of_it = [(page, page.missing(device)) for page in pages_of(room.key, pages)]
-        there = [{"key": page.key(), "title": page.title} for page, why in of_it if not why]
+        there = [
+            {"key": page.key(), "title": page.title, "hint": meaning(page.title)}
+            for page, why in of_it
+            if not why
+        ]
         absent = [{"title": page.title, "why": why} for page, why in of_it if why]
         found.append(
             {

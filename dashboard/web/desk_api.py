@@ -3,7 +3,7 @@ emergency stop of tables that are driven.
 """
 
 import time
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, HTTPException, Request
 from pydantic import BaseModel, Field
@@ -52,9 +52,8 @@ class StopOut(BaseModel):
 
 
 class ViewIn(Strict):
-    view: str = Field(
-        max_length=LONGEST, description="the live page's link after the question mark"
-    )
+    view: str = Field(max_length=LONGEST, description="the page's link after the question mark")
+    page: Literal["live", "session"] = Field(default="live", description="session: any of them")
 
 
 class ViewOut(BaseModel):
@@ -173,13 +172,13 @@ def view(request: Request, who: SignedIn) -> ViewOut:
     return ViewOut(view=front_of(request).views.of(who.name))
 
 
-@routes.post("/me/view", summary="Remember what you have on the live page")
+@routes.post("/me/view", summary="Remember what you have on the live page, or on those of sessions")
 def keep_view(request: Request, body: ViewIn, who: Same) -> ViewOut:
     views = front_of(request).views
     try:
-        views.keep(who.name, body.view)
+        views.keep(who.name, body.view, body.page)
     except ValueError as error:
         raise HTTPException(422, str(error)) from None
     except OSError as error:
         raise HTTPException(503, f"your view could not be kept: {error.strerror}") from None
-    return ViewOut(view=views.of(who.name))
+    return ViewOut(view=views.of(who.name, body.page))

@@ -17,6 +17,7 @@ from gateway.virtual.board_link import PtyLink, TcpLink
 from gateway.virtual.virtual_board import BoardAccel, BoardPulse, Item
 from inertial.simulation.driven import DrivenTable
 from inertial.simulation.faults import Faults
+from inertial.simulation.person import Person
 from inertial.simulation.profiles import DEGREE
 from messages.bus.session import BusSettings, LateSession, subscribe
 from messages.contract import gyrofree_pb2 as pb
@@ -44,8 +45,15 @@ ACTIVE = (pb.ProcedureStatus.STATE_RUNNING, pb.ProcedureStatus.STATE_HELD)
 class TableDesk:
     """Takes orders for the table of one simulated board; `remote` while somebody drives it."""
 
-    def __init__(self, link: PtyLink | TcpLink | None, bus: BusSettings, device: str) -> None:
-        self._link, self._said = link, ""
+    def __init__(
+        self,
+        link: PtyLink | TcpLink | None,
+        bus: BusSettings,
+        device: str,
+        person: Person,
+    ) -> None:
+        """person: who turns the table where it is not driven."""
+        self._link, self._said, self._person = link, "", person
         self._by_line, self._wanted_up = False, None
         self._hand_rate: float | None = None
         self._heard_at = -np.inf
@@ -185,7 +193,12 @@ class TableDesk:
         log.info("the table is left to its profile")
 
     def _steer(self, table: DrivenTable) -> None:
-        omega, acceleration = self._order if self._by_line else (self._hand_rate or 0.0, None)
+        omega, acceleration = self._order
+        if not self._by_line:
+            seconds = STEP * table.period_s
+            omega = self._person.step(self._hand_rate or 0.0, seconds)
+            even = abs(omega - table.rate()) / seconds
+            acceleration = float(np.clip(even, 1e-3, table.acceleration))
         table.set_rate(np.clip(omega, -table.limit, table.limit), acceleration)
         if self._wanted_up is not None and table.standing:
             if table.turn_over(self._wanted_up):

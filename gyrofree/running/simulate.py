@@ -34,6 +34,7 @@ from gyrofree.running.driven_table import TableDesk, until_it_ends
 from inertial.simulation.arm import arm_test, centre
 from inertial.simulation.driven import DrivenTable
 from inertial.simulation.faults import AxisFault, Faults
+from inertial.simulation.person import Person
 from inertial.simulation.profiles import Profile
 from inertial.simulation.table import BLOCK, TableTest, Truth
 from messages.bus.session import BusSettings, LateSession, Publishers
@@ -71,6 +72,7 @@ class Options:
     arm_m: float = 0.0
     table_link: Path | None = None  # where the table's text protocol is offered
     table_tcp: int | None = None
+    slips: int = 0  # of the person who turns a table that is not driven
 
 
 class TruthPublisher:
@@ -268,7 +270,8 @@ def run(options: Options, bus: BusSettings, stop: threading.Event) -> None:
     test = _test(options, 0)  # before the link: an unknown profile is said at once
     link, port = open_link(options)
     truths = TruthPublisher(bus, options.device)
-    desk = TableDesk(_table_line(options), bus, options.device)
+    person = Person(options.seed, options.slips)
+    desk = TableDesk(_table_line(options), bus, options.device, person)
     log.info("simulated cube, profile %s, seed %d, on %s", test.profile.name, options.seed, port)
     first = int(time.time()) & 0xFF  # boot counters differ from those of the last process
     try:

@@ -28,6 +28,7 @@ from dashboard.web.auth import Role
 from dashboard.web.frame.scene_messages import ROLE, Widgets, may_send
 from dashboard.web.pages import own_path
 from dashboard.web.views import Views
+from logs.figures.words import glossary_link, words_of
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 
@@ -102,6 +103,18 @@ def test_a_page_that_is_offered_shows_something(view, store):
                 view._asked(Wish.of(f"p={page['key']}"))
                 view.tick_panels()
                 assert state(view)["missing"] == "" and state(view)["page"] == page["key"]
+                for words in said(view):
+                    text = re.sub('<span class="gf-name">[^<]*<', "<", words)  # of channels
+                    there = words_of([re.sub("<[^>]*>", " ", text)])
+                    assert all(f'href="{glossary_link(word)}"' in words for word in there), words
+
+
+def said(view):
+    """The HTML of the page that is open, and of the summary at its left."""
+    page = view._pages[view._page]
+    handles = [*vars(page).values(), *(chart._heading for chart in page._charts.values())]
+    handles += vars(view._devices).values()
+    return [one.content for one in handles if isinstance(one, viser.GuiHtmlHandle)]
 
 
 # --- what a link asks

@@ -21,7 +21,7 @@ import viser
 
 from dashboard.data.ring import gap_limit
 from dashboard.scene.drawing import series
-from dashboard.scene.drawing.page import tag
+from dashboard.scene.drawing.page import explained, tag
 from dashboard.scene.drawing.palette import number, rgba
 from logs.figures.stretch import stretch
 
@@ -175,15 +175,22 @@ class Chart:
             stale = " gf-stale" if curve.stale else ""
             sample = tag("i", class_=mark, style=f"border-color:{curve.colour}")
             items.append(
-                tag("span", sample, curve.label, " ", tag("b", value), class_=f"gf-item{stale}")
+                tag(
+                    "span",
+                    sample,
+                    explained(curve.label),
+                    " ",
+                    tag("b", value),
+                    class_=f"gf-item{stale}",
+                )
             )
         for shade in shades:
             if shade.on.any():
                 style = f"border-color:{shade.colour};border-width:8px"
                 sample = tag("i", class_="gf-line", style=style)
-                items.append(tag("span", sample, shade.label, class_="gf-item"))
+                items.append(tag("span", sample, explained(shade.label), class_="gf-item"))
         items = items or [tag("span", "no data yet", class_="gf-item gf-stale")]
-        title = tag("span", self._title, " ", tag("em", self._unit), class_="gf-title")
+        title = tag("span", explained(self._title), " ", tag("em", self._unit), class_="gf-title")
         legend = tag("span", *items, class_="gf-legend")
         data = json.dumps(told, separators=(",", ":"), ensure_ascii=False)
         return str(tag("div", title, legend, class_="gf-chart", data_chart=data))
@@ -208,7 +215,7 @@ class Chart:
                     "strip": {"range": (0, 1 / LATE_HEIGHT)},
                 },
                 axes=(
-                    {"size": 38, "font": "11px sans-serif"},  # with the origin below the numbers
+                    {"size": 42, "font": "11px sans-serif"},  # with the origin below the numbers
                     {"size": 46, "font": "11px sans-serif"},
                 ),
                 legend={"show": False},

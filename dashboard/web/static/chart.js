@@ -135,7 +135,7 @@ export class Plot {
     });
     const fresh = this.lines.every((line) => line.measured && line.asked === this.group.asked);
     return {
-      title: this.title, unit: this.unit, origin: "s since the recording began",
+      title: this.title, unit: this.unit, origin: this.group.origin, of: this.group.of, provisional: this.group.provisional, done: true,
       ranges: this.marks.map((mark) => [mark.t, mark.until ?? mark.t, mark.text, mark.kind ?? "mark"]), lines: () => lines,
       measured: fresh ? Object.fromEntries(this.lines.map((line) => [line.short, line.measured])) : null,
     };
@@ -161,6 +161,7 @@ export class Group {
     this.plots = [];
     this.span = this.window = [0, 1];
     this.asked = ""; // the stretch that the server is asked to measure
+    Object.assign(this, { origin: "s", of: "every sample", provisional: false });
     this.cursors = new Cursors((a, b) => {
       this.asked = a === null ? "" : `${a}_${b}`;
       clearTimeout(this.timer);
@@ -169,6 +170,11 @@ export class Group {
     this.cursorKey = `charts ${Group.count++}`;
     Object.assign(this, { onLook, click });
     onTheme(() => this.plots.forEach((plot) => { if (plot.chart) { plot.build(); plot.look(); } }));
+  }
+
+  remove(plot) {
+    plot.chart?.destroy();
+    this.plots = this.plots.filter((one) => one !== plot);
   }
 
   look(begin, end) {

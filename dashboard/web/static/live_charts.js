@@ -1,6 +1,6 @@
 // The charts inside the scene's frame, which has the same origin: they get the tools of figure.js and cursors.js. What
 // they show stands in the heading above each (data-chart); see dashboard/scene/drawing/chart.py.
-import { Cursors } from "/static/cursors.js";
+import { Cursors, pictures } from "/static/cursors.js";
 import { keyed, selectable } from "/static/drag.js";
 import { dress } from "/static/figure.js";
 import { ask, choose, state, whenStated, zoomed } from "/static/view.js";
@@ -40,15 +40,18 @@ function told(chart) {
 
 const asked = (measured) => Object.values(measured ?? {}).every(({ at }) => `${at[0]}_${at[1]}` === stretch);
 
+const overTime = (chart) => chart.scales.x.distr !== 3; // a spectrum has logarithmic axes
+const upright = (chart) => (overTime(chart) ? "y" : "level");
+
 function describe(chart) {
-  const { title = "", unit = "", origin = "", ranges = [], measured = null } = told(chart);
+  const { title = "", unit = "", origin = "", across = "", ranges = [], measured = null } = told(chart), high = upright(chart);
   const [x, ...data] = chart.data;
-  const lines = () => chart.series.slice(1).map((series, k) => ({ series, k })).filter(({ series }) => series.scale === "y" && series.show && series.label && series.label !== NAMELESS && !EDGE.test(series.label))
+  const lines = () => chart.series.slice(1).map((series, k) => ({ series, k })).filter(({ series }) => series.scale === high && series.show && series.label && series.label !== NAMELESS && !EDGE.test(series.label))
     .map(({ series, k }) => ({
-      label: series.label, color: series._stroke ?? series.stroke, dash: series.dash, width: 1.4, x, low: data[k], high: data[k],
+      label: overTime(chart) ? series.label : "", color: series._stroke ?? series.stroke, dash: series.dash, width: 1.4, x, low: data[k], high: data[k],
       half: EDGE.test(chart.series[k + 2]?.label ?? "") ? [data[k + 1], data[k + 2]] : null,
     })).map((line) => ({ ...line, color: typeof line.color === "function" ? line.color(chart, 0) : line.color }));
-  return { title, unit, origin, ranges, lines, measured: measured && asked(measured) ? measured : null };
+  return { title, unit, origin, across, ranges, lines, high, measured: measured && asked(measured) ? measured : null };
 }
 
 // A zoom is the view's, so that its charts are drawn anew from every sample, stay while data come in, and are the same
@@ -71,7 +74,7 @@ function press(event, chart) {
 
 function equip(chart) {
   known.add(chart);
-  if (!chart.scales.y) return;
+  if (!overTime(chart)) return pictures(chart, chart.root, () => describe(chart));
   dress(chart, () => describe(chart));
   cursors.add(chart, chart.root, () => describe(chart));
   const mine = (event) => event.stopImmediatePropagation(); // uPlot would zoom in what it has been sent
@@ -90,7 +93,7 @@ function look() {
     // The scene keeps a chart's zoom as a share of its time axis, and reads that from a chart just made before the axis
     // has its limits: one second of thirty is then shown for good. Over time, what is sent is what is to be seen.
     const { min, max } = chart.scales.x, off = min !== t[0] || max !== t[t.length - 1];
-    if (off && chart.scales.y && t[t.length - 1] > t[0]) chart.setScale("x", { min: t[0], max: t[t.length - 1] });
+    if (off && overTime(chart) && t[t.length - 1] > t[0]) chart.setScale("x", { min: t[0], max: t[t.length - 1] });
   }
   if (cursors.at) cursors.refresh();
 }

@@ -182,8 +182,10 @@ def _report(m: pb.ProcedureStatus) -> Markup:
     if m.state in ACTIVE or not m.session or m.instruction.endswith("being closed"):
         return EMPTY
     way = f"/sessions/{m.session}"
-    link = tag("a", "Open the session and its report", href=way, target="_blank", rel="noopener")
-    return tag("p", link, class_="gf-note")
+    new = {"target": "_blank", "rel": "noopener"}
+    report = tag("a", "Open the report", href=f"{way}?report", **new)
+    session = tag("a", "the session, to add a photo of the unit", href=way, **new)
+    return tag("p", report, ", or ", session, class_="gf-note")
 
 
 def steps_of(m: pb.ProcedureStatus) -> Markup:
@@ -191,9 +193,9 @@ def steps_of(m: pb.ProcedureStatus) -> Markup:
     items = []
     for k, step in enumerate(m.steps):
         mark, colour, word = MARKS.get(step.state, MARKS[STEP.STATE_TODO])
-        name = tag("span", f"{mark} {step.name}", style=f"color:{colour}", title=word)
-        if k == m.step and m.state in ACTIVE:
-            name = tag("b", name)
+        now = k == m.step and m.state in ACTIVE
+        sign = tag("b", mark, style=f"color:{colour}", title=word)
+        name = joined([sign, tag("b" if now else "span", step.name)], " ")
         parts: list[object] = [figure(one) for one in step.figures]
         if step.spoilt:
             parts.append(tag("span", f"{step.spoilt}× spoilt", title=step.reason))

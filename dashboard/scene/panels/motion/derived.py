@@ -9,7 +9,7 @@ import numpy as np
 from dashboard.data.channels import Channel, Drawn, channels, derived, sight
 from dashboard.data.device import Device
 from dashboard.scene.drawing.chart import Curve, Shade
-from dashboard.scene.drawing.page import Markup, alert, joined, note, rows, tag
+from dashboard.scene.drawing.page import Markup, alert, joined, note, tag
 from dashboard.scene.drawing.palette import VERMILLION, YELLOW
 from dashboard.scene.panels.base import Panel, Snapshot
 from logs.figures.expression import read
@@ -81,17 +81,26 @@ def _shades(s: Snapshot, drawn: Drawn) -> list[Shade]:
 
 
 def _offer(named: dict[str, Channel]) -> Markup:
-    """What may be named, by whom it comes."""
+    """What may be named, by whom it comes; of two names of one thing the shorter."""
     guide = note(
         "Type an expression under ƒ in the row above, like ",
         tag("b", "norm(omega_x, omega_y, omega_z)"),
-        ". It is drawn here, kept with your view, and part of its link. These channels have names:",
+        ". It is drawn here, kept with your view, and part of its link. These channels have names,"
+        " which are offered as you type:",
     )
-    of: dict[str, list[Channel]] = {}
-    for one in named.values():
-        of.setdefault(one.who, []).append(one)
-    lines = [
-        (who, joined([tag("code", one.name, title=one.unit) for one in some], " "))
-        for who, some in of.items()
-    ]
-    return joined([guide, rows(lines)])
+    shortest = {(one.topic, one.estimator, one.column, one.part): one for one in named.values()}
+    of: dict[str, dict[str, list[str]]] = {}
+    for one in shortest.values():
+        who = "axes" if one.topic == "accel" else one.who
+        stem, _, part = one.name.rpartition("_") if one.part is not None else (one.name, "", "")
+        of.setdefault(who, {}).setdefault(stem, []).append(f"_{part}" if part else "")
+    lines = [note(tag("b", who), ": ", _names(stems)) for who, stems in of.items()]
+    return joined([guide, *lines])
+
+
+def _names(stems: dict[str, list[str]]) -> Markup:
+    """`omega_x _y _z` for the three of them."""
+    return joined(
+        [tag("span", stem + " ".join(parts), class_="gf-name") for stem, parts in stems.items()],
+        " ",
+    )

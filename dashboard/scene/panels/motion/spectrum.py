@@ -1,5 +1,6 @@
 """Power spectral density and Allan deviation of one signal, of the window that is shown."""
 
+import json
 import math
 import time
 from collections.abc import Sequence
@@ -22,6 +23,9 @@ from sessions.report.stability import LEAST, allan_of
 Array = NDArray[np.float64]
 EVERY_S = 2.0  # between two computations
 SEGMENTS = 8  # of Welch's method, half over one another, at least; more average more
+FIRST = "omega_z"  # what the table turns about, of the leading estimator
+ORDER = {"psd": 2.0, "allan": 4.0}  # of the charts on the page
+NEARLY = 1e-3  # of a decade: a period of 9.9999 ms is one of 10 ms
 HOLE = 1.6  # usual periods; a longer pause ends a stretch
 COLUMNS = ("omega_ib_b", "omega", "f_b", "f", "counts", "roll", "pitch")  # that have a spectrum
 
@@ -90,8 +94,8 @@ def _scales(x: Array) -> dict[str, Any]:
     negative ones while the span grows; on a logarithmic axis the search for its ticks does not end
     then.
     """
-    low = math.floor(math.log10(x[0]))
-    high = max(math.ceil(math.log10(x[-1])), low + 1)
+    low = math.floor(math.log10(x[0]) + NEARLY)
+    high = max(math.ceil(math.log10(x[-1]) - NEARLY), low + 1)
     across = {"time": False, "distr": 3, "auto": False, "range": (10.0**low, 10.0**high)}
     return {"x": across, "level": {"distr": 3}}
 
@@ -120,7 +124,9 @@ class Spectrum(Panel):
         if known and tuple(self._choice.options) != tuple(known):
             before = self._choice.value
             self._choice.options = tuple(known)
-            self._choice.value = before if before in known else next(iter(known))
+            leading = (title for title, one in known.items() if getattr(one, "name", "") == FIRST)
+            first = next(leading, next(iter(known)))
+            self._choice.value = before if before in known else first
         chosen, now = self._choice.value, time.monotonic()
         if chosen not in known or (self._of == chosen and now - self._at < EVERY_S):
             return
@@ -137,22 +143,26 @@ class Spectrum(Panel):
         rate = f"{len(y)} samples without a hole, {len(y) * period:.1f} s at {1 / period:.1f} Hz"
         self._say(note(rate))
         f, p = density(y, period)
-        self._draw("psd", "Spectral density", f"{unit}/√Hz over Hz", f, np.sqrt(p), 2.0)
+        self._draw(
+            "psd", f"Spectral density of {chosen}", f"{unit}/√Hz", "frequency, Hz", f, np.sqrt(p)
+        )
         allan = allan_of(chosen, y, period)
         if allan is not None:
             title = f"Allan deviation, N = {allan.random_walk:.3g} {unit}·√s"
-            self._draw("allan", title, f"{unit} over s", allan.tau, allan.deviation, 4.0)
+            self._draw("allan", title, unit, "τ, s", allan.tau, allan.deviation)
 
     def _say(self, words: Markup) -> None:
         self._note = self.html(words, self._note)
 
-    def _draw(self, key: str, title: str, unit: str, x: Array, y: Array, order: float) -> None:
+    def _draw(self, key: str, title: str, unit: str, across: str, x: Array, y: Array) -> None:
+        order = ORDER[key]
         keep = (x > 0) & (y > 0)
         data = (x[keep].astype(float), y[keep].astype(float))
         if len(data[0]) < 2:
             return
-        named = tag("span", title, " ", tag("em", unit), class_="gf-title")
-        heading = str(tag("div", named, class_="gf-chart"))
+        named = tag("span", title, " ", tag("em", f"{unit} over {across}"), class_="gf-title")
+        told = json.dumps({"title": title, "unit": unit, "across": across}, ensure_ascii=False)
+        heading = str(tag("div", named, class_="gf-chart", data_chart=told))
         if key not in self._plots:
             with self.folder:
                 self._headings[key] = self.client.gui.add_html(heading, order=order)

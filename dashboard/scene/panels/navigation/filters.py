@@ -8,7 +8,16 @@ import viser
 from dashboard.data.device import Device
 from dashboard.scene.drawing.chart import Curve
 from dashboard.scene.drawing.map import map_svg
-from dashboard.scene.drawing.page import EMPTY, Markup, alert, joined, note, rows, tag
+from dashboard.scene.drawing.page import (
+    EMPTY,
+    Markup,
+    alert,
+    explained,
+    joined,
+    note,
+    rows,
+    tag,
+)
 from dashboard.scene.drawing.palette import (
     GREY,
     GYRO_FREE,
@@ -17,6 +26,7 @@ from dashboard.scene.drawing.palette import (
     number,
 )
 from dashboard.scene.panels.base import Input, Panel, Snapshot, estimator_curve
+from dashboard.scene.panels.motion.innovations import verdict
 from dashboard.scene.panels.navigation import drift
 from messages.contract import gyrofree_pb2 as pb
 
@@ -153,11 +163,14 @@ class Navigation(Panel):
             found, key=lambda f: (np.nan_to_num(f[0], nan=1e9), f[3])
         ):
             dot = tag("span", "●", style=f"color:{estimator_colour(name, names)}")
-            honest = number(float(np.mean(nis)), 1) if len(nis) else "–"
+            dof = s.device.get("innovation", name).message.dof
+            honest = "–"
+            if len(nis):
+                honest = joined([number(float(np.mean(nis)), 1), " · ", verdict(nis, dof)])
             cells = [number(v, 3) for v in (error, ahead, left)] + [honest]
             title = joined([dot, " ", estimator_title(name)])
             items.append([title, *cells])
-        body = (tag("tr", *(tag("td", cell) for cell in row)) for row in [HEAD, *items])
+        body = (tag("tr", *(tag("td", explained(cell)) for cell in row)) for row in [HEAD, *items])
         return tag("table", *body, class_="gf-rows") + note(METRICS)
 
     def _order(self) -> None:
