@@ -77,6 +77,7 @@ def listen(host: str, port: int) -> socket.socket:
 def serve(front: Front, bound: socket.socket, stop: threading.Event) -> None:
     """Serve the web application on a bound socket until `stop` is set."""
     settings = front.settings
+    connections = Connections(settings)
     config = uvicorn.Config(
         create_app(front),
         log_config=None,
@@ -88,7 +89,8 @@ def serve(front: Front, bound: socket.socket, stop: threading.Event) -> None:
         proxy_headers=bool(settings.trusted_proxies),
         forwarded_allow_ips=settings.trusted_proxies or None,
         timeout_graceful_shutdown=GRACE_S,
-        http=Connections(settings).protocol(),
+        http=connections.protocol(),
+        ws=connections.sockets(),
         h11_max_incomplete_event_size=HEAD_LIMIT,
         timeout_keep_alive=15,
         backlog=BACKLOG,
