@@ -21,6 +21,7 @@ from dashboard.web.control import Replay
 from dashboard.web.first.control import FirstRun
 from dashboard.web.front import Front
 from dashboard.web.jobs import Jobs
+from dashboard.web.map.archive import ArchiveError, open_archive
 from dashboard.web.users import UserStore, load_users
 from messages.bus.session import BusSettings, open_client
 from sessions.library.catalogue import Catalogue
@@ -106,6 +107,14 @@ def serve(front: Front, bound: socket.socket, stop: threading.Event) -> None:
     asyncio.run(until_stopped())
 
 
+def _look_at_map(settings: DashboardSettings) -> None:
+    try:
+        if settings.map is not None:
+            open_archive(settings.map)
+    except ArchiveError as error:
+        log.warning("[dashboard] map: %s; the map is a plain grid", error)
+
+
 def run(
     settings: DashboardSettings,
     bus: BusSettings,
@@ -137,6 +146,7 @@ def run(
                 "serving %s without TLS: passwords cross the network readable; see docs",
                 settings.url,
             )
+        _look_at_map(settings)
         with open_client(bus, stop) as session:
             store = Store(settings.devices, settings.history_bytes)
             desk, watched = Desk(session, bus.prefix), threading.Event()

@@ -29,6 +29,12 @@ IDLE_S = 2.0
 DATA = (ACCEL, IMU, TACHO, RATE, AXES, LINK)
 WAITING = 20_000  # messages of a device; more are dropped, which the watch takes for lost data
 COMMAND = pb.ProcedureCommand
+DONE = {
+    COMMAND.ACTION_START: "started",
+    COMMAND.ACTION_NEXT: "goes on",
+    COMMAND.ACTION_REPEAT: "the step begins anew",
+    COMMAND.ACTION_ABORT: "aborted",
+}
 
 
 class Tables(dict[str, RateTable]):
@@ -147,7 +153,7 @@ class Service:
         except (library.ProcedureError, TableError, orders.OrderError, OSError) as error:
             problem = str(error)
         log.info("%s: order %d of %s: %s", device, command.action, command.user, problem or "done")
-        order.answer(pb.Reply(ok=not problem, message=problem or "done"))
+        order.answer(pb.Reply(ok=not problem, message=problem or DONE[command.action]))
 
     def _do(self, command: COMMAND, device: str, conductor: Conductor | None) -> str:
         if command.action == COMMAND.ACTION_START:

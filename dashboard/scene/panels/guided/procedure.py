@@ -193,9 +193,9 @@ def steps_of(m: pb.ProcedureStatus) -> Markup:
     items = []
     for k, step in enumerate(m.steps):
         mark, colour, word = MARKS.get(step.state, MARKS[STEP.STATE_TODO])
-        name = tag("span", f"{mark} {step.name}", style=f"color:{colour}", title=word)
-        if k == m.step and m.state in ACTIVE:
-            name = tag("b", name)
+        now = k == m.step and m.state in ACTIVE
+        sign = tag("b", mark, style=f"color:{colour}", title=word)
+        name = joined([sign, tag("b" if now else "span", step.name)], " ")
         parts: list[object] = [figure(one) for one in step.figures]
         if step.spoilt:
             parts.append(tag("span", f"{step.spoilt}× spoilt", title=step.reason))
