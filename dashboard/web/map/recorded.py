@@ -11,7 +11,7 @@ from logs.figures.names import line_colour, line_title
 from sessions.library.curves import Curves
 from sessions.library.sky import sky_near
 
-NOWHERE_RAD = 1e-7  # from 0, 0: what a filter says that waits
+NOWHERE_RAD = 1e-5  # from 0, 0: where a filter counts from that waits for its first fix
 POINTS = 4000  # of each way
 SVG = '<svg xmlns="http://www.w3.org/2000/svg"'
 Way = dict[str, Any]
