@@ -1,10 +1,10 @@
 """An estimator whose machine is too slow for all that it is given: late by a few seconds at most.
 
 Every sample is worked through as long as that is possible. A device that is late, and does not
-catch up, is first published in coarser steps: making messages costs several times what the filters
-do, and those go on taking every sample. Where that is not enough, samples that wait are passed
-over up to the newest: a hole, counted in seconds, that the estimators hear of as of any other
-missing samples. What is late because much came at once, as after a start, is caught up with.
+catch up, is first published in coarser steps, which spares messages, journal and bus; filters go
+on taking every sample. Where that is not enough, samples that wait are passed over up to the
+newest: a hole, counted in seconds, that the estimators hear of as of any other missing samples.
+What is late because much came at once, as after a start, is caught up with.
 
 Times: CLOCK_BOOTTIME, ns, handed in, so that a test needs no clock.
 """
@@ -18,6 +18,7 @@ LATE_S = 1.0  # later than this: coarser steps, unless it catches up
 HOLE_S = 3.0  # later than this with coarser steps already: a hole
 CATCH_UP_S = 10.0  # who will be fresh within this time catches up
 FRESH_S = 0.25  # age of the oldest samples that are taken after a hole
+SAY_S = 10.0
 LOOK_S = 1.0  # between two looks at a device
 COARSE_HZ = 5.0  # estimates per second, at most, while steps are coarser
 CALM_S, LONGEST_CALM_S = 10.0, 320.0  # not late for so long: as set again; doubled at each relapse
@@ -51,6 +52,7 @@ class Overload:
 
     def __init__(self) -> None:
         self._devices: dict[str, Lateness] = {}
+        self._said_ns: dict[str, int] = {}  # by what was said
 
     def of(self, device: str) -> Lateness:
         """What is known of a device."""
@@ -91,12 +93,8 @@ class Overload:
             return
         if not state.coarse:
             state.coarse = True
-            log.warning(
-                "%s: %.1f s late: too slow for all; at most %g estimates a second are published",
-                device,
-                state.late_s,
-                COARSE_HZ,
-            )
+            what = "too slow for all; at most %g estimates a second are published"
+            self._say(f"%s: %.1f s late: {what}", now_ns, device, state.late_s, COARSE_HZ)
         elif state.late_s > HOLE_S:
             self._leave_out(device, state, now_ns)
 
@@ -105,16 +103,17 @@ class Overload:
         state.seen_s = None
         state.holes += 1
         if state.holes & (state.holes - 1) == 0:
-            log.warning(
-                "%s: %.1f s late: samples of %.1f s are passed over (hole %d)",
-                device,
-                state.late_s,
-                state.late_s - FRESH_S,
-                state.holes,
-            )
+            what = "samples of %.1f s are passed over (hole %d)"
+            hole_s = state.late_s - FRESH_S
+            self._say(f"%s: %.1f s late: {what}", now_ns, device, state.late_s, hole_s, state.holes)
 
-    @staticmethod
-    def _be_calm(device: str, state: Lateness, now_ns: int) -> None:
+    def _say(self, text: str, now_ns: int, *values: object) -> None:
+        """A line for the log, one of a kind in SAY_S: devices of one machine are late together."""
+        if now_ns - self._said_ns.get(text, -round(SAY_S / NS)) >= SAY_S / NS:
+            self._said_ns[text] = now_ns
+            log.warning(text, *values)
+
+    def _be_calm(self, device: str, state: Lateness, now_ns: int) -> None:
         if not state.coarse:
             return
         if state.calm_ns is None:
@@ -122,4 +121,4 @@ class Overload:
         elif (now_ns - state.calm_ns) * NS >= state.calm_s:
             state.coarse, state.calm_ns = False, None
             state.calm_s = min(2.0 * state.calm_s, LONGEST_CALM_S)
-            log.warning("%s: not late any more: estimates are published as set", device)
+            self._say("%s: not late any more: estimates are published as set", now_ns, device)

@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 BACKLOG = 20_000
 BACKLOG_BYTES = 256 << 20
 FAILURES_SHOWN = 20  # faults of ours that stand in the log with all that is known of them
-SAVE_S = 2.0
+SAVE_S, SAVE_SHARE = 2.0, 0.05  # so often, and at most this share of the time: many boards are much
 SAMPLES = (ACCEL, IMU, ADC)  # inputs that may be passed over when there is no time for all
 
 
@@ -174,9 +174,11 @@ class Worker:
             self._save_at = 0.0
         if self._save is None or self._ready or self.mender.asking:
             return
-        if time.monotonic() >= self._save_at:
-            self._save_at = time.monotonic() + SAVE_S
+        began = time.monotonic()
+        if began >= self._save_at:
             self._save(self)
+            took = time.monotonic() - began
+            self._save_at = began + max(SAVE_S, took / SAVE_SHARE)
 
     def _handle(self, arrival: Arrival) -> None:
         """One message in its place: through the door, and into its device's estimators."""

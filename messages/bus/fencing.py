@@ -213,10 +213,11 @@ class Claim:
         ]
 
     def look(self) -> bool:
-        """Ask now; False, and `lost` is set, when another has it."""
-        if self._outdone(alive(self._session, self._bases)):
+        """Ask now; False when another has it, and `lost` is set, or when that is not known."""
+        ranks = alive(self._session, self._bases)
+        if self._outdone(ranks or ()):
             self.lost.set()
-        return not self.lost.is_set()
+        return ranks is not None and not self.lost.is_set()
 
     def release(self) -> None:
         """Give it up."""
@@ -255,7 +256,11 @@ def claim(
     """
     names, greatest, said = tuple(bases), 0, False
     while not stop.is_set():
-        others = [rank for rank in alive(session, names) if rank[1] != str(session.zid())]
+        ranks = alive(session, names)
+        if ranks is None:
+            stop.wait(RETRY_S)
+            continue
+        others = [rank for rank in ranks if rank[1] != str(session.zid())]
         if not others:
             greatest = max(greatest, heard())
             mine = Claim(session, names, max(own, greatest + 1) if greatest else own)
@@ -271,14 +276,18 @@ def claim(
     return None
 
 
-def alive(session: zenoh.Session, bases: Iterable[str]) -> list[Rank]:
-    """Numbers and ids of the tokens below the bases."""
+def alive(session: zenoh.Session, bases: Iterable[str]) -> list[Rank] | None:
+    """Numbers and ids of the tokens below the bases. None when that is not known: without a router,
+    or when it does not answer in time, nobody may be taken for gone.
+    """
     found = []
     for base in bases:
         for reply in session.liveliness().get(f"{base}/*", timeout=QUERY_S):
-            rank = None if reply.ok is None else rank_of(str(reply.ok.key_expr))
+            if reply.ok is None:
+                return None
+            rank = rank_of(str(reply.ok.key_expr))
             found += [] if rank is None else [rank]
-    return sorted(found)
+    return sorted(found) if list(session.info.routers_zid()) else None
 
 
 def rank_of(key: str) -> Rank | None:

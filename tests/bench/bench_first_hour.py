@@ -77,9 +77,11 @@ class Newcomer:
         return self._real([".venv/bin/gyrofree"])
 
     def _real(self, words) -> list[str]:
-        if self.ready and words[0] == ".venv/bin/gyrofree":
+        if words[0] != ".venv/bin/gyrofree":
+            return list(words)
+        if self.ready:
             return [sys.executable, "-P", "-m", "gyrofree", *words[1:]]
-        return list(words)
+        return [str(self.clone / words[0]), *words[1:]]
 
     def _env(self) -> dict[str, str]:
         return os.environ | ({"PYTHONPATH": str(self.clone)} if self.ready else {})

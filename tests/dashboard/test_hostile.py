@@ -37,7 +37,7 @@ ATTRIBUTES = set(
     "class style colspan viewbox width height role aria-label points fill stroke stroke-width"
     " stroke-linecap stroke-linejoin font-size font-weight text-anchor x y x1 x2 y1 y2 cx cy r rx"
     " ry d id transform clip-path fill-opacity title data-state data-chart"
-    " xmlns font-family stroke-opacity".split()
+    " xmlns font-family stroke-opacity stroke-dasharray".split()
 )
 GLOSSARY = {glossary_link(word) for word in TERMS}
 

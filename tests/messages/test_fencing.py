@@ -1,5 +1,8 @@
 """Whose number is believed: real sessions over a real router."""
 
+import signal
+import subprocess
+import sys
 import threading
 import time
 
@@ -7,7 +10,8 @@ import pytest
 import zenoh
 from support.stack import free_port
 
-from messages.bus.fencing import FAR_NS, Claim, Fence, claim, heard_of, packed
+from messages.bus import fencing
+from messages.bus.fencing import FAR_NS, Claim, Fence, alive, claim, heard_of, packed
 from messages.bus.session import BusSettings, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import GATEWAY
@@ -75,6 +79,49 @@ def test_a_number_forged_before_anybody_serves_is_outdone(bus):
     assert listener.refused == ["stale"]
     listener.declared.undeclare()
     made.release()
+
+
+ROUTER = """
+import sys
+from messages.bus.session import BusSettings, open_router
+with open_router(BusSettings(prefix="t", router=sys.argv[1], listen=[sys.argv[1]])):
+    print("ready", flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_nobody_is_taken_for_gone_while_the_router_does_not_answer(monkeypatch):
+    """A machine without time for its router is no reason to take over: both would serve in turn."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    router = subprocess.Popen(
+        [sys.executable, "-c", ROUTER, endpoint], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    try:
+        assert router.stdout.readline() == b"ready\n"
+        settings = BusSettings(prefix="t", router=endpoint, listen=[])
+        with open_client(settings) as session:
+            assert alive(session, [BASE]) == []
+            router.send_signal(signal.SIGSTOP)
+            assert alive(session, [BASE]) is None
+            monkeypatch.setattr(fencing, "RETRY_S", 0.01)
+            stop, ended = threading.Event(), []
+            args = session, [BASE], time.time_ns(), stop, ended.append
+            waiting = threading.Thread(target=lambda: ended.append(claim(*args)))
+            waiting.start()
+            waiting.join(2.5)
+            assert waiting.is_alive() and not ended
+            router.send_signal(signal.SIGCONT)
+            waiting.join(60.0)
+            assert ended[0].number == args[2]
+            router.kill()
+            router.wait()
+            while session.info.routers_zid():
+                time.sleep(0.01)
+            assert alive(session, [BASE]) is None and not ended[0].look()
+            assert not ended[0].lost.is_set()
+    finally:
+        router.kill()
+        router.communicate()
 
 
 def test_one_that_claims_more_takes_over_and_when_it_is_gone_the_other_is_heard_again(bus):

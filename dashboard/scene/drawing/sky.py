@@ -94,7 +94,7 @@ def sky_svg(satellites: Iterable[Satellite], dark: bool) -> Markup:
     for one in sorted(seen, key=lambda one: one.use == pb.Sky.USE_YES):
         out.append(_satellite(one, ink))
     box = {"viewBox": f"0 0 {SIZE} {SIZE}", "width": "100%", "role": "img"}
-    return tag("svg", *out, xmlns="http://www.w3.org/2000/svg", aria_label=said(seen), **box)
+    return tag("svg", *out, aria_label=said(seen), **box)
 
 
 def _text(text: str, x: float, y: float, size: int, ink: str) -> Markup:

@@ -1,4 +1,5 @@
 // The page of one session: plots, replay, report, export, notes, labels, deletion.
+import { showMap, showSky } from "/static/map/session.js";
 import { Derived } from "/static/derived.js";
 import { Overlay } from "/static/overlay.js";
 import { call, ended, send, toast } from "/static/rest.js";
@@ -159,6 +160,7 @@ if (by("plots")) {
       if (by("note")) by("note").at_s.value = moment;
       if (by("replay")) by("replay").textContent = `Replay from ${moment} s`;
       address({ t: moment });
+      showSky(path, moment);
     },
   });
   const editor = new Derived(by("own-curves"), {
@@ -172,6 +174,8 @@ if (by("plots")) {
   });
   if (lines.length) by("own-curves").open = true;
   overlay.load();
+  showMap(path);
+  showSky(path, moment || 0);
 }
 
 // The link to what is seen.
