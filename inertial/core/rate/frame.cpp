@@ -34,6 +34,7 @@ void Frame::restart() {
   since_rest_.forget();
   started_ = still_ = moved_ = false;
   agreement_.forget();
+  inexact_.begin_anew();
   perhaps_still_ = false;
   perhaps_for_ = 0;
   against_s_ = 0.0;
@@ -92,7 +93,7 @@ void Frame::advance(const Constants& configured, double t_s, const double* a) {
   if (still_) arrivals_.clear();
   run(c, first, now, fixed, nullptr);
   if (static_cast<Method>(c.tuning.method) == Method::HORIZON && !still_) horizon(c, now, fixed);
-  if (branches_ == 2) two_signs(still_);
+  if (branches_ == 2) two_signs(c, still_);
   if (diverged()) return;
   if (still_ && !moved_) stay();
   count(c);
@@ -139,7 +140,7 @@ bool Frame::contradicted() {
 Doubt Frame::doubt() const {
   if (intake_.missing() > 0) return Doubt::NO_DATA;
   if (perhaps_still_) return Doubt::STANDING;
-  return against_s_ > 0.0 ? Doubt::CONTRADICTED : Doubt::NONE;
+  return against_s_ > 0.0 || inexact_.hopeless() ? Doubt::CONTRADICTED : Doubt::NONE;
 }
 
 void Frame::wait(const Constants& c, bool still) {
@@ -155,6 +156,7 @@ void Frame::wait(const Constants& c, bool still) {
 }
 
 void Frame::begin(const Constants& c) {
+  inexact_.begin_anew();
   begin_still(first_.filter, c.sensor, c.tuning, watch_.mean_of(c.limits.window));
   started_ = true;
   branches_ = 1;
@@ -176,7 +178,7 @@ void Frame::fit_start(const Constants& c, bool still) {
     fitted_ = 0;
   } else if (std::find(std::begin(FITS), std::end(FITS), n) != std::end(FITS)) {
     balance_ = fit(c);
-    branches_ = balance_ > DECIDED && !perhaps_still_ ? 1 : 2;
+    branches_ = balance_ > decided(c) && !perhaps_still_ ? 1 : 2;
   } else {
     const long now = watch_.newest();
     for (Start* begun : {&first_, &second_}) carry(begun->filter, watch_.y(now), watch_.dt(now), c.sensor, c.tuning);
@@ -206,7 +208,10 @@ long Frame::begin_of_motion(const Constants& c, const Verdict& verdict, long now
   } else if (first >= 0) {
     first_.filter = *kept_.of(first);
   }
-  if (first >= 0) taken_back_ += now - first;
+  if (first >= 0) {
+    taken_back_ += now - first;
+    inexact_.jumped(first_.filter);
+  }
   kept_.clear();
   if (noisier_) first_.filter.P.block<3, 3>(OMEGA, OMEGA) += late(c) * Matrix3::Identity();
   return first >= 0 ? first : now;
@@ -254,8 +259,17 @@ void Frame::run(const Constants& c, long first, long now, bool fixed, const Stat
     const Moment moment{watch_.dt(sample), !still_, fixed, eighth ? EVERY * dt_ : 0.0, end == nullptr ? nullptr : &at,
                         agreement_.forgetting(), watch_.wander()};
     step(first_.filter, c.sensor, c.tuning, watch_.y(sample), moment, said_);
+    if (end == nullptr) watch_errors(c, sample, moment);
     if (branches_ == 2) step(second_.filter, c.sensor, c.tuning, watch_.y(sample), moment, other_said_);
   }
+}
+
+// What errors of the axes do to the state after a sample.
+void Frame::watch_errors(const Constants& c, long sample, const Moment& moment) {
+  if (branches_ == 1) inexact_.observe(said_);
+  if (moment.grow == 0.0) return;
+  const Measurement mean = (watch_.total(sample) - watch_.total(sample - EVERY)) / EVERY;
+  inexact_.step(first_.filter, c.sensor, c.tuning, {mean, dt_, EVERY, moment.turning, moment.fixed});
 }
 
 // The window again, about what its end says, when it is due and all of it was turning (E-49).
@@ -276,14 +290,19 @@ void Frame::swap_signs() {
   balance_ = -balance_;
 }
 
+// Of axes that are less exact than the filters take them for, likelihoods say less.
+double Frame::decided(const Constants& c) const {
+  return DECIDED * std::max(1.0, inexact_.seen() / c.tuning.scale);
+}
+
 // Keep the better one of two signs first, and only that once it is sure.
-void Frame::two_signs(bool still) {
+void Frame::two_signs(const Constants& c, bool still) {
   balance_ += elementary::log(said_.density / other_said_.density) - 0.5 * (said_.misfit - other_said_.misfit);
   if (balance_ < 0.0) {
     swap_signs();
     std::swap(said_, other_said_);
   }
-  if (still || (balance_ > DECIDED && !perhaps_still_)) branches_ = 1;
+  if (still || (balance_ > decided(c) && !perhaps_still_)) branches_ = 1;
 }
 
 // Start anew when the rate is beyond all bounds or no number at all, or its covariance is none any more.
