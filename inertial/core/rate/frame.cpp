@@ -93,7 +93,7 @@ void Frame::advance(const Constants& configured, double t_s, const double* a) {
   if (still_) arrivals_.clear();
   run(c, first, now, fixed, nullptr);
   if (static_cast<Method>(c.tuning.method) == Method::HORIZON && !still_) horizon(c, now, fixed);
-  if (branches_ == 2) two_signs(c, still_);
+  if (branches_ == 2) two_signs(still_);
   if (diverged()) return;
   if (still_ && !moved_) stay();
   count(c);
@@ -140,7 +140,7 @@ bool Frame::contradicted() {
 Doubt Frame::doubt() const {
   if (intake_.missing() > 0) return Doubt::NO_DATA;
   if (perhaps_still_) return Doubt::STANDING;
-  return against_s_ > 0.0 || inexact_.hopeless() ? Doubt::CONTRADICTED : Doubt::NONE;
+  return against_s_ > 0.0 ? Doubt::CONTRADICTED : Doubt::NONE;
 }
 
 void Frame::wait(const Constants& c, bool still) {
@@ -178,7 +178,7 @@ void Frame::fit_start(const Constants& c, bool still) {
     fitted_ = 0;
   } else if (std::find(std::begin(FITS), std::end(FITS), n) != std::end(FITS)) {
     balance_ = fit(c);
-    branches_ = balance_ > decided(c) && !perhaps_still_ ? 1 : 2;
+    branches_ = balance_ > DECIDED && !perhaps_still_ ? 1 : 2;
   } else {
     const long now = watch_.newest();
     for (Start* begun : {&first_, &second_}) carry(begun->filter, watch_.y(now), watch_.dt(now), c.sensor, c.tuning);
@@ -290,19 +290,14 @@ void Frame::swap_signs() {
   balance_ = -balance_;
 }
 
-// Of axes that are less exact than the filters take them for, likelihoods say less.
-double Frame::decided(const Constants& c) const {
-  return DECIDED * std::max(1.0, inexact_.seen() / c.tuning.scale);
-}
-
 // Keep the better one of two signs first, and only that once it is sure.
-void Frame::two_signs(const Constants& c, bool still) {
+void Frame::two_signs(bool still) {
   balance_ += elementary::log(said_.density / other_said_.density) - 0.5 * (said_.misfit - other_said_.misfit);
   if (balance_ < 0.0) {
     swap_signs();
     std::swap(said_, other_said_);
   }
-  if (still || (balance_ > decided(c) && !perhaps_still_)) branches_ = 1;
+  if (still || (balance_ > DECIDED && !perhaps_still_)) branches_ = 1;
 }
 
 // Start anew when the rate is beyond all bounds or no number at all, or its covariance is none any more.

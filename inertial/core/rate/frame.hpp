@@ -134,8 +134,7 @@ class Frame {
   void run(const Constants& c, long first, long now, bool fixed, const StateVector* end);
   void watch_errors(const Constants& c, long sample, const Moment& moment);
   void horizon(const Constants& c, long now, bool fixed);
-  void two_signs(const Constants& c, bool still);
-  double decided(const Constants& c) const;
+  void two_signs(bool still);
   void swap_signs();
   bool diverged();
   void count(const Constants& c);

@@ -48,13 +48,9 @@ class Inexact {
   // Covariance of omega for errors of variance 1, and its derivative by them.
   Matrix3 unit_of_rate() const;
   ByErrors<3> rate() const { return by_.middleRows<3>(OMEGA); }
-  // So far off that nothing linear in them is worth saying.
-  bool hopeless() const { return seen() > HOPELESS; }
 
  private:
   static constexpr int SETTLES = 8;  // steps at rest
-  static constexpr double HOPELESS = 0.01;  // of 1, squared: one axis of twelve is off by a third
-
   double by_innovations(double expected) const;
 
   void begin(const Filter& f, const Sensor& s);

@@ -35,7 +35,7 @@ Phase phase_of(const Frame& frame) {
   return frame.still() ? STILL : TURNING;
 }
 
-void write_sight(const Frame& frame, const Constants& c, const Matrix3& inexact, Row& row) {
+void write_sight(const Frame& frame, const Constants& c, Row& row) {
   const Sensor& s = frame.sensor(c);
   const Filter& f = frame.filter();
   Doubt doubt = frame.doubt();
@@ -48,8 +48,7 @@ void write_sight(const Frame& frame, const Constants& c, const Matrix3& inexact,
     return;
   }
   if (!frame.started() || frame.still()) return;
-  const Known known{f.omega(), (f.omega_covariance() + inexact).diagonal(),
-                    f.sign_variance + largest_variance(inexact), frame.two_signs()};
+  const Known known{f.omega(), f.omega_covariance().diagonal(), f.sign_variance, frame.two_signs()};
   judge(known, s, frame.dt(), row.sight);
 }
 
@@ -107,7 +106,7 @@ void write(const Frame& frame, const Constants& c, Row& row) {
   row.sign_variance = f.sign_variance;
   row.still = frame.still();
   row.phase = phase_of(frame);
-  write_sight(frame, c, inexact, row);
+  write_sight(frame, c, row);
 }
 
 }  // namespace gyrofree::rate

@@ -46,7 +46,7 @@ bool Frame::correct(const Constants& c, const Report& report) {
   if (branches_ == 2 && report.is_signed) {  // the likelier sign becomes the first
     balance_ += log_likelihood(said_of(first_)) - log_likelihood(said_of(second_));
     if (balance_ < 0.0) swap_signs();
-    if (balance_ > decided(c)) branches_ = 1;
+    if (balance_ > DECIDED) branches_ = 1;
   }
   bool used = absorb_report(first_.filter, report, said_of(first_), noise);
   if (branches_ == 2) used = absorb_report(second_.filter, report, said_of(second_), noise) || used;
