@@ -21,6 +21,7 @@ from dashboard.web.control import Replay
 from dashboard.web.first.control import FirstRun
 from dashboard.web.front import Front
 from dashboard.web.jobs import Jobs
+from dashboard.web.map.archive import ArchiveError, open_archive
 from dashboard.web.users import UserStore, load_users
 from messages.bus.session import BusSettings, open_client
 from sessions.library.catalogue import Catalogue
@@ -76,6 +77,7 @@ def listen(host: str, port: int) -> socket.socket:
 def serve(front: Front, bound: socket.socket, stop: threading.Event) -> None:
     """Serve the web application on a bound socket until `stop` is set."""
     settings = front.settings
+    connections = Connections(settings)
     config = uvicorn.Config(
         create_app(front),
         log_config=None,
@@ -87,7 +89,8 @@ def serve(front: Front, bound: socket.socket, stop: threading.Event) -> None:
         proxy_headers=bool(settings.trusted_proxies),
         forwarded_allow_ips=settings.trusted_proxies or None,
         timeout_graceful_shutdown=GRACE_S,
-        http=Connections(settings).protocol(),
+        http=connections.protocol(),
+        ws=connections.sockets(),
         h11_max_incomplete_event_size=HEAD_LIMIT,
         timeout_keep_alive=15,
         backlog=BACKLOG,
@@ -104,6 +107,14 @@ def serve(front: Front, bound: socket.socket, stop: threading.Event) -> None:
         await serving
 
     asyncio.run(until_stopped())
+
+
+def _look_at_map(settings: DashboardSettings) -> None:
+    try:
+        if settings.map is not None:
+            open_archive(settings.map)
+    except ArchiveError as error:
+        log.warning("[dashboard] map: %s; the map is a plain grid", error)
 
 
 def run(
@@ -137,6 +148,7 @@ def run(
                 "serving %s without TLS: passwords cross the network readable; see docs",
                 settings.url,
             )
+        _look_at_map(settings)
         with open_client(bus, stop) as session:
             store = Store(settings.devices, settings.history_bytes)
             desk, watched = Desk(session, bus.prefix), threading.Event()

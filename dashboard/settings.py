@@ -34,6 +34,9 @@ class DashboardSettings(BaseModel):
         "folder of the recorded sessions, the one of `[recorder] root`",
         shown=True,
     )
+    map: Path | None = setting(
+        None, "PMTiles file whose tiles lie under tracks and fixes; none: a plain grid", shown=True
+    )
     demo: bool = setting(False, "says so on the pages; the demo's link signs in without a password")
 
     allowed_hosts: list[str] = setting([], "names besides localhost that people type to get here")

@@ -79,6 +79,12 @@ class Pipeline:
         self._cubes.pop(device, None)
         self._six_axes.pop(device, None)
 
+    def limit(self, device: str, hz: float) -> None:
+        """Publish at most so many estimates of a device per second from now on; 0: as the settings
+        say. Filters go on taking every sample.
+        """
+        self._common.limit(device, hz)
+
     def _six_axis(self, device: str) -> SixAxis:
         if device not in self._six_axes:
             self._six_axes[device] = SixAxis(device, self._common, self._axes)

@@ -18,6 +18,7 @@ from estimator.settings import EstimatorSettings
 from estimator.worker import Worker
 from messages.bus.session import Publishers
 from messages.clock import Moment
+from messages.history.journal_folder import remedy_of
 
 log = logging.getLogger(__name__)
 
@@ -35,7 +36,7 @@ class SavedState:
         self._mark = hashlib.sha256(
             f"{version} {settings!r}".encode()
         ).hexdigest()  # of another setup it is of no use
-        self.message = ""  # why the newest state is not on the disk; empty when it is
+        self.message = ""  # why the newest state is not on the disk, for people; empty when it is
 
     def save(self, worker: Worker, publishers: Publishers) -> None:
         """Replace the file. A state that cannot be saved costs the resumption only: it is said once
@@ -54,15 +55,20 @@ class SavedState:
             self._say(error)
             return
         if self.message:
-            log.warning("%s: the state is saved again", self._path)
+            log.warning("%s: the estimators' state is saved again", self._path)
         self.message = ""
 
     def _say(self, error: Exception) -> None:
-        why = error.strerror if isinstance(error, OSError) else error
-        remedy = "make room; until then estimates begin anew after a crash"
-        message = f"{self._path}: the state cannot be saved ({why}): {remedy}"
+        why, remedy = type(error).__name__, "see its log"
+        if isinstance(error, OSError):
+            why = error.strerror or why
+            remedy = remedy_of(error)
+        message = (
+            f"the estimators' state cannot be saved ({why}): {remedy}; until then estimates begin"
+            " anew after a crash"
+        )
         if message != self.message:
-            log.warning("%s", message)
+            log.warning("%s: %s", self._path, message, exc_info=why == type(error).__name__)
         self.message = message
 
     def load(self) -> tuple[Pipeline, dict, dict] | None:

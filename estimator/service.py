@@ -18,7 +18,7 @@ from estimator.saved_state import SavedState, version
 from estimator.settings import EstimatorSettings
 from estimator.worker import Worker
 from messages.bus import orders
-from messages.bus.fencing import Claim, Fence, claim, heard_of
+from messages.bus.fencing import CLAIMED_ESTIMATES, Claim, Fence, claim, heard_of
 from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client
 from messages.clock import elapsed_ns
 from messages.contract.door import Door
@@ -46,7 +46,7 @@ def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) ->
         if stop.is_set():
             return
         raise
-    bases = [f"{bus.prefix}/{name}/estimates" for name in _leader(settings)]
+    bases = [f"{bus.prefix}/{name}/{CLAIMED_ESTIMATES}" for name in _leader(settings)]
 
     def refused(other: str) -> None:
         log.error(
@@ -88,13 +88,14 @@ def _serve(
     """Estimate until `stop`, or until another has claimed the same."""
     spool = _open_spool(settings)
     publishers = Publishers(session, bus.prefix, spool)
-    publishers.number = claimed.number
     if spool is not None:
         spool.journal.outrun(claimed.number - 1)
-        publishers.number = spool.journal.run
+        claimed.raise_to(spool.journal.run)
+    publishers.number = claimed.number
     asker = Asker(session, bus.prefix, lambda question, reply: worker.answered(question, reply))
     saved = SavedState(settings.journal, settings, version()) if spool is not None else None
-    worker = _worker(Pipeline(settings), publishers, asker, saved, settings)
+    trouble = _trouble(saved, spool)
+    worker = _worker(Pipeline(settings), publishers, asker, saved, settings, trouble)
     failed = threading.Event()
     thread = threading.Thread(target=worker.work, args=(failed,), name="estimator", daemon=True)
     thread.start()
@@ -146,6 +147,7 @@ def _worker(
     asker: Asker,
     saved: SavedState | None,
     settings: EstimatorSettings,
+    trouble: Callable[[], str],
 ) -> Worker:
     """A worker that goes on from the saved state when there is one."""
     found = saved.load() if saved is not None else None
@@ -163,12 +165,24 @@ def _worker(
         lambda question: asker.ask(question, *question.stream, question.query),
         None if saved is None else lambda worker: saved.save(worker, publishers),
         Door("estimator", most_devices=settings.max_devices, gone_s=GONE_S),
+        trouble,
     )
     if found is not None:
         for (device, name), (run_, last) in found[1].items():
             worker.mender.seed(device, name, run_, last)
         log.info("going on from the state of before: %d inputs known", len(found[1]))
     return worker
+
+
+def _trouble(saved: SavedState | None, spool: Spool | None) -> Callable[[], str]:
+    """What cannot be kept at this moment, for people."""
+
+    def trouble() -> str:
+        kept = "" if spool is None else spool.journal.message
+        state = "" if saved is None else saved.message
+        return "; ".join(filter(None, (state, kept and f"estimates are not kept: {kept}")))
+
+    return trouble
 
 
 def _open_spool(settings: EstimatorSettings) -> Spool | None:

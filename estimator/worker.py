@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from estimator.convert.samples import BadMessage
 from estimator.inbox import Inbox
 from estimator.output import Output
+from estimator.overload import Overload
 from estimator.pipeline import Pipeline
 from estimator.stream import worth_a_line
 from messages.bus import orders
@@ -21,7 +22,7 @@ from messages.clock import elapsed_ns
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import Refusal
 from messages.contract.door import Door
-from messages.contract.topics import ESTIMATOR, PIPELINE_INPUTS, Address
+from messages.contract.topics import ACCEL, ADC, ESTIMATOR, IMU, PIPELINE_INPUTS, Address
 from messages.history.mending import Mender
 from messages.history.mending_state import Arrival, Question
 
@@ -31,7 +32,8 @@ log = logging.getLogger(__name__)
 BACKLOG = 20_000
 BACKLOG_BYTES = 256 << 20
 FAILURES_SHOWN = 20  # faults of ours that stand in the log with all that is known of them
-SAVE_S = 2.0
+SAVE_S, SAVE_SHARE = 2.0, 0.05  # so often, and at most this share of the time: many boards are much
+SAMPLES = (ACCEL, IMU, ADC)  # inputs that may be passed over when there is no time for all
 
 
 @dataclass(frozen=True)
@@ -68,9 +70,11 @@ class Worker:
         ask: Callable[[Question], None] | None = None,
         save: Callable[["Worker"], None] | None = None,
         door: Door | None = None,
+        trouble: Callable[[], str] = lambda: "",
+        now_ns: Callable[[], int] = elapsed_ns,
     ) -> None:
         """`ask` puts a question to a gateway, its answer comes through `answered`; `save` keeps the
-        state.
+        state; `trouble()` says what this process cannot do now; `now_ns` is CLOCK_BOOTTIME.
         """
         self.pipeline = pipeline
         self.door = door or Door("estimator")
@@ -79,11 +83,11 @@ class Worker:
             topics=PIPELINE_INPUTS,
             refuse=self.door.refuse,
         )
-        self._put, self._save = put, save
+        self._put, self._save, self._trouble, self._now_ns = put, save, trouble, now_ns
+        self.overload = Overload()
         self.inbox = Inbox(BACKLOG, BACKLOG_BYTES)
         self._ready = 0  # messages that the mender has given on and the pipeline has not taken
         self._bad = 0
-        self._behind_s: dict[str, float] = {}  # by device: from arrival to its turn, newest
         self._save_at = time.monotonic() + SAVE_S
         self.failure: BaseException | None = None
 
@@ -129,6 +133,7 @@ class Worker:
                 elif isinstance(item, Gone):
                     self.pipeline.forget(item.device)
                     self.mender.forget(item.device)
+                    self.overload.forget(item.device)
                 elif isinstance(item, Ready):
                     self._ready -= 1
                     self._handle(item.arrival)
@@ -169,19 +174,21 @@ class Worker:
             self._save_at = 0.0
         if self._save is None or self._ready or self.mender.asking:
             return
-        if time.monotonic() >= self._save_at:
-            self._save_at = time.monotonic() + SAVE_S
+        began = time.monotonic()
+        if began >= self._save_at:
             self._save(self)
+            took = time.monotonic() - began
+            self._save_at = began + max(SAVE_S, took / SAVE_SHARE)
 
     def _handle(self, arrival: Arrival) -> None:
         """One message in its place: through the door, and into its device's estimators."""
+        if not self._has_time(arrival):
+            return
         address = Address("", arrival.device, arrival.topic, arrival.estimator)
         message = self.door.message(address, arrival.payload)
         if message is None:
             return
         message.header.device = arrival.device
-        if arrival.at_ns and not arrival.late:
-            self._behind_s[arrival.device] = max(0, elapsed_ns() - arrival.at_ns) * 1e-9
         try:
             for output in self.pipeline.on(arrival.topic, message):
                 self._tell(output)
@@ -192,11 +199,24 @@ class Worker:
         except Exception as error:
             self._fail(arrival.device, arrival.topic.name, error)
 
+    def _has_time(self, arrival: Arrival) -> bool:
+        """False for samples that are passed over because their device is too late."""
+        if arrival.topic not in SAMPLES or not arrival.at_ns:
+            return True
+        device = arrival.device
+        if arrival.late:
+            return self.overload.take_filled(device)
+        taken = self.overload.take(device, arrival.at_ns, self._now_ns())
+        self.pipeline.limit(device, self.overload.of(device).limit_hz)
+        return taken
+
     def _tell(self, output: Output) -> None:
         if output.topic is ESTIMATOR:
-            output.message.refused.update(self.door.of(output.device))
-            output.message.behind_s = self._behind_s.get(output.device, 0.0)
-            output.message.waiting = len(self.inbox)
+            status, lateness = output.message, self.overload.of(output.device)
+            status.refused.update(self.door.of(output.device))
+            status.behind_s, status.skipped_s = lateness.late_s, lateness.skipped_s
+            status.limit_hz, status.trouble = lateness.limit_hz, self._trouble()
+            status.waiting = len(self.inbox)
         self._put(output)
 
     def _fail(self, device: str, what: str, error: Exception) -> None:

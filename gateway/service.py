@@ -126,7 +126,8 @@ class _Line:
         stopped = threading.Event()
         self.link.on_stopped = lambda: (self.publishers.hold(), stopped.set())
         self.link.outrun(claimed.number - 1)
-        self.publishers.number = self.link.journal.run
+        claimed.raise_to(self.link.journal.run)
+        self.publishers.number = claimed.number
         self.publishers.attach(session)
         while not (stop.is_set() or self.failed.is_set() or claimed.lost.wait(LOOK_S)):
             # after a stop nothing is said before it is known that nobody took our place
@@ -225,7 +226,7 @@ def _publish(
 
     claimed = claim(
         session,
-        [f"{check_name(prefix)}/{check_name(device.name)}/gateway"],
+        [f"{check_name(prefix)}/{check_name(device.name)}/{GATEWAY}"],
         line.link.journal.run,
         stop,
         give_up,

@@ -63,3 +63,15 @@ def ned_between(origin: Place, place: Place) -> tuple[Array, Array, Array]:
     R_N, R_E = radii(L0)
     east = (l - l0 + np.pi) % (2.0 * np.pi) - np.pi
     return (L - L0) * (R_N + h0), east * (R_E + h0) * cos(L0), h0 - h
+
+
+def place_from_ned(
+    origin: Place, north: ArrayLike, east: ArrayLike, down: ArrayLike
+) -> tuple[Array, Array, Array]:
+    """The place so many metres north, east and down of an origin: the inverse of `ned_between`, its
+    longitude not brought back over the antimeridian.
+    """
+    L0, l0, h0 = origin
+    R_N, R_E = radii(L0)
+    north, east, down = (np.asarray(value, dtype=float) for value in (north, east, down))
+    return L0 + north / (R_N + h0), l0 + east / ((R_E + h0) * cos(L0)), h0 - down

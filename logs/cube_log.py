@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from inertial.constants import GRAVITY
 from inertial.layouts.layout import PRODUCTS, Layout
 from inertial.timing import Timing
+from logs.cube_tacho import beside
 from logs.quantities import UNITS, column_of, in_range, timing_of
 from logs.sheet import LogError, Sheet, Table, open_sheet
 
@@ -118,7 +119,7 @@ def read_log(path: Path, names: Sequence[str], lsb_mg: float | None = None) -> C
         index=timing.index,
         timing=timing,
         gaps=_gaps(timing, table),
-        tacho=table[TACHO] if TACHO in table else None,
+        tacho=table[TACHO] if TACHO in table else beside(sheet, table["t"]),
         omega_b=_columns(table, TRUE_RATE),
         q_nb=_attitude(path, table, _columns(table, TRUE_ATTITUDE)),
         cut_off=table.cut_off,

@@ -26,6 +26,7 @@ AXIS_WORDS = {
 }
 MOST = 12  # of one device
 TURNS_RADPS = 0.035  # 2 deg/s: beyond it a rate is no standstill
+PROCEDURES_SILENT_S = 3.0  # s without a word of who drives a table
 RECORDER_STALE_S = 5.0  # s without a word of the recorder while it records
 _COUNTS = re.compile(r"fixes (\w+) (\d+)")
 
@@ -66,7 +67,7 @@ def alarms(store: Store, device: Device, now: float | None = None) -> list[Alarm
     now = time.monotonic() if now is None else now
     if store.replay.state(device.name, time.monotonic()) == "ended":
         return []
-    found = [*_link(device, now), *_board(device, now), *_axes(device, now)]
+    found = [*_table(device, now), *_link(device, now), *_board(device, now), *_axes(device, now)]
     found += [*_estimators(device, now), *_sight(device, now)]
     return found[:MOST]
 
@@ -84,6 +85,22 @@ def bench_alarms(store: Store, now: float | None = None) -> list[Alarm]:
         return []
     full = "no space" in text.lower() or "full" in text.lower()
     return [Alarm("recorder", "disk full" if full else "recording failed", text, "")]
+
+
+def drives(m: pb.ProcedureStatus) -> bool:
+    """Whether a procedure has a table in its hands: from its start until the table is let go."""
+    active = m.state in (pb.ProcedureStatus.STATE_RUNNING, pb.ProcedureStatus.STATE_HELD)
+    return bool(m.table) and (active or m.instruction.endswith("being closed"))
+
+
+def _table(device: Device, now: float) -> Iterator[Alarm]:
+    heard = device.get("procedure")
+    if heard is not None and drives(heard.message) and heard.age(now) > PROCEDURES_SILENT_S:
+        text = (
+            f"the procedures have been silent for {heard.age(now):.0f} s and"
+            f" {plain(heard.message.table, 60)} may still turn: stop it at the table"
+        )
+        yield Alarm("table", "the table is left alone", text, "procedure")
 
 
 def _link(device: Device, now: float) -> Iterator[Alarm]:
@@ -104,7 +121,11 @@ def _board(device: Device, now: float) -> Iterator[Alarm]:
     heard = device.get("board")
     if heard is None or device.stale("board", now=now):
         return
+    # The simulated table boots at the beginning of each of its tests: nobody has to look after it.
+    simulated = heard.message.header.source == pb.SOURCE_SIMULATED
     for fault in heard.message.faults:
+        if fault.name == "reboot" and simulated:
+            continue
         if fault.active or fault.name == "reboot":  # over as soon as it is known
             yield Alarm("board", plain(fault.name), plain(fault.text), "board")
 
@@ -134,13 +155,31 @@ def _estimators(device: Device, now: float) -> Iterator[Alarm]:
             doubted = m.message.startswith("settings: ")
             title = "is a setting wrong?" if doubted else called
             yield Alarm("settings" if doubted else "estimator", title, plain(m.message), page)
-    behind_s = max((device.behind_s(n) for n in device.estimators("estimator")), default=0.0)
-    if behind_s > BEHIND_STALE_S:
-        text = (
-            f"estimates are {behind_s:.0f} s behind their samples: its machine is too slow for all"
-            " that it is given; fewer estimators or boards, or a second machine"
-        )
-        yield Alarm("late", "estimates are late", text, page)
+    yield from _late(device, page)
+
+
+def _late(device: Device, page: str) -> Iterator[Alarm]:
+    """What the estimators' machine has no time or no room for."""
+    said = [device.get("estimator", name).message for name in device.estimators("estimator")]
+    trouble = next((plain(m.trouble) for m in said if m.trouble), "")
+    if trouble:
+        yield Alarm("disk", "state not saved", trouble, page)
+    behind_s = max((m.behind_s for m in said), default=0.0)
+    limit_hz = max((m.limit_hz for m in said), default=0.0)
+    if behind_s <= BEHIND_STALE_S and not limit_hz:
+        return
+    what = [f"estimates are {behind_s:.0f} s behind their samples"] if behind_s >= 0.5 else []
+    if limit_hz:
+        what.append(f"at most {limit_hz:g} estimates a second are published")
+    skipped_s = max(m.skipped_s for m in said)
+    if skipped_s:
+        what.append(f"samples of {skipped_s:.0f} s were passed over")
+    text = (
+        f"{', '.join(what)}: the estimators' machine is too slow for all that it is given; fewer"
+        " estimators or boards, or a second machine"
+    )
+    title = "estimates are late" if behind_s > BEHIND_STALE_S else "estimates are sparse"
+    yield Alarm("late", title, text, page)
 
 
 def _sight(device: Device, now: float) -> Iterator[Alarm]:

@@ -26,6 +26,7 @@ SLOW_STALE_S = {
     "board": 30.0,
     "procedure": 5.0,
     "gnss": 2.5,
+    "sky": 5.0,
     "innovation": 10.0,
 }
 

@@ -151,7 +151,14 @@ def _gnss(device: Device, estimator: str, t: float, m: pb.GnssFix) -> None:
         return
     origin = device.origin or _origin(m.latitude_deg, m.longitude_deg, m.height_m)
     p_n = ned_from_geodetic(m.latitude_deg, m.longitude_deg, m.height_m, origin)
-    device.ring("gnss", estimator).append(t, p_n=p_n)
+    device.ring("gnss", estimator).append(
+        t,
+        p_n=p_n,
+        latitude=m.latitude_deg,
+        longitude=m.longitude_deg,
+        sigma_p_n=fields(m.position_sigma_ned_m, 3),
+        quality=m.quality,
+    )
     if device.origin is None:
         return  # the fix would land in another frame than the trajectory
     device.tracks.setdefault("fixes", Track(spacing=FIX_SPACING_M)).add(p_n)

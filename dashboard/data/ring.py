@@ -111,3 +111,10 @@ def _with_slack(capacity: int) -> int:
 def blank(dtype: np.dtype, count: int) -> np.ndarray:
     """Rows of NaN; every field of the type is float64."""
     return np.full(count * (dtype.itemsize // 8), np.nan).view(dtype)
+
+
+def gap_limit(t: np.ndarray, least: float = 0.25) -> float:
+    """The pause between samples above which a series counts as interrupted: five usual periods, at
+    least `least` s.
+    """
+    return least if len(t) < 3 else max(least, 5.0 * float(np.median(np.diff(t))))

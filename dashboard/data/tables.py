@@ -79,7 +79,16 @@ NAV = Table(
         Column("membership", "", 6),
     ),
 )
-GNSS = Table(10.0, (Column("p_n", "m", 3),))
+GNSS = Table(
+    10.0,
+    (
+        Column("p_n", "m", 3),
+        Column("latitude", "deg"),
+        Column("longitude", "deg"),
+        Column("sigma_p_n", "m", 3),
+        Column("quality", ""),  # GnssFix.Quality
+    ),
+)
 INNOVATION = Table(
     10.0,
     (

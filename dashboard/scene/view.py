@@ -7,6 +7,7 @@ import time
 
 import viser
 
+from dashboard.data.channels import judged
 from dashboard.data.device import Device
 from dashboard.data.store import Store
 from dashboard.desk import Desk
@@ -14,14 +15,16 @@ from dashboard.scene.drawing.page import alert, tag
 from dashboard.scene.panels import PAGES, Devices, Record, Snapshot, Timeline
 from dashboard.scene.panels.base import Input
 from dashboard.scene.scene import Choice, SceneView
+from dashboard.scene.span import Span
 from dashboard.scene.style import LEFT_WIDTH
-from dashboard.scene.workspaces import LAYERS, WINDOWS, WORKSPACES, Wish, offered, stated
+from dashboard.scene.workspaces import LAYERS, WORKSPACES, Wish, offered, stated
+from logs.figures.expression import many
 
 TRACK_S = 0.2  # trajectories grow five times a second
 # a replay that begins this near to the opening of a page was asked for by the person at it
 ASKED_FOR_S = 60.0
 ASK, ROLE = "Show", "Role"  # labels of what the page and the relay write into
-VIEWER, OPERATORS = "viewer", ("operator", "admin")  # what the relay says
+VIEWER, OPERATORS = "viewer", ("operator", "admin")  # what the relay says, and after it the name
 FIRST = {"nav": "position", "attitude": "tilt", "rate": "rates"}  # page, by what moves a body
 # Labels of the inputs that change this browser's own view only; anybody may use them, and an order
 # may not have a label that stands here.
@@ -47,8 +50,8 @@ class View:
         self._device_chosen = False  # by the person, or by the replay that it began
         self._opened_at = time.monotonic()
         self._generation = -1
-        self._window, self._size = "30", "l"
-        self._paused_at: float | None = None
+        self._span, self._size, self._rank = Span(), "l", ""
+        self._derived: list[str] = []  # lines of expression.py
         self._tracks_at = 0.0
         self._lock = threading.RLock()  # callbacks of the browser against the loops
         self._page = 0
@@ -75,7 +78,7 @@ class View:
         """Poses, and less often trajectories."""
         with self._lock, self._store.lock, self._client.atomic():
             device = self._device()
-            if device is None or self._paused_at is not None:
+            if device is None or self._span.paused_at is not None:
                 return
             self.scene.update(device)
             now = time.monotonic()
@@ -97,24 +100,24 @@ class View:
                 text = "no device has spoken yet: is `gyrofree gateway` running?"
                 self._devices.waiting(text if self._desk.connected else router)
                 return
-            if device.generation != self._generation and self._paused_at is not None:
+            if device.generation != self._generation and self._span.paused_at is not None:
                 self._pause(False)  # the frozen window belongs to a time axis that is gone
             self._generation = device.generation
             snapshot = self._snapshot(device, now)
             if not self._page_chosen:
                 self._open(KEYS.index(FIRST[device.body]))
-            if self._paused_at is None:
+            if self._span.paused_at is None:
                 self._devices.update(snapshot)
             page = self._pages[self._page]
             page.update(snapshot)
             page.tidy()
 
     def _snapshot(self, device: Device, now: float) -> Snapshot:
-        t1 = device.t_newest if self._paused_at is None else self._paused_at
-        t0 = max(t1 - WINDOWS[self._window], device.t_first)
         clock = self._store.replay.clock(device.name, now)
-        t1 = max(t1, t0 + 1.0)
-        return Snapshot(self._store, device, t0, t1, clock, self._choice.dark, self._cursors)
+        limits, dark = self._span.limits(device), self._choice.dark
+        return Snapshot(
+            self._store, device, *limits, clock, dark, self._cursors, tuple(self._derived)
+        )
 
     # --- building
 
@@ -159,8 +162,10 @@ class View:
             title=page.title,
             missing=page.missing(device) if device is not None else "",
             rooms=self._rooms,
-            window=self._window,
-            paused=self._paused_at is not None,
+            window=self._span.window,
+            paused=self._span.paused_at is not None,
+            **self._span.stated(device),
+            derived=[] if device is None else judged(device, self._derived),
             dark=self._choice.dark,
             follow=self._choice.follow,
             size=self._size,
@@ -179,7 +184,11 @@ class View:
             if wish.prefer and not self._device_chosen and not self._wanted:
                 self._choose(wish.prefer, by_person=False)
             if wish.window:
-                self._window = wish.window
+                self._span.window = wish.window
+            if wish.zoom is not None:
+                self._span.zoom = wish.zoom
+            if wish.derived is not None:
+                self._derived = many(wish.derived)
             if wish.dark is not None and wish.dark != self._choice.dark:
                 self._set_dark(wish.dark)
             if wish.pause is not None:
@@ -196,7 +205,7 @@ class View:
             for what in wish.do:
                 if what == "camera":
                     self._reset_camera()
-                if self._role.value in OPERATORS:  # an order, by an input that is anybody's
+                if self._rank in OPERATORS:  # an order, by an input that is anybody's
                     self._timeline.do(what)
             self._say_state(self._device())
 
@@ -240,15 +249,18 @@ class View:
     def _set_rights(self) -> None:
         """A viewer sees the orders, and that and why they are not his."""
         with self._lock:
-            barred = self._role.value == VIEWER
+            self._rank, _, user = self._role.value.partition(" ")
+            barred = self._rank == VIEWER
             self._timeline.bar(barred)
+            for page in self._pages:
+                page.user = user
             for handle in self.orders:
                 if handle is not self._role and not isinstance(handle, viser.GuiButtonGroupHandle):
                     handle.disabled = barred
             self._say_rights()
 
     def _say_rights(self) -> None:
-        barred = self._role.value == VIEWER and bool(self._pages[self._page].orders)
+        barred = self._rank == VIEWER and bool(self._pages[self._page].orders)
         text = "You look as viewer: what gives orders is greyed, it takes the role operator."
         if barred:
             self._rights.content = str(alert(text))
@@ -258,9 +270,9 @@ class View:
     def _pause(self, pause: bool) -> None:
         with self._lock, self._store.lock:
             device = self._device()
-            if pause and self._paused_at is not None:
+            if pause and self._span.paused_at is not None:
                 return
-            self._paused_at = device.t_newest if pause and device is not None else None
+            self._span.paused_at = device.t_newest if pause and device is not None else None
 
     def _reset_camera(self) -> None:
         with self._lock, self._store.lock:
@@ -272,7 +284,7 @@ class View:
             if name != self._device_name and self._store.device(name) is not None:
                 self._device_chosen |= by_person
                 self._device_name = name
-                if self._paused_at is not None:
+                if self._span.paused_at is not None:
                     self._pause(False)
 
     def _choose_page(self, index: int) -> None:

@@ -14,10 +14,11 @@ from urllib.parse import parse_qs
 
 from dashboard.data.device import Device
 from dashboard.scene.panels.base import Panel
+from dashboard.scene.span import WINDOWS
+from logs.figures.words import meaning
 
-WINDOWS = {"10": 10.0, "30": 30.0, "60": 60.0, "300": 300.0, "600": 600.0}  # s
 LAYERS = ("truth", "estimates", "sensors", "rate", "trajectory", "fixes", "ellipsoid", "grid")
-MOST_FIELDS = 16
+MOST_FIELDS = 24
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,11 @@ def offered(pages: Sequence[type[Panel]], device: Device) -> list[dict[str, Any]
     found = []
     for room in WORKSPACES:
         of_it = [(page, page.missing(device)) for page in pages_of(room.key, pages)]
-        there = [{"key": page.key(), "title": page.title} for page, why in of_it if not why]
+        there = [
+            {"key": page.key(), "title": page.title, "hint": meaning(page.title)}
+            for page, why in of_it
+            if not why
+        ]
         absent = [{"title": page.title, "why": why} for page, why in of_it if why]
         found.append(
             {
@@ -79,6 +84,8 @@ class Wish:
     follow: bool | None = None
     layers: frozenset[str] | None = None  # those shown
     cursors: tuple[float, float] | tuple[()] | None = None  # s on the device's axis; (): none
+    zoom: tuple[float, float] | tuple[()] | None = None  # s since 1970; (): follow the data
+    derived: str | None = None  # curves of one's own, as expression.many reads them
     do: tuple[str, ...] = field(default=())  # "camera", "play", "back", "on"
 
     @classmethod
@@ -102,17 +109,22 @@ class Wish:
             pause=switch.get(given.get("pause", "")),
             follow=switch.get(given.get("follow", "")),
             layers=None if layers is None else frozenset(layers.split(".")) & frozenset(LAYERS),
-            cursors=_cursors(given.get("cursors")),
+            cursors=_pair(given.get("cursors")),
+            zoom=_pair(given.get("zoom"), decimals=4),
+            derived=given.get("derived"),
             do=tuple(given.get("do", "").split(".")),
         )
 
 
-def _cursors(text: str | None) -> tuple[float, float] | tuple[()] | None:
+def _pair(text: str | None, decimals: int = 9) -> tuple[float, float] | tuple[()] | None:
+    """`from_until`, s; what is no such pair stands for none."""
     try:
         a, b = map(float, (text or "").split("_"))
     except ValueError:
         return None if text is None else ()
-    return (min(a, b), max(a, b)) if abs(a) + abs(b) < 1e12 else ()
+    if not abs(a) + abs(b) < 1e12:
+        return ()
+    return round(min(a, b), decimals), round(max(a, b), decimals)
 
 
 def stated(**state: Any) -> str:

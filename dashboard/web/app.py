@@ -25,6 +25,7 @@ from dashboard.web.first import pages as first_pages
 from dashboard.web.frame import proxy
 from dashboard.web.front import Front
 from dashboard.web.guard import Guard
+from dashboard.web.map import routes as map_routes
 from dashboard.web.programs import live_api, users_page
 from dashboard.web.users import UsersError
 
@@ -45,6 +46,7 @@ def create_app(front: Front) -> ASGIApp:
     app.include_router(api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(desk_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(live_api.routes, responses={401: {"description": "not signed in"}})
+    app.include_router(map_routes.routes, responses={401: {"description": "not signed in"}})
     app.include_router(intake_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(session_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(compare_api.routes, responses={401: {"description": "not signed in"}})

@@ -10,12 +10,15 @@ from fastapi.responses import HTMLResponse, JSONResponse, Response
 
 from dashboard.web import api
 from dashboard.web.api import SignedIn, file_of
+from dashboard.web.desk_api import ChannelsOut, NamedOut, functions
 from dashboard.web.front import Front, front_of
 from dashboard.web.pages import render
 from dashboard.web.schemas import session_out
+from logs.figures.expression import many
 from messages.text import plain
 from sessions.library.annotations import read_annotations
 from sessions.library.compare import METHODS, MOST, CompareError, Comparison, as_dict, compare
+from sessions.library.derived import channels
 from sessions.library.overlay import POINTS, drawing
 from sessions.recording.manifest import SessionError
 
@@ -59,6 +62,9 @@ def comparison(
     cursors: Annotated[
         str, Query(max_length=60, description="begin_end of a stretch to be measured, s")
     ] = "",
+    derived: Annotated[
+        str, Query(max_length=2000, description="expressions over channels, `;` between them")
+    ] = "",
 ) -> Response:
     """202 with the share done while a recording is still being read; 409 for sessions that cannot
     be compared.
@@ -85,13 +91,29 @@ def comparison(
     except CompareError as error:
         raise HTTPException(409, str(error)) from None
     window = [value if value is None or math.isfinite(value) else None for value in (begin, end)]
-    drawn = drawing(result, window[0], window[1], points, everything, _cursors(cursors))
+    own = many(derived)
+    drawn = drawing(result, window[0], window[1], points, everything, _cursors(cursors), own)
     _add_notes(front, result, drawn)
     facts = as_dict(result)
     table = {name: facts[name] for name in ("bin_s", "differences", "track_differences")}
     errors = [one["errors"] for one in facts["sessions"]]
     return JSONResponse(
         {"state": "reading" if done else "done", "done": share, "errors": errors} | table | drawn
+    )
+
+
+@routes.get("/api/sessions/{session}/channels", summary="What an expression over it may name")
+def session_channels(request: Request, session: str, who: SignedIn) -> ChannelsOut:
+    """Empty while the recording is still being read."""
+    front = front_of(request)
+    try:
+        found, _ = front.readings.get(file_of(front, session))
+    except OSError as error:
+        raise HTTPException(409, f"session {session}: {error.strerror}") from None
+    known = channels(found).values() if found is not None else ()
+    return ChannelsOut(
+        channels=[NamedOut(name=one.name, unit=one.unit, who=one.who) for one in known],
+        functions=functions(),
     )
 
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from dashboard.settings import DashboardSettings
 from dashboard.web.auth import Backoff
@@ -85,6 +86,27 @@ class Connections:
 
         return Counted
 
+    def sockets(self) -> type[WebSocketsSansIOProtocol]:
+        """What uvicorn makes of a connection that becomes a WebSocket. Text that is none ends it
+        with one line; uvicorn itself would log a traceback for each.
+        """
+        connections = self
+
+        class Checked(WebSocketsSansIOProtocol):
+            def send_receive_event_to_app(self) -> None:
+                if self.curr_msg_data_type == "text" and not self.close_sent:
+                    try:
+                        b"".join(self.frames).decode()
+                    except UnicodeDecodeError as error:
+                        connections.count(_network(self.transport), f"text is not UTF-8: {error}")
+                        self.frames = []
+                        self.conn.send_close(1007, "text must be UTF-8")
+                        self.handle_parser_exception()
+                        return
+                super().send_receive_event_to_app()
+
+        return Checked
+
     def enter(self, transport: asyncio.Transport, protocol: H11Protocol) -> Connection | None:
         """Count a new connection, or end it when nobody can give way."""
         address = _network(transport)
@@ -127,10 +149,15 @@ class Connections:
             one.transport.abort()
         else:
             one.transport.close()
-        self.ended[why] += 1
-        n = self.ended[why]
-        if n & (n - 1) == 0:  # a flood stays readable
-            log.warning("connection of %s ended: %s (%d so far)", one.address, why, n)
+        self.count(one.address, why)
+
+    def count(self, address: str, why: str) -> None:
+        """One that was ended, by the words before a colon; said unless there is a flood of them."""
+        kind = why.partition(":")[0]
+        self.ended[kind] += 1
+        n = self.ended[kind]
+        if n & (n - 1) == 0:
+            log.warning("connection of %s ended: %s (%d so far)", address, why, n)
 
     def _look(self) -> None:
         """End those that said nothing for too long, or take nothing."""

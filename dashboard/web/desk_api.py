@@ -1,19 +1,27 @@
-"""REST of the live page: a person's notes on a device, and what he last had on the page."""
+"""REST of the live page: a person's notes on a device, what he last had on the page, and the
+emergency stop of tables that are driven.
+"""
 
 import time
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, HTTPException, Request
 from pydantic import BaseModel, Field
 
+from dashboard.data.alarms import drives
+from dashboard.data.channels import channels
 from dashboard.data.store import Store
 from dashboard.web.auth import Role
 from dashboard.web.front import Asker, asker, front_of, needs
 from dashboard.web.schemas import Lines, Strict
+from dashboard.web.views import LONGEST
+from logs.figures.quantity import HINTS
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
+from messages.text import plain
 
 routes = APIRouter(prefix="/api")
+SWITCH_OFF = "THE TABLE MAY STILL TURN, switch it off by hand"
 
 SignedIn = Annotated[Asker, Depends(asker)]
 Same = Annotated[Asker, Depends(needs(Role.viewer))]
@@ -32,12 +40,56 @@ class NoteOut(BaseModel):
     message: str
 
 
+class TableOut(BaseModel):
+    device: str
+    table: str = Field(description="its name")
+    rate_radps: float = Field(description="that it was last said to turn at")
+    silent_s: float = Field(description="since the last word of the procedures")
+
+
+class StopOut(BaseModel):
+    message: str
+
+
 class ViewIn(Strict):
-    view: str = Field(max_length=500, description="the live page's link after the question mark")
+    view: str = Field(max_length=LONGEST, description="the page's link after the question mark")
+    page: Literal["live", "session"] = Field(default="live", description="session: any of them")
 
 
 class ViewOut(BaseModel):
     view: str
+
+
+class NamedOut(BaseModel):
+    name: str
+    unit: str
+    who: str = Field(description="an estimator or an instrument; of a function, what it does")
+
+
+class ChannelsOut(BaseModel):
+    channels: list[NamedOut] = Field(description="what an expression may name")
+    functions: list[NamedOut]
+
+
+@routes.get("/devices/{device}/channels", summary="What an expression over a device may name")
+def named_channels(request: Request, device: str, who: SignedIn) -> ChannelsOut:
+    store = front_of(request).store
+    if store is None:
+        raise HTTPException(503, "this dashboard has no connection to the bus")
+    with store.lock:
+        found = store.device(device)
+        if found is None:
+            raise HTTPException(404, "nothing has been heard of such a device")
+        known = list(channels(found).values())
+    return ChannelsOut(
+        channels=[NamedOut(name=one.name, unit=one.unit, who=one.who) for one in known],
+        functions=functions(),
+    )
+
+
+def functions() -> list[NamedOut]:
+    """What an expression may call."""
+    return [NamedOut(name=name, unit="", who=hint) for name, hint in HINTS.items()]
 
 
 @routes.post("/devices/{device}/notes", summary="Keep a note or a mark of this moment (operator)")
@@ -73,6 +125,43 @@ def note(request: Request, device: str, body: NoteIn, who: Operator) -> NoteOut:
     return NoteOut(at_s=at_s, message=f"{what} at {at_s:.1f} s: {kept}")
 
 
+@routes.get("/tables", summary="Tables that a procedure drives now")
+def tables(request: Request, who: SignedIn) -> list[TableOut]:
+    store = front_of(request).store
+    if store is None:
+        return []
+    with store.lock:
+        found = [
+            (store.devices[name], store.devices[name].get("procedure")) for name in store.names()
+        ]
+        return [
+            TableOut(
+                device=device.name,
+                table=plain(heard.message.table),
+                rate_radps=heard.message.table_radps,
+                silent_s=heard.age(),
+            )
+            for device, heard in found
+            if heard is not None and drives(heard.message)
+        ]
+
+
+@routes.post("/devices/{device}/stop", summary="EMERGENCY STOP of its table (operator)")
+def stop(request: Request, device: str, who: Operator) -> StopOut:
+    """The table stops at once and the procedure ends; HTTP 503 where that is not certain."""
+    desk = front_of(request).desk
+    if desk is None:
+        raise HTTPException(503, f"{SWITCH_OFF}: this dashboard has no connection to the bus")
+    action = pb.ProcedureCommand.ACTION_STOP
+    try:
+        reply = desk.procedure(pb.ProcedureCommand(action=action, device=device, user=who.name))
+    except (OrderError, ValueError) as error:
+        raise HTTPException(503, f"{SWITCH_OFF}: {error}") from None
+    if not reply.ok:
+        raise HTTPException(503, reply.message)
+    return StopOut(message=reply.message)
+
+
 def recording(store: Store) -> bool:
     """Is a recording going on, as last heard?"""
     return store.recorder is not None and store.recorder.message.recording
@@ -83,13 +172,13 @@ def view(request: Request, who: SignedIn) -> ViewOut:
     return ViewOut(view=front_of(request).views.of(who.name))
 
 
-@routes.post("/me/view", summary="Remember what you have on the live page")
+@routes.post("/me/view", summary="Remember what you have on the live page, or on those of sessions")
 def keep_view(request: Request, body: ViewIn, who: Same) -> ViewOut:
     views = front_of(request).views
     try:
-        views.keep(who.name, body.view)
+        views.keep(who.name, body.view, body.page)
     except ValueError as error:
         raise HTTPException(422, str(error)) from None
     except OSError as error:
         raise HTTPException(503, f"your view could not be kept: {error.strerror}") from None
-    return ViewOut(view=views.of(who.name))
+    return ViewOut(view=views.of(who.name, body.page))

@@ -1,13 +1,13 @@
-"""REST for sessions that are made from the page: a log sent in pieces and imported, a session
-estimated again.
+"""REST for what is sent from the page in pieces: a log that becomes a session, the photo of a unit;
+and for a session estimated again.
 """
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, HTTPException, Query, Request
+from fastapi import APIRouter, HTTPException, Query, Request, Response
 from pydantic import BaseModel, Field
 
-from dashboard.web.api import Operator, SignedIn, file_of
+from dashboard.web.api import Operator, SignedIn, file_of, find_session
 from dashboard.web.front import Front, front_of
 from dashboard.web.schemas import Line, Strict
 from dashboard.web.session_api import JobOut, start_job
@@ -15,10 +15,12 @@ from dashboard.web.uploads import FILES, Upload, UploadError, samples_and_fixes
 from logs.sheet import LogError
 from logs.tables.preview import TARGETS, look, rewritten
 from messages import text
+from sessions.report import photo
 
 routes = APIRouter(prefix="/api")
 
 LARGEST = 1 << 30  # bytes of one log
+PHOTOS = (".jpg", ".jpeg", ".png")
 NAMED = r"^[a-z][a-z0-9_-]{0,31}$"
 ESTIMATOR_NAME = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")]
 SETTING = Annotated[str, Field(pattern=r"^[a-z0-9_-]+(\.[a-z0-9_-]+){0,3}$", max_length=100)]
@@ -88,7 +90,8 @@ async def take_piece(
     file = text.composed(file)  # one file, whether its umlauts come in one piece or in two
     if fault := text.file_name(file):
         raise HTTPException(422, f"file {text.plain(file, 80)}: {fault}: give it another name")
-    if not file.lower().endswith(".csv"):
+    most = photo.MOST_BYTES if file.lower().endswith(PHOTOS) else LARGEST
+    if not file.lower().endswith((".csv", *PHOTOS)):
         raise HTTPException(422, f"file {text.plain(file, 80)}: want a CSV file, like imu.csv")
     body = await request.body()
     with found.lock:
@@ -100,10 +103,9 @@ async def take_piece(
             raise HTTPException(
                 409, f"{file}: {have} bytes are here, so the next piece begins there, not at {at}"
             )
-        if have + len(body) > LARGEST:
-            raise HTTPException(
-                413, f"{file}: larger than {LARGEST >> 20} MB: use `gyrofree import`"
-            )
+        if have + len(body) > most:
+            hint = ": use `gyrofree import`" if most == LARGEST else ": take it smaller"
+            raise HTTPException(413, f"{file}: larger than {most >> 20} MB{hint}")
         try:
             with path.open("ab") as stream:
                 stream.write(body)
@@ -158,6 +160,43 @@ def finish_import(request: Request, upload: int, body: ImportOrder, who: Operato
     except HTTPException:
         found.reading = False  # it can be tried again
         raise
+
+
+class PhotoOrder(Strict):
+    upload: int = Field(description="that the photo was sent in, alone")
+
+
+class PhotoOut(BaseModel):
+    sha256: str = Field(description="of the photo as it is kept, a JPEG without what cameras add")
+
+
+@routes.post("/sessions/{session}/photo", summary="Keep the photo of its unit (operator)")
+def keep_photo(request: Request, session: str, body: PhotoOrder, who: Operator) -> PhotoOut:
+    front = front_of(request)
+    find_session(front, session)
+    found = _upload(front, body.upload, who.name)
+    files = list(found.folder.iterdir())
+    if len(files) != 1 or not files[0].name.lower().endswith(PHOTOS):
+        raise HTTPException(409, "want one photo, sent before: a JPEG or PNG")
+    try:
+        kept = photo.keep(front.catalogue.root / session, files[0].read_bytes())
+    except photo.PhotoError as error:
+        raise HTTPException(422, str(error)) from None
+    except OSError as error:
+        raise HTTPException(507, f"the photo cannot be kept: {error.strerror}") from None
+    finally:
+        front.uploads.forget(body.upload)
+    return PhotoOut(sha256=kept.sha256)
+
+
+@routes.get("/sessions/{session}/photo", summary="The photo of its unit", response_class=Response)
+def unit_photo(request: Request, session: str, who: SignedIn) -> Response:
+    front = front_of(request)
+    find_session(front, session)
+    found = photo.read(front.catalogue.root / session)
+    if found is None:
+        raise HTTPException(404, f"session {session} has no photo of its unit")
+    return Response(found.jpeg, media_type="image/jpeg")
 
 
 def _upload(front: Front, number: int, user: str) -> Upload:

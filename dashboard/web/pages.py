@@ -12,11 +12,11 @@ import jinja2
 from fastapi import APIRouter, Depends, HTTPException, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 
-from dashboard.terms import TERMS
 from dashboard.web import api
 from dashboard.web.auth import Role, WaitError, same_token
 from dashboard.web.front import Asker, address_of, asker, front_of
 from dashboard.web.users import UsersError
+from logs.figures.words import TERMS
 from messages.text import template_value
 
 log = logging.getLogger(__name__)

@@ -53,6 +53,11 @@ class EstimatorOut(BaseModel):
     us_per_sample: float
     gaps: int
     behind_s: float = Field(description="from the arrival of samples to their estimates, s")
+    skipped_s: float = Field(
+        description="s of samples passed over: the machine is too slow for all"
+    )
+    limit_hz: float = Field(description="estimates a second at most, while it is; 0: as set")
+    trouble: str = Field(description="what its process cannot do now, such as save its state")
 
 
 class AlarmOut(BaseModel):
@@ -158,6 +163,9 @@ def device_out(device: Device, stale_s: float, found: Iterable[Alarm] = ()) -> D
             us_per_sample=s.us_per_sample,
             gaps=s.gaps,
             behind_s=s.behind_s,
+            skipped_s=s.skipped_s,
+            limit_hz=s.limit_hz,
+            trouble=text.plain(s.trouble),
         )
         for name, s in states
     ]

@@ -3,6 +3,7 @@
 import json
 from dataclasses import dataclass
 from typing import Annotated
+from urllib.parse import parse_qs
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
@@ -17,6 +18,7 @@ from dashboard.web.trend import Point, Trend, draw
 from sessions.export.export import FORMATS
 from sessions.library.annotations import Annotations, read_annotations
 from sessions.recording.manifest import Manifest, SessionError
+from sessions.report import photo
 
 routes = APIRouter(include_in_schema=False)
 NO_REPORT = {"verdict": "", "specification": "", "estimator": ""}  # of a file that says less
@@ -58,8 +60,10 @@ def session_page(request: Request, session: str, who: SignedIn) -> HTMLResponse:
         manifest=manifest,
         annotations=_annotations(front, session),
         report=report,
+        photo=_photo(front, session),
         completeness=_completeness(manifest),
         formats=list(FORMATS),
+        derived=parse_qs(front.views.of(who.name, "session")).get("derived", [""])[0],
         can_replay=front.replay is not None and who.role >= Role.operator,
         can_change=who.role >= Role.operator,
         can_delete=who.role >= Role.admin,
@@ -127,6 +131,15 @@ def _report(front: Front, session: str) -> dict | None:
         return None
     whole = isinstance(found, dict) and isinstance(found.get("device"), str)
     return NO_REPORT | found if whole else None
+
+
+def _photo(front: Front, session: str) -> str:
+    """Digest of the photo of the unit; empty without one."""
+    try:
+        found = photo.read(front.catalogue.root / session)
+    except OSError:
+        return ""
+    return "" if found is None else found.sha256
 
 
 def _completeness(manifest: Manifest | None) -> list[Completeness]:

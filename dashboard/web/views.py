@@ -12,7 +12,9 @@ from dashboard.web.users import write_private
 
 log = logging.getLogger(__name__)
 
-VIEW = re.compile(r"[A-Za-z0-9=&._%+-]{0,500}")  # as URLSearchParams writes it
+LONGEST = 6000  # characters, with a person's own curves
+VIEW = re.compile(rf"[A-Za-z0-9=&._%+*-]{{0,{LONGEST}}}")  # as URLSearchParams writes it
+LIVE = "live"
 
 
 class Views:
@@ -22,16 +24,16 @@ class Views:
         self._path, self._lock = path, threading.Lock()
         self._views = self._load()
 
-    def of(self, user: str) -> str:
-        """The last one, empty for none."""
-        return self._views.get(user, "")
+    def of(self, user: str, page: str = LIVE) -> str:
+        """The last one of a kind of page, empty for none."""
+        return self._views.get(_key(user, page), "")
 
-    def keep(self, user: str, view: str) -> None:
+    def keep(self, user: str, view: str, page: str = LIVE) -> None:
         """Remember it. Raises ValueError for what is no view, OSError when it cannot be written."""
         if not VIEW.fullmatch(view):
             raise ValueError("view: want the part of a link after the question mark")
         with self._lock:
-            self._views[user] = view
+            self._views[_key(user, page)] = view
             write_private(self._path, json.dumps(self._views))
 
     def _load(self) -> dict[str, str]:
@@ -43,3 +45,8 @@ class Views:
         except (OSError, ValueError, TypeError, AttributeError, RecursionError) as error:
             log.warning("%s: %s: everybody's view begins anew", self._path, error)
             return {}
+
+
+def _key(user: str, page: str) -> str:
+    """No user's name has a blank."""
+    return user if page == LIVE else f"{user} {page}"

@@ -39,7 +39,7 @@ class AttitudeBoard:
         self.stream = Stream()
         self.filters: dict[str, AttitudeFilter] = {}
         self._names = names
-        self._limit = limit_hz
+        self.limit_hz = limit_hz  # of what is told; may be changed
         self._period = 0.0
         self._last: tuple[Array, Array] | None = None
 
@@ -61,7 +61,7 @@ class AttitudeBoard:
                 for attitude in self.filters.values():
                     attitude.step(*self._last)
         self._last = f_b[-1].copy(), omega_b[-1].copy()
-        return self._step(first_index, every(period_s, self._limit), f_b, omega_b)
+        return self._step(first_index, every(period_s, self.limit_hz), f_b, omega_b)
 
     def _step(
         self, first_index: int, step: int, f_b: Array, omega_b: Array

@@ -45,7 +45,7 @@ class NavBoard:
             config,
             names,
         )  # no closures: a process that goes on after a crash pickles this
-        self._limit = limit_hz
+        self.limit_hz = limit_hz  # of what is told; may be changed
         self.mutes = Mutes()
         self._newest = -math.inf  # s, time of the newest sample or fix
         self._epoch = 0
@@ -73,7 +73,7 @@ class NavBoard:
                 first_index,
                 self.stream.gaps,
             )
-        step = every(period_s, self._limit)
+        step = every(period_s, self.limit_hz)
         self._newest = float(t_s[-1]) if epoch != self._epoch else max(self._newest, float(t_s[-1]))
         self._epoch = epoch
         imu = np.column_stack([t_s, f_b, omega_b])

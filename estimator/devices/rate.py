@@ -1,6 +1,7 @@
 """All gyro-free rate estimators of one accelerometer board, side by side on the same samples."""
 
 import logging
+import math
 import time
 from typing import Any, NamedTuple
 
@@ -31,6 +32,22 @@ class RateOutput(NamedTuple):
     step: int  # each step-th sample is told
     estimator: str
     columns: RateColumns  # of the samples that are told
+
+
+def thinned(said: RateOutput, period_s: float, limit_hz: float) -> RateOutput | None:
+    """What is left of an output when at most limit_hz of its samples are told; period_s: of the
+    board. None when nothing is.
+    """
+    fewer = math.ceil(every(period_s, limit_hz) / said.step)
+    if fewer == 1:
+        return said
+    step = fewer * said.step
+    first = (step - 1 - said.index) % step // said.step
+    if first >= len(said.columns):
+        return None
+    ahead = first * said.step
+    rows = said.columns.part(slice(first, None, fewer))
+    return RateOutput(said.row + ahead, said.index + ahead, step, said.estimator, rows)
 
 
 class RateBoard:

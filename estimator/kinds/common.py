@@ -31,11 +31,23 @@ class Common:
         self.mutes = MuteDesk()
         self.clock_offset: dict[str, float] = {}  # s, UTC minus the board's clock, by device
         self._version = version
+        self._limits: dict[str, float] = {}  # Hz, by device, where fewer are published than set
         self._second: dict[tuple[str, str], int] = {}
 
     def heard(self, header: pb.Header) -> None:
         """A batch of samples came: how far the board's clock is from UTC."""
         self.clock_offset[header.device] = header.utc_ns * 1e-9 - header.device_us * 1e-6
+
+    def limit(self, device: str, hz: float) -> None:
+        """Publish at most so many estimates of a device per second; 0: as the settings say."""
+        if hz > 0.0:
+            self._limits[device] = hz
+        else:
+            self._limits.pop(device, None)
+
+    def limit_hz(self, device: str, usual_hz: float) -> float:
+        """How many estimates of a device may be published per second, by the settings usual_hz."""
+        return min(usual_hz, self._limits.get(device, usual_hz))
 
     def new_second(self, device: str, what: str, t_s: float) -> bool:
         """Whether t_s is in another second than the last time for the same device and `what`."""

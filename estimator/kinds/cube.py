@@ -23,7 +23,7 @@ from estimator.convert.samples import (
 from estimator.convert.status import rate_state
 from estimator.devices.gyro_free import GyroFreeNavigation
 from estimator.devices.navigation import NavBoard
-from estimator.devices.rate import RateBoard, RateOutput, WrongAxes
+from estimator.devices.rate import RateBoard, RateOutput, WrongAxes, thinned
 from estimator.kinds.common import Common, navigator_config
 from estimator.kinds.navigation import navigated
 from estimator.orders.calibration import CalibrationDesk
@@ -71,6 +71,8 @@ class Cube:
         self._common.heard(batch.header)
         if self._gyro_free is not None:
             navigation = self._gyro_free
+            usual_hz = self._common.settings.nav_limit_hz
+            navigation.board.limit_hz = self._common.limit_hz(self._device, usual_hz)
             said = navigation.feed(batch.header.epoch, batch.period_s, samples.t_s, states)
             out += navigated(self._common, batch, samples, navigation.board, said, navigation.names)
         return out
@@ -143,9 +145,12 @@ class Cube:
         states: list[RateOutput],
     ) -> list[Output]:
         """A message of each estimator, and poses now and then."""
-        device, step, out = self._device, every(batch.period_s, POSE_HZ), []
+        device, out = self._device, []
         card = "" if board.card is None else board.card.id
-        for said in states:
+        limit_hz = self._common.limit_hz(device, self._common.settings.rate_limit_hz)
+        few = (thinned(said, batch.period_s, limit_hz) for said in states)
+        for said in (said for said in few if said is not None):
+            step = every(batch.period_s, POSE_HZ) if limit_hz > POSE_HZ else said.step
             message = rate_batch(batch, card, said)
             out.append(Output(RATE, device, said.estimator, message))
             for k in range(len(said.columns)):

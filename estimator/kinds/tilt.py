@@ -21,10 +21,12 @@ class Tilt:
     def __init__(self, device: str, common: Common) -> None:
         settings = common.settings
         self._board = AttitudeBoard(device, settings.attitudes, settings.attitude_limit_hz)
+        self._common = common
 
     def take(self, batch: Batch, f_b: Array, omega_b: Array) -> list[Output]:
         """Specific force and rate (n, 3), m/s^2 and rad/s."""
-        header, out = batch.header, []
+        header, out, common = batch.header, [], self._common
+        self._board.limit_hz = common.limit_hz(header.device, common.settings.attitude_limit_hz)
         for o in self._board.feed(header.epoch, batch.first_index, batch.period_s, f_b, omega_b):
             then = sample_header(header, o.row * batch.period_s)
             message = attitude_message(then, batch, o.index, o.estimator, o.state)

@@ -26,6 +26,7 @@ class Vehicle:
         """Specific force in `samples`, rate (n, 3), rad/s."""
         header, common = batch.header, self._common
         common.heard(header)
+        self.board.limit_hz = common.limit_hz(header.device, common.settings.nav_limit_hz)
         started = common.clock()
         said = self.board.feed(
             header.epoch, batch.first_index, batch.period_s, samples.t_s, samples.values, omega_b

@@ -16,6 +16,7 @@ from datetime import date, timedelta
 from gateway.gnss.fields import Refused, utc_ns_of
 from gateway.gnss.fix import DAY_NS, Fix, Stamp, nmea_fix, ubx_fix
 from gateway.gnss.nmea import Sentence, sentence_of
+from gateway.gnss.sky import Sky, SkyReader
 from gateway.gnss.stream import GnssStream, RawMessage
 from gateway.gnss.ubx_read import Nav, nav_of
 
@@ -48,6 +49,8 @@ class GnssDecoder:
         self.stream = GnssStream()
         self.refused: Counter[str] = Counter()  # message and field: right checksum, wrong content
         self.heard: Counter[str] = Counter()  # messages with a right checksum, by name
+        self.sky: Sky | None = None  # the newest; whoever takes it puts None in its place
+        self._skies = SkyReader()
         self._ubx: _UbxEpoch | None = None
         self._nmea: _NmeaEpoch | None = None
         self._ubx_roster: set[str] = set()
@@ -98,6 +101,7 @@ class GnssDecoder:
     def _take(self, message: RawMessage) -> list[Fix]:
         name = message.name
         self.heard[name if name in self.heard or len(self.heard) < MOST_NAMES else "others"] += 1
+        self._look_up(message)
         if message.kind == "UBX":
             nav = nav_of(message.data)
             return [] if nav is None else self._take_ubx(nav)
@@ -105,6 +109,20 @@ class GnssDecoder:
             sentence = sentence_of(message.data)
             return [] if sentence is None else self._take_nmea(sentence)
         return []
+
+    def _look_up(self, message: RawMessage) -> None:
+        """What it says of satellites, which does not concern the fix."""
+        try:
+            if message.kind == "UBX":
+                sky = self._skies.ubx(message.data)
+            elif message.kind == "NMEA":
+                sky = self._skies.nmea(message.name, message.data)
+            else:
+                return
+        except Refused as refusal:
+            self.refused[refusal.text] += 1
+            return
+        self.sky = sky or self.sky
 
     # --- UBX
 

@@ -8,11 +8,12 @@ from gateway.gnss.heard import Heard, counts_of
 from gateway.gnss.link import GnssLink
 from gateway.samples import convert
 from gateway.time.wall import WallClock
-from messages.contract.topics import GNSS, LOCATION
+from messages.contract.topics import GNSS, LOCATION, SKY
 
 log = logging.getLogger(__name__)
 
 _DIGITS = str.maketrans("", "", "0123456789")  # the same words with other numbers are no news
+SKY_EVERY_US = 900_000  # of the board's clock: satellites move slowly, and receivers may say 10 Hz
 STEP_TOLD_S = 60.0  # a step of the receiver's time is said for so long
 
 
@@ -26,6 +27,7 @@ class GnssFlow:
         self._placed = self._unplaced = 0  # epochs with and without a position
         self._said = ""
         self._steps, self._step_s = 0, 0.0
+        self._sky_us: int | None = None  # of the last sky
 
     @property
     def good(self) -> int:
@@ -62,6 +64,7 @@ class GnssFlow:
 
     def restart(self) -> None:
         """The board has booted; the receiver goes on."""
+        self._sky_us = None
         self._link.restart()
 
     def take(self, data: bytes, device_us: int, monotonic_ns: int | None) -> None:
@@ -76,3 +79,14 @@ class GnssFlow:
             self._out.publish(GNSS, message, arrival.device_us, utc_ns)
             if message.quality:
                 self._out.send(LOCATION, convert.location_fix(message, self._device))
+        self._take_sky(device_us, monotonic_ns)
+
+    def _take_sky(self, device_us: int, monotonic_ns: int | None) -> None:
+        sky, self._link.decoder.sky = self._link.decoder.sky, None
+        if sky is None or (
+            self._sky_us is not None and 0 <= device_us - self._sky_us < SKY_EVERY_US
+        ):
+            return
+        self._sky_us = device_us
+        utc_ns = None if monotonic_ns is None else self._wall.utc_ns(monotonic_ns)
+        self._out.publish(SKY, convert.sky(sky), device_us, utc_ns)

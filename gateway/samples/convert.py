@@ -7,6 +7,7 @@ from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
 from firmware_protocol.codec import FLAG_SIMULATED
 from firmware_protocol.frames import Hello, Imu6, Status, field_names
 from gateway.gnss.fix import Fix, usual_sigma
+from gateway.gnss.sky import Sky
 from inertial.constants import GEOID_SIGMA, GRAVITY
 from messages.contract import gyrofree_pb2 as pb
 
@@ -15,6 +16,7 @@ ADXL345_SCALE = (
 )  # m/s^2 per count, full resolution, data sheet rev. G; before HELLO has come
 READS_IN_TURN = {0, 3}  # board ids of the LPC1768 cube, real and emulated
 READ_S = 17e-6  # one sensor: five SPI frames of 16 bits at 4.8 MHz, and the chip select
+LETTERS = "XGSECJRI"  # of pb.Sky.Constellation, as in RINEX
 NO_HEIGHT_SIGMA = 1e4  # m, of a height that is not known
 
 SOURCES = {
@@ -178,3 +180,25 @@ def location_fix(message: pb.GnssFix, device: str) -> LocationFix:
         location.position_covariance.extend([e, 0, 0, 0, n, 0, 0, 0, d])
         location.position_covariance_type = LocationFix.DIAGONAL_KNOWN
     return location
+
+
+def sky(seen: Sky) -> pb.Sky:
+    """Satellites in view as a bus message, without its header."""
+    used = {None: pb.Sky.USE_UNKNOWN, False: pb.Sky.USE_NO, True: pb.Sky.USE_YES}
+    message = pb.Sky(talker=seen.talker)
+    for one in seen.satellites:
+        message.satellites.add(
+            name=f"{LETTERS[one.system]}{one.number:02d}",
+            constellation=one.system,
+            number=one.number,
+            elevation_deg=_known(one.elevation_deg),
+            azimuth_deg=_known(one.azimuth_deg),
+            cn0_dbhz=_known(one.cn0_dbhz),
+            use=used[one.used],
+            signals=one.signals,
+        )
+    return message
+
+
+def _known(value: float | None) -> float:
+    return math.nan if value is None else value

@@ -38,6 +38,13 @@ def demo(
         Path, typer.Option(help="Where journal, recordings and users are kept.")
     ] = Path("var/demo"),
     record: Annotated[bool, typer.Option(help="Record from the start.")] = True,
+    by_hand: Annotated[
+        bool,
+        typer.Option(
+            "--by-hand",
+            help="The table is not driven: in a test a simulated person turns it, and slips once.",
+        ),
+    ] = False,
     fault: Fault = None,
 ) -> None:
     """Start router, gateway, estimator, recorder, dashboard and a board, and print one URL.
@@ -50,7 +57,11 @@ def demo(
     if source == "table":
         faults_of(fault)  # a wrong one is said here, not in the board's log
         board, device, layout = (
-            ["simulate", *(w for f in fault or () for w in ("--fault", f))],
+            [
+                "simulate",
+                *(["--slips=1"] * by_hand),
+                *(w for f in fault or () for w in ("--fault", f)),
+            ],
             "cube",
             "cube",
         )
@@ -72,7 +83,7 @@ def demo(
     plan = demonstration.Plan(
         folder.absolute(), board, device, layout, port, bus_port, record=record, time_scale=scale
     )
-    plan = replace(plan, table=source == "table")
+    plan = replace(plan, table=source == "table" and not by_hand)
     demonstration.run(replace(plan, estimator=demonstration.ESTIMATOR.get(source, "")))
 
 

@@ -65,6 +65,10 @@ def simulate(
     table_tcp: Annotated[
         int | None, typer.Option(help="The same on a TCP port of the loopback.")
     ] = None,
+    slips: Annotated[
+        int,
+        typer.Option(min=0, help="How often the person lets go who turns a table without a drive."),
+    ] = 0,
     csv: Annotated[
         Path | None,
         typer.Option(
@@ -102,7 +106,7 @@ def simulate(
         from gyrofree.running import simulate_hand
 
         options = simulator.Options(
-            link, tcp, motion, seed, device, once, faults, arm or 0.0, table_link, table_tcp
+            link, tcp, motion, seed, device, once, faults, arm or 0.0, table_link, table_tcp, slips
         )
         (simulate_hand if tilt else simulator).run(options, settings.bus, stop)
 

@@ -17,6 +17,7 @@ from gateway.virtual.board_link import PtyLink, TcpLink
 from gateway.virtual.virtual_board import BoardAccel, BoardPulse, Item
 from inertial.simulation.driven import DrivenTable
 from inertial.simulation.faults import Faults
+from inertial.simulation.person import Person
 from inertial.simulation.profiles import DEGREE
 from messages.bus.session import BusSettings, LateSession, subscribe
 from messages.contract import gyrofree_pb2 as pb
@@ -44,11 +45,19 @@ ACTIVE = (pb.ProcedureStatus.STATE_RUNNING, pb.ProcedureStatus.STATE_HELD)
 class TableDesk:
     """Takes orders for the table of one simulated board; `remote` while somebody drives it."""
 
-    def __init__(self, link: PtyLink | TcpLink | None, bus: BusSettings, device: str) -> None:
-        self._link, self._said = link, ""
+    def __init__(
+        self,
+        link: PtyLink | TcpLink | None,
+        bus: BusSettings,
+        device: str,
+        person: Person,
+    ) -> None:
+        """person: who turns the table where it is not driven."""
+        self._link, self._said, self._person = link, "", person
         self._by_line, self._wanted_up = False, None
         self._hand_rate: float | None = None
         self._heard_at = -np.inf
+        self._line_at, self._patience_s = -np.inf, np.inf
         self._table: DrivenTable | None = None
         self._order: tuple[float, float | None] = (0.0, None)
         self.driving = self.given_back = False  # in this run
@@ -104,12 +113,22 @@ class TableDesk:
         while not self._stop.wait(PATIENCE_S):
             if self._link is None or not self._link.connected:
                 self._said = ""
+                self._watch()
                 continue
             self._said = (self._said + self._link.read().decode(errors="replace"))[-4096:]
+            self._watch()
             while "\n" in self._said:
+                self._line_at = time.monotonic()
                 line, self._said = self._said.split("\n", 1)
                 if line.strip():
                     self._link.write(self._obey(line.strip()).encode() + b"\n")
+
+    def _watch(self) -> None:
+        """The table's own watchdog: whoever drives it must say something now and then."""
+        silent_s = time.monotonic() - self._line_at
+        if self._by_line and self._order[0] != 0.0 and silent_s > self._patience_s:
+            log.warning("nothing heard for %.1f s: the table stops by itself", silent_s)
+            self._order = (0.0, None)
 
     def _obey(self, line: str) -> str:
         """The answer to one command."""
@@ -120,8 +139,11 @@ class TableDesk:
                     return IDENTITY
                 case "SYST:REM":
                     self._by_line, self._order = True, (0.0, None)
+                    self._patience_s = np.inf
                 case "SYST:LOC":
-                    self._by_line = False
+                    self._by_line, self._patience_s = False, np.inf
+                case "SYST:WATC":
+                    self._patience_s = _watchdog(float(value))
                 case "SENS:RATE?":
                     return f"{(self._table.rate() if self._table else 0.0) / DEGREE:.4f}"
                 case "SOUR:RATE?":
@@ -144,9 +166,9 @@ class TableDesk:
         if not self._by_line:
             raise ValueError("in local mode; send SYST:REM first")
         if not abs(omega) < 720.5 * DEGREE:
-            raise ValueError(f"{omega / DEGREE:g} deg/s: at most 720")
+            raise ValueError(f"{omega / DEGREE:g} °/s: at most 720")
         if acceleration is not None and not 0.0 < acceleration < 200.5 * DEGREE:
-            raise ValueError(f"{acceleration / DEGREE:g} deg/s^2: want 0 to 200")
+            raise ValueError(f"{acceleration / DEGREE:g} °/s^2: want 0 to 200")
         self._order = (omega, acceleration)
 
     # --- the motion
@@ -171,11 +193,25 @@ class TableDesk:
         log.info("the table is left to its profile")
 
     def _steer(self, table: DrivenTable) -> None:
-        omega, acceleration = self._order if self._by_line else (self._hand_rate or 0.0, None)
+        omega, acceleration = self._order
+        if not self._by_line:
+            seconds = STEP * table.period_s
+            omega = self._person.step(self._hand_rate or 0.0, seconds)
+            even = abs(omega - table.rate()) / seconds
+            acceleration = float(np.clip(even, 1e-3, table.acceleration))
         table.set_rate(np.clip(omega, -table.limit, table.limit), acceleration)
         if self._wanted_up is not None and table.standing:
             if table.turn_over(self._wanted_up):
                 self._wanted_up = None
+
+
+def _watchdog(seconds: float) -> float:
+    """Patience of the table's watchdog, s; 0 is none. Raises ValueError."""
+    if seconds == 0.0:
+        return np.inf
+    if not 0.5 <= seconds <= 60.0:
+        raise ValueError(f"{seconds:g} s: want 0 (none), or 0.5 to 60")
+    return seconds
 
 
 def until_it_ends(items: Iterator[Item], seconds: float, desk: TableDesk) -> Iterator[Item]:

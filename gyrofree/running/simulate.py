@@ -21,6 +21,7 @@ import zenoh
 from pynmeagps import GET, NMEAMessage
 
 from gateway.virtual.board_link import PtyLink, TcpLink
+from gateway.virtual.satellites import of_sky
 from gateway.virtual.virtual_board import (
     SIMULATED,
     BoardAccel,
@@ -33,6 +34,7 @@ from gyrofree.running.driven_table import TableDesk, until_it_ends
 from inertial.simulation.arm import arm_test, centre
 from inertial.simulation.driven import DrivenTable
 from inertial.simulation.faults import AxisFault, Faults
+from inertial.simulation.person import Person
 from inertial.simulation.profiles import Profile
 from inertial.simulation.table import BLOCK, TableTest, Truth
 from messages.bus.session import BusSettings, LateSession, Publishers
@@ -70,6 +72,7 @@ class Options:
     arm_m: float = 0.0
     table_link: Path | None = None  # where the table's text protocol is offered
     table_tcp: int | None = None
+    slips: int = 0  # of the person who turns a table that is not driven
 
 
 class TruthPublisher:
@@ -203,9 +206,8 @@ def _receiver(seed: int) -> Iterator[BoardBytes]:
     )  # the sky is another in each run
     for number in itertools.count():
         noise = draw.normal(0.0, 1.0, 3) * GPS_SIGMA
-        yield BoardBytes(
-            number * GPS_PERIOD + 0.005, sentences(noise, datetime.datetime.now(datetime.UTC))
-        )
+        utc = datetime.datetime.now(datetime.UTC)
+        yield BoardBytes(number * GPS_PERIOD + 0.005, sentences(noise, utc) + of_sky(utc, PLACE))
 
 
 def _rider(test: TableTest, seed: int) -> Iterator[BoardBytes]:
@@ -216,9 +218,8 @@ def _rider(test: TableTest, seed: int) -> Iterator[BoardBytes]:
         p, v = centre(test, t)
         p, v = p + draw.normal(size=3) * ARM_SIGMA_P, v + draw.normal(size=3) * ARM_SIGMA_V
         noise = np.array([p[0], p[1], -p[2]])
-        yield BoardBytes(
-            t + 0.005, sentences(noise, datetime.datetime.now(datetime.UTC), (v[0], v[1]))
-        )
+        utc = datetime.datetime.now(datetime.UTC)
+        yield BoardBytes(t + 0.005, sentences(noise, utc, (v[0], v[1])) + of_sky(utc, PLACE))
 
 
 def _table(
@@ -269,7 +270,8 @@ def run(options: Options, bus: BusSettings, stop: threading.Event) -> None:
     test = _test(options, 0)  # before the link: an unknown profile is said at once
     link, port = open_link(options)
     truths = TruthPublisher(bus, options.device)
-    desk = TableDesk(_table_line(options), bus, options.device)
+    person = Person(options.seed, options.slips)
+    desk = TableDesk(_table_line(options), bus, options.device, person)
     log.info("simulated cube, profile %s, seed %d, on %s", test.profile.name, options.seed, port)
     first = int(time.time()) & 0xFF  # boot counters differ from those of the last process
     try:

@@ -114,13 +114,13 @@ class Standstill:
         if f.std(axis=0).max() >= s.still_f:
             return f"the board shakes by {f.std(axis=0).max():.2f} m/s^2"
         if w.std(axis=0).max() >= s.still_w:
-            return f"the board shakes by {math.degrees(w.std(axis=0).max()):.1f} deg/s"
+            return f"the board shakes by {math.degrees(w.std(axis=0).max()):.1f} °/s"
         size = float(norm(f.mean(axis=0)))
         if abs(size - 9.81) > s.bias_f:
             return f"the board feels {size:.2f} m/s^2, which is not 1 g"
         if np.abs(w.mean(axis=0)).max() > s.bias_w:
             return (
-                f"the board turns steadily ({math.degrees(np.abs(w.mean(axis=0)).max()):.1f} deg/s)"
+                f"the board turns steadily ({math.degrees(np.abs(w.mean(axis=0)).max()):.1f} °/s)"
             )
         if self._count:
             tilted = np.abs(f.mean(axis=0) - self._sum_f / self._count).max()
@@ -128,5 +128,5 @@ class Standstill:
             if tilted >= s.tilt_f:
                 return f"the board tilted or was pushed ({tilted:.2f} m/s^2)"
             if turned >= s.turn_w:
-                return f"the board turned ({math.degrees(turned):.1f} deg/s)"
+                return f"the board turned ({math.degrees(turned):.1f} °/s)"
         return ""

@@ -11,6 +11,7 @@ from inertial.core import native
 from inertial.layouts.layout import Layout
 from inertial.rate import parity
 from inertial.rate.health_config import Config
+from inertial.rate.products_ekf import BIAS
 
 Array = NDArray[np.float64]
 
@@ -37,6 +38,8 @@ class Width(NamedTuple):
 
 
 FIRST_OFFSET = 2.5  # m/s^2, beyond which an axis at its first standstill is not believed
+# Sigmas of an uncalibrated offset that the rate filters bear; beyond it they see a motion.
+FIRST_SIGMAS = 3.2
 USUAL = Width()
 WIDER = tuple(Width(o, s) for o in (1.0, 3.0) for s in (0.0, 0.03, 0.06, 0.12))[1:]
 
@@ -54,8 +57,11 @@ class Belief:
         self._per_block = per_block
         self._J, self._Q = np.ascontiguousarray(layout.J), np.ascontiguousarray(layout.Q)
         errors = np.array([sensor.scale_error for sensor in layout.sensors])
+        self._theta = layout.theta_b
+        self._uncalibrated = np.array([sensor.bias for sensor in layout.sensors])
+        self._borne = np.maximum(self._uncalibrated, BIAS)
         self._scale = max(config.scale, config.scale_sigmas * float(errors.max()))
-        sigma = config.offset_sigmas * np.array([sensor.bias for sensor in layout.sensors])
+        sigma = config.offset_sigmas * self._uncalibrated
         n = layout.axes
         self.ratio = 1.0  # of the measured variance of the noise to the configured
         self.white = self.noise**2 / per_block
@@ -87,6 +93,27 @@ class Belief:
         if not self.learned.any():
             most = np.maximum(most, np.minimum(9.0 * most, FIRST_OFFSET**2))
         return not np.any((off - self.bias)[used] ** 2 > most[used])
+
+    def far_off(self, mean: Array, used: NDArray[np.bool_]) -> dict[int, float]:
+        """The used axes whose offset at a first standstill of these mean readings (N,) is beyond
+        what the rate filters bear, and that offset, m/s^2; none where they are so many that the
+        others cannot tell (H-13).
+        """
+        rest, found = used.copy(), {}
+        while np.count_nonzero(rest) > 6:
+            off = parity.offsets_at_rest(self._theta, mean, rest)
+            apart = np.diag(projection(self._theta[rest])).clip(1e-12)  # what is not taken for p
+            sigmas = np.abs(off[rest]) / (self._borne[rest] * np.sqrt(apart))
+            worst = int(np.argmax(sigmas))
+            if sigmas[worst] <= FIRST_SIGMAS:
+                break
+            axis = int(np.flatnonzero(rest)[worst])
+            rest[axis] = False
+            found[axis] = 0.0
+        if len(found) > len(used) // 6:
+            return {}
+        off = parity.offsets_at_rest(self._theta, mean, rest)
+        return {axis: float(off[axis]) for axis in found}
 
     def steady(self, window: Array, used: NDArray[np.bool_]) -> bool:
         """Does nothing but noise change over blocks (n, N)? Vibration shakes all axes alike and is

@@ -149,7 +149,7 @@ class RateColumns:
         variances = self.P[k].diagonal()
         if phase == Phase.INTEGRATING:
             spread = math.sqrt(variances.max()) * sight.DEG
-            return f"integration only, now {spread:.0f} deg/s uncertain"
+            return f"integration only, now {spread:.0f} °/s uncertain"
         size = math.hypot(*self.omega_b[k], math.sqrt(variances.sum()))
         sights = tuple(self.sight[k].tolist())
         return sight.reason(

@@ -207,7 +207,7 @@ def plot_bound(
                 linewidth=0.7,
                 label="error of the estimate",
             )
-        axes.set_ylabel(f"omega {'xyz'[k]}, deg/s")
+        axes.set_ylabel(f"omega {'xyz'[k]}, °/s")
         axes.grid(alpha=0.3)
     figure.axes[0].legend(loc="upper left", fontsize=8)
     figure.axes[0].set_title(title or "Posterior Cramer-Rao bound of the rate")

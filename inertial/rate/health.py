@@ -299,6 +299,8 @@ class HealthMonitor:
         if not self.belief.steady(window, self.used):
             return
         mean, used = window.mean(axis=0), self.used
+        if not self.belief.learned.any():
+            self._leave_out_far_off(mean)
         off = parity.offsets_at_rest(self.layout.theta_b, mean, used)
         if not self.belief.learn(off, mean, used):
             return
@@ -311,6 +313,12 @@ class HealthMonitor:
         omega = parity.OMEGA
         self._x[omega], self._P[omega, :], self._P[:, omega] = 0.0, 0.0, 0.0
         self._P[omega, omega] = 0.1**2 * np.eye(3)
+
+    def _leave_out_far_off(self, mean: Array) -> None:
+        """Axes that the first standstill shows to be far off."""
+        for i, off in self.belief.far_off(mean, self.used).items():
+            text = f"at rest {off:+.2f} m/s² off the others: calibrate it"
+            self._name(i, AxisState.BIASED, text, parity.OFFSET_OF, -1, off)
 
     def _at_first_rest(self) -> bool:
         """No standstill was learned yet, and so far the readings are those of one."""

@@ -35,7 +35,7 @@ def reason(
     """
     said = []
     if AMBIGUOUS in sights:
-        began = f"began while turning, at {size * DEG:.0f} deg/s"
+        began = f"began while turning, at {size * DEG:.0f} °/s"
         said.append(f"sign unknown: {began if two else f'passed zero with {_deg(sign_variance)}'}")
     for k, axis in enumerate("xyz"):
         if sights[k] == BLIND:
@@ -44,4 +44,4 @@ def reason(
 
 
 def _deg(variance: float) -> str:
-    return f"{np.sqrt(variance) * DEG:.1f} deg/s"
+    return f"{np.sqrt(variance) * DEG:.1f} °/s"

@@ -108,7 +108,7 @@ CONDITIONS: dict[str, Condition] = {
     "F": Condition("B, filter believes R/10", tuning=Tuning(r_scale=0.1)),
     "G": Condition("B, filter believes 10 R", tuning=Tuning(r_scale=10.0)),
     "H": Condition(
-        "bias step 0.3 m/s^2, 0.5 deg/s; filter models constant biases",
+        "bias step 0.3 m/s^2, 0.5 °/s; filter models constant biases",
         STEP,
         Tuning(constant_bias=True),
     ),

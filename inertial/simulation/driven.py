@@ -54,10 +54,10 @@ class DrivenTable(TableTest):
         ValueError beyond what the drive can.
         """
         if not abs(omega) <= self.limit:
-            raise ValueError(f"{omega / DEGREE:g} deg/s: at most {self.limit / DEGREE:g}")
+            raise ValueError(f"{omega / DEGREE:g} °/s: at most {self.limit / DEGREE:g}")
         if acceleration is not None and not 0.0 < acceleration <= self.acceleration:
             most = self.acceleration / DEGREE
-            raise ValueError(f"{acceleration / DEGREE:g} deg/s^2: want 0 to {most:g}")
+            raise ValueError(f"{acceleration / DEGREE:g} °/s^2: want 0 to {most:g}")
         with self._lock:
             self._target = omega
             self._ramp = self.acceleration if acceleration is None else acceleration

@@ -94,3 +94,13 @@ def line_colour(name: str, among: Iterable[str] = ()) -> str:
     if name == "gnss":
         return FIX
     return "#808080" if name in ("truth", "gyro") else estimator_colour(name, among)
+
+
+def slug(name: str) -> str:
+    """A name as a part of a channel's, which stands in an expression."""
+    return "".join(letter if letter.isalnum() else "_" for letter in name.lower())
+
+
+def axis_channel(k: int) -> str:
+    """The k-th axis of an array by its triad and direction: a1_x is a11."""
+    return f"a{k // 3 + 1}_{'xyz'[k % 3]}"

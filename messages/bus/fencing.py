@@ -9,7 +9,9 @@ finds out by the other's token and steps back.
 
 A claim is a Zenoh liveliness token `<base>/<number>-<id>`, which goes with its process's
 connection. While another has one, a newcomer waits; of two that claim at the same time the greater
-number serves.
+number serves. A number is believed when its publisher has claimed it: whoever sends a great one
+beside the process that serves silences nobody, and when the one with the greater number has gone,
+the one that is left is heard again.
 """
 
 import logging
@@ -21,7 +23,7 @@ import zenoh
 
 from messages.contract.checks import Refusal
 from messages.contract.door import device_of
-from messages.contract.topics import RECORDER, TopicError, check_name, parse
+from messages.contract.topics import ESTIMATES, GATEWAY, RECORDER, TopicError, check_name, parse
 
 log = logging.getLogger(__name__)
 
@@ -31,12 +33,60 @@ BYTES = 8  # of a number in an attachment
 KEYS = 1 << 16  # whose numbers are remembered
 FAR_NS = 100 * 365 * 86400 * 10**9  # a number is about a time; further ahead it is none
 
+CLAIMED_ESTIMATES = "estimates"  # in the tokens of estimators
+CLAIMS = 1 << 16  # live ones that are remembered
+
 Rank = tuple[int, str]  # number, and the session's id where two are equal
 
 
 def packed(number: int) -> bytes | None:
     """A number as an attachment; None for 0, which fences nothing."""
     return number.to_bytes(BYTES, "little") if number else None
+
+
+class Claims:
+    """Who has claimed what at this moment, as their tokens say; may be used by several threads."""
+
+    def __init__(self) -> None:
+        self._live: dict[str, set[Rank]] = {}  # by what is claimed
+        self._count = 0
+        self._lock = threading.Lock()
+
+    def heard(self, sample: zenoh.Sample) -> None:
+        """Zenoh's thread: a token has come or gone."""
+        key = str(sample.key_expr)
+        rank, about = rank_of(key), _claimed(*key.split("/")[-3:-1])
+        if rank is None:
+            return
+        with self._lock:
+            ranks = self._live.setdefault(about, set())
+            if sample.kind != zenoh.SampleKind.PUT:
+                self._count -= rank in ranks
+                ranks.discard(rank)
+            elif self._count < CLAIMS:
+                self._count += rank not in ranks
+                ranks.add(rank)
+            if not ranks:
+                del self._live[about]
+
+    def numbers(self, key: str) -> set[int]:
+        """Under which numbers messages of this key are claimed; empty when nobody has, and when
+        there are more claims than can be remembered.
+        """
+        try:
+            address = parse(key)
+        except TopicError:
+            return set()
+        with self._lock:
+            if self._count >= CLAIMS:
+                return set()
+            ranks = self._live.get(_claimed(address.device, address.topic.source), ())
+            return {number for number, _ in ranks}
+
+
+def _claimed(name: str, source: str) -> str:
+    """What a claim is about: a device's gateway, or estimates, whoever's they are."""
+    return f"{name}/{source}" if source == GATEWAY else ESTIMATES
 
 
 class Fence:
@@ -46,6 +96,7 @@ class Fence:
         """refuse(key, why, device): count and say a message that is not taken."""
         self._refuse = refuse
         self._numbers: dict[str, int] = {}
+        self.claims = Claims()
 
     def admit(self, key: str, attachment: "zenoh.ZBytes | None") -> bool:
         """Is this message of the newest publisher of its key? One without a number always is."""
@@ -53,17 +104,19 @@ class Fence:
             return True
         number = int.from_bytes(attachment.to_bytes(), "little")
         known = self._numbers.get(key, 0)
-        if number < known:
+        if number == known:
+            return True
+        claimed = self.claims.numbers(key)
+        if number < known and (number not in claimed or known in claimed):
             wanted = f"{known}, of the process that took its place"
             self._refuse(key, Refusal("stale", "publisher", str(number), wanted), device_of(key))
             return False
-        if number > known:
-            if number > time.time_ns() + FAR_NS:
-                why = Refusal("stale", "publisher", str(number), "a number about the present time")
-                self._refuse(key, why, device_of(key))
-                return False
-            if len(self._numbers) < KEYS or key in self._numbers:
-                self._numbers[key] = number
+        if number > time.time_ns() + FAR_NS or (claimed and number not in claimed):
+            wanted = f"a number that its publisher has claimed: {max(claimed, default=known)}"
+            self._refuse(key, Refusal("claim", "publisher", str(number), wanted), device_of(key))
+            return False
+        if len(self._numbers) < KEYS or key in self._numbers:
+            self._numbers[key] = number
         return True
 
     def highest(self, device: str, source: str) -> int:
@@ -78,8 +131,10 @@ class Fence:
                 found = max(found, number)
         return found
 
-    def declare(self, session: zenoh.Session, prefix: str) -> zenoh.Queryable:
-        """Tell whoever takes a device over which numbers were heard of it."""
+    def declare(self, session: zenoh.Session, prefix: str) -> "Declared":
+        """Watch who claims what from now on, and tell whoever takes a device over which numbers
+        were heard of it.
+        """
 
         def on_query(query: zenoh.Query) -> None:
             device = str(query.key_expr).split("/")[1]
@@ -89,7 +144,23 @@ class Fence:
                 name = RECORDER if device == "*" else device  # a reply's key names one
                 query.reply(f"{prefix}/{name}/fence", number.to_bytes(BYTES, "little"))
 
-        return session.declare_queryable(f"{prefix}/*/fence", on_query)
+        watches = [
+            session_watch(session, f"{prefix}/*/{kind}/*", self.claims.heard)
+            for kind in (GATEWAY, CLAIMED_ESTIMATES)
+        ]
+        return Declared([*watches, session.declare_queryable(f"{prefix}/*/fence", on_query)])
+
+
+class Declared:
+    """What a fence has declared on the bus."""
+
+    def __init__(self, parts: "list[zenoh.Subscriber[None] | zenoh.Queryable[None]]") -> None:
+        self._parts = parts
+
+    def undeclare(self) -> None:
+        """Take it back."""
+        for part in self._parts:
+            part.undeclare()
 
 
 def heard_of(session: zenoh.Session, prefix: str, device: str, source: str) -> int:
@@ -116,12 +187,24 @@ class Claim:
     def __init__(self, session: zenoh.Session, bases: Iterable[str], number: int) -> None:
         self.number, self.lost = number, threading.Event()
         self._session, self._bases = session, tuple(bases)
-        self._rank: Rank = (number, str(session.zid()))
-        self._tokens = [
-            session.liveliness().declare_token(f"{base}/{number:020d}-{session.zid()}")
+        self._id = str(session.zid())
+        self._tokens = self._declare()
+        self._watches: list[zenoh.Subscriber] = []
+
+    def _declare(self) -> list[zenoh.LivelinessToken]:
+        return [
+            self._session.liveliness().declare_token(f"{base}/{self.number:020d}-{self._id}")
             for base in self._bases
         ]
-        self._watches: list[zenoh.Subscriber] = []
+
+    def raise_to(self, number: int) -> None:
+        """Claim the same under a greater number, the one that messages are going to have."""
+        if number > self.number:
+            self.number, old = number, self._tokens
+            self._tokens = self._declare()
+            for token in old:
+                token.undeclare()
+            self.look()  # a round trip: the token is known before the first message
 
     def watch(self) -> None:
         """From now on `lost` is set when it comes to that."""
@@ -130,10 +213,11 @@ class Claim:
         ]
 
     def look(self) -> bool:
-        """Ask now; False, and `lost` is set, when another has it."""
-        if self._outdone(alive(self._session, self._bases)):
+        """Ask now; False when another has it, and `lost` is set, or when that is not known."""
+        ranks = alive(self._session, self._bases)
+        if self._outdone(ranks or ()):
             self.lost.set()
-        return not self.lost.is_set()
+        return ranks is not None and not self.lost.is_set()
 
     def release(self) -> None:
         """Give it up."""
@@ -141,7 +225,8 @@ class Claim:
             one.undeclare()
 
     def _outdone(self, ranks: Iterable[Rank]) -> bool:
-        return any(rank > self._rank for rank in ranks)
+        mine = self.number, self._id
+        return any(rank > mine and rank[1] != self._id for rank in ranks)
 
     def _heard(self, sample: zenoh.Sample) -> None:
         rank = rank_of(str(sample.key_expr))
@@ -171,7 +256,11 @@ def claim(
     """
     names, greatest, said = tuple(bases), 0, False
     while not stop.is_set():
-        others = [rank for rank in alive(session, names) if rank[1] != str(session.zid())]
+        ranks = alive(session, names)
+        if ranks is None:
+            stop.wait(RETRY_S)
+            continue
+        others = [rank for rank in ranks if rank[1] != str(session.zid())]
         if not others:
             greatest = max(greatest, heard())
             mine = Claim(session, names, max(own, greatest + 1) if greatest else own)
@@ -187,14 +276,18 @@ def claim(
     return None
 
 
-def alive(session: zenoh.Session, bases: Iterable[str]) -> list[Rank]:
-    """Numbers and ids of the tokens below the bases."""
+def alive(session: zenoh.Session, bases: Iterable[str]) -> list[Rank] | None:
+    """Numbers and ids of the tokens below the bases. None when that is not known: without a router,
+    or when it does not answer in time, nobody may be taken for gone.
+    """
     found = []
     for base in bases:
         for reply in session.liveliness().get(f"{base}/*", timeout=QUERY_S):
-            rank = None if reply.ok is None else rank_of(str(reply.ok.key_expr))
+            if reply.ok is None:
+                return None
+            rank = rank_of(str(reply.ok.key_expr))
             found += [] if rank is None else [rank]
-    return sorted(found)
+    return sorted(found) if list(session.info.routers_zid()) else None
 
 
 def rank_of(key: str) -> Rank | None:

@@ -184,6 +184,61 @@ class GnssFix(_message.Message):
     height_reference: HeightReference
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., fix_utc_ns: _Optional[int] = ..., latitude_deg: _Optional[float] = ..., longitude_deg: _Optional[float] = ..., height_m: _Optional[float] = ..., height_msl_m: _Optional[float] = ..., position_sigma_ned_m: _Optional[_Iterable[float]] = ..., v_n_mps: _Optional[_Iterable[float]] = ..., velocity_sigma_ned_mps: _Optional[_Iterable[float]] = ..., quality: _Optional[_Union[GnssFix.Quality, str]] = ..., satellites: _Optional[int] = ..., hdop: _Optional[float] = ..., talker: _Optional[str] = ..., device_time_s: _Optional[float] = ..., height_reference: _Optional[_Union[HeightReference, str]] = ...) -> None: ...
 
+class Sky(_message.Message):
+    __slots__ = ("header", "talker", "satellites")
+    class Constellation(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        CONSTELLATION_UNKNOWN: _ClassVar[Sky.Constellation]
+        CONSTELLATION_GPS: _ClassVar[Sky.Constellation]
+        CONSTELLATION_SBAS: _ClassVar[Sky.Constellation]
+        CONSTELLATION_GALILEO: _ClassVar[Sky.Constellation]
+        CONSTELLATION_BEIDOU: _ClassVar[Sky.Constellation]
+        CONSTELLATION_QZSS: _ClassVar[Sky.Constellation]
+        CONSTELLATION_GLONASS: _ClassVar[Sky.Constellation]
+        CONSTELLATION_NAVIC: _ClassVar[Sky.Constellation]
+    CONSTELLATION_UNKNOWN: Sky.Constellation
+    CONSTELLATION_GPS: Sky.Constellation
+    CONSTELLATION_SBAS: Sky.Constellation
+    CONSTELLATION_GALILEO: Sky.Constellation
+    CONSTELLATION_BEIDOU: Sky.Constellation
+    CONSTELLATION_QZSS: Sky.Constellation
+    CONSTELLATION_GLONASS: Sky.Constellation
+    CONSTELLATION_NAVIC: Sky.Constellation
+    class Use(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        USE_UNKNOWN: _ClassVar[Sky.Use]
+        USE_NO: _ClassVar[Sky.Use]
+        USE_YES: _ClassVar[Sky.Use]
+    USE_UNKNOWN: Sky.Use
+    USE_NO: Sky.Use
+    USE_YES: Sky.Use
+    class Satellite(_message.Message):
+        __slots__ = ("name", "constellation", "number", "elevation_deg", "azimuth_deg", "cn0_dbhz", "use", "signals")
+        NAME_FIELD_NUMBER: _ClassVar[int]
+        CONSTELLATION_FIELD_NUMBER: _ClassVar[int]
+        NUMBER_FIELD_NUMBER: _ClassVar[int]
+        ELEVATION_DEG_FIELD_NUMBER: _ClassVar[int]
+        AZIMUTH_DEG_FIELD_NUMBER: _ClassVar[int]
+        CN0_DBHZ_FIELD_NUMBER: _ClassVar[int]
+        USE_FIELD_NUMBER: _ClassVar[int]
+        SIGNALS_FIELD_NUMBER: _ClassVar[int]
+        name: str
+        constellation: Sky.Constellation
+        number: int
+        elevation_deg: float
+        azimuth_deg: float
+        cn0_dbhz: float
+        use: Sky.Use
+        signals: int
+        def __init__(self, name: _Optional[str] = ..., constellation: _Optional[_Union[Sky.Constellation, str]] = ..., number: _Optional[int] = ..., elevation_deg: _Optional[float] = ..., azimuth_deg: _Optional[float] = ..., cn0_dbhz: _Optional[float] = ..., use: _Optional[_Union[Sky.Use, str]] = ..., signals: _Optional[int] = ...) -> None: ...
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    TALKER_FIELD_NUMBER: _ClassVar[int]
+    SATELLITES_FIELD_NUMBER: _ClassVar[int]
+    header: Header
+    talker: str
+    satellites: _containers.RepeatedCompositeFieldContainer[Sky.Satellite]
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., talker: _Optional[str] = ..., satellites: _Optional[_Iterable[_Union[Sky.Satellite, _Mapping]]] = ...) -> None: ...
+
 class LinkStatus(_message.Message):
     __slots__ = ("header", "connected", "port", "message", "bytes_in", "good_frames", "good_bytes", "bad_chunks", "bad_bytes", "pending_bytes", "lost_frames", "device_dropped", "lost_samples", "reboots", "unknown_frames", "reconnects", "sample_rate_hz", "frame_rate_hz", "latency_p50_s", "latency_p99_s", "clock_skew_ppm", "clock_residual_s", "clock_window_s", "journal_sequence", "durable_sequence", "gnss_good", "gnss_bad", "damage", "published_sequence", "published_durable", "refused", "stops", "stopped_s", "clock_offset_s")
     class DamageEntry(_message.Message):
@@ -576,7 +631,7 @@ class Truth(_message.Message):
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., for_index: _Optional[int] = ..., q_nb: _Optional[_Iterable[float]] = ..., omega_ib_b_radps: _Optional[_Iterable[float]] = ..., alpha_b_radps2: _Optional[_Iterable[float]] = ..., f_b_mps2: _Optional[_Iterable[float]] = ..., angle_z_rad: _Optional[float] = ..., profile_time_s: _Optional[float] = ...) -> None: ...
 
 class EstimatorStatus(_message.Message):
-    __slots__ = ("header", "estimator", "samples", "gaps", "missing_samples", "us_per_sample", "state", "message", "bias_f_b_mps2", "bias_alpha_radps2", "layout", "version", "restart", "refused", "behind_s", "waiting")
+    __slots__ = ("header", "estimator", "samples", "gaps", "missing_samples", "us_per_sample", "state", "message", "bias_f_b_mps2", "bias_alpha_radps2", "layout", "version", "restart", "refused", "behind_s", "waiting", "trouble", "skipped_s", "limit_hz")
     class RefusedEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -600,6 +655,9 @@ class EstimatorStatus(_message.Message):
     REFUSED_FIELD_NUMBER: _ClassVar[int]
     BEHIND_S_FIELD_NUMBER: _ClassVar[int]
     WAITING_FIELD_NUMBER: _ClassVar[int]
+    TROUBLE_FIELD_NUMBER: _ClassVar[int]
+    SKIPPED_S_FIELD_NUMBER: _ClassVar[int]
+    LIMIT_HZ_FIELD_NUMBER: _ClassVar[int]
     header: Header
     estimator: str
     samples: int
@@ -616,7 +674,10 @@ class EstimatorStatus(_message.Message):
     refused: _containers.ScalarMap[str, int]
     behind_s: float
     waiting: int
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., samples: _Optional[int] = ..., gaps: _Optional[int] = ..., missing_samples: _Optional[int] = ..., us_per_sample: _Optional[float] = ..., state: _Optional[str] = ..., message: _Optional[str] = ..., bias_f_b_mps2: _Optional[_Iterable[float]] = ..., bias_alpha_radps2: _Optional[_Iterable[float]] = ..., layout: _Optional[str] = ..., version: _Optional[str] = ..., restart: _Optional[bytes] = ..., refused: _Optional[_Mapping[str, int]] = ..., behind_s: _Optional[float] = ..., waiting: _Optional[int] = ...) -> None: ...
+    trouble: str
+    skipped_s: float
+    limit_hz: float
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., samples: _Optional[int] = ..., gaps: _Optional[int] = ..., missing_samples: _Optional[int] = ..., us_per_sample: _Optional[float] = ..., state: _Optional[str] = ..., message: _Optional[str] = ..., bias_f_b_mps2: _Optional[_Iterable[float]] = ..., bias_alpha_radps2: _Optional[_Iterable[float]] = ..., layout: _Optional[str] = ..., version: _Optional[str] = ..., restart: _Optional[bytes] = ..., refused: _Optional[_Mapping[str, int]] = ..., behind_s: _Optional[float] = ..., waiting: _Optional[int] = ..., trouble: _Optional[str] = ..., skipped_s: _Optional[float] = ..., limit_hz: _Optional[float] = ...) -> None: ...
 
 class Horizon(_message.Message):
     __slots__ = ("n", "inputs", "membership_name", "membership", "crisp")

@@ -60,6 +60,7 @@ IMU = Topic("imu", pb.ImuBatch, 100, "gateway", "specific force and rate of a si
 TACHO = Topic("tacho", pb.TachoRate, 20, "gateway", "table rate from tachometer pulses")
 GNSS = Topic("gnss", pb.GnssFix, 4, "gateway", "GNSS epoch: position, velocity, quality")
 LOCATION = Topic("location", LocationFix, 4, "gateway", "the same position for any viewer")
+SKY = Topic("sky", pb.Sky, 1, "gateway", "satellites in view: direction, C/N0, used in the fix")
 LINK = Topic("link", pb.LinkStatus, 1, "gateway", "state and ledger of the line")
 BOARD = Topic("board", pb.BoardInfo, 0.1, "gateway", "what the board says of itself")
 TRUTH = Topic("truth", pb.Truth, 100, "simulator", "true motion; simulated boards only")
@@ -105,6 +106,7 @@ TOPICS: tuple[Topic, ...] = (
     TACHO,
     GNSS,
     LOCATION,
+    SKY,
     LINK,
     BOARD,
     TRUTH,

@@ -9,6 +9,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable
+from operator import itemgetter
 
 import zenoh
 from google.protobuf.message import DecodeError
@@ -22,7 +23,8 @@ log = logging.getLogger(__name__)
 
 ANSWER_S = 10.0  # an answer is a MB from the disk; a busy machine takes its time
 MOST_BYTES = 8 << 20  # of messages in one reply that we give, however much is asked for
-MOST_REPLY_BYTES = 32 << 20  # of one reply that we read
+MOST_REPLY_BYTES = 32 << 20  # of all replies to a question that we read
+MOST_REPLIES = 16  # to one question; a device has one publisher, or two that take turns
 LEAST_BYTES = 1 << 15  # of an answer that a busier machine is asked for
 
 
@@ -70,8 +72,12 @@ def ask(
     query: pb.HistoryQuery,
     timeout_s: float = ANSWER_S,
 ) -> pb.HistoryReply | None:
-    """The answer of one source, or of all of them put together (`*`); None when nobody answered."""
-    found = None
+    """The answer of one source, or of all of them put together (`*`); None when nobody answered.
+
+    Whoever answers is believed no further than `together` says; what is beyond the limits is said.
+    """
+    found: list[pb.HistoryReply] = []
+    size = 0
     replies = session.get(
         published_key(prefix, device, source),
         payload=query.SerializeToString(),
@@ -87,19 +93,44 @@ def ask(
                 reply.err.payload.to_bytes().decode(errors="replace")[:200],
             )
             continue
-        size = len(reply.ok.payload)
+        size += len(reply.ok.payload)
+        if size > MOST_REPLY_BYTES or len(found) >= MOST_REPLIES:
+            log.warning(
+                "history of %s: %d answers, %d bytes, want at most %d and %d: the rest is left out",
+                device,
+                len(found) + 1,
+                size,
+                MOST_REPLIES,
+                MOST_REPLY_BYTES,
+            )
+            break
         try:
-            if size > MOST_REPLY_BYTES:
-                raise DecodeError(f"{size} bytes, want at most {MOST_REPLY_BYTES}")
-            answer = pb.HistoryReply.FromString(reply.ok.payload.to_bytes())
+            found.append(pb.HistoryReply.FromString(reply.ok.payload.to_bytes()))
         except DecodeError as error:
             log.warning("history of %s: %s", device, error)
-            continue
-        if found is None:
-            found = answer
-        else:
-            found.MergeFrom(answer)
-    return found
+    return together(found)
+
+
+def together(answers: list[pb.HistoryReply]) -> pb.HistoryReply | None:
+    """Answers of several publishers as one; None without any.
+
+    Of two processes that took turns the older one's messages come first, whoever answered first: a
+    run is greater than all that were before it.
+    """
+    if len(answers) < 2:
+        return answers[0] if answers else None
+    whole = pb.HistoryReply()
+    ordered: list[tuple[int, pb.HistoryItem]] = []
+    for answer in answers:
+        whole.next = max(whole.next, answer.next)
+        whole.durable = max(whole.durable, answer.durable)
+        whole.first_kept = max(whole.first_kept, answer.first_kept)
+        run = 0  # messages without one stay behind those they came with
+        for item in answer.items:
+            run = max(run, item.run)
+            ordered.append((run, item))
+    whole.items.extend(item for _, item in sorted(ordered, key=itemgetter(0)))
+    return whole
 
 
 class Asker:

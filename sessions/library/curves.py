@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating[Any]]
 
 FILE = "curves.npz"
-FORMAT = 1
+FORMAT = 2
 BINS = 100_000  # at most, per line
 STEPS = (1, 2, 5)  # bins are 1, 2 or 5 times a power of ten, s
 
 RATE, GYRO, TACHO, TRUTH = "rate", "gyro", "tacho", "truth"
+AXES, FORCE = "axes", "force"  # what accelerometers read, m/s²
 COMPONENTS = {
     RATE: ("x", "y", "z", "angle_z"),
     TRUTH: ("x", "y", "z", "angle_z"),
@@ -42,6 +43,7 @@ class Line:
     mean: Array  # (n, components)
     low: Array  # the same as mean where a bin holds one sample at most
     high: Array
+    names: tuple[str, ...] = ()  # of the columns, where the kind does not say them
 
     @property
     def kind(self) -> str:
@@ -61,7 +63,7 @@ class Line:
     @property
     def components(self) -> tuple[str, ...]:
         """Names of the columns."""
-        return COMPONENTS[self.kind]
+        return self.names or COMPONENTS[self.kind]
 
     def part(self, component: str) -> tuple[Array, Array, Array] | None:
         """Mean, least and greatest of one component, (n,); None where the line has no such."""
@@ -106,12 +108,14 @@ class Curves:
     ] = ()  # <device>/<gateway run>/<boot>: sessions that share one have one clock
     coarse: bool = False  # a first look at a part of the file
     leader: str = ""  # the first estimator of the configuration it was recorded with
+    axes: dict[str, Line] = field(default_factory=dict)  # <device>/axes or /force; means alone
     said: tuple[str, ...] = ()  # sentences about damage of the recording
 
     @property
     def t(self) -> Array:
         """Middle of every bin, s."""
-        n = len(next(iter(self.lines.values())).mean) if self.lines else 0
+        every = [*self.lines.values(), *self.axes.values()]
+        n = len(every[0].mean) if every else 0
         return (np.arange(n) + 0.5) * self.bin_s
 
     def of_kind(self, kind: str) -> list[Line]:
@@ -191,6 +195,8 @@ def save(curves: Curves, recording: Path) -> Path:
             )
     for k, track in enumerate(curves.tracks.values()):
         arrays[f"track{k}"] = track.points
+    for k, line in enumerate(curves.axes.values()):
+        arrays[f"axes{k}"] = line.mean.astype(np.float32)
     facts = {
         "format": FORMAT,
         "of": stamp(recording),
@@ -199,6 +205,7 @@ def save(curves: Curves, recording: Path) -> Path:
         "seconds": curves.seconds,
         "bin_s": curves.bin_s,
         "lines": list(curves.lines),
+        "axes": [[line.key, line.names] for line in curves.axes.values()],
         "tracks": [[track.key, track.origin] for track in curves.tracks.values()],
         "clocks": curves.clocks,
         "leader": curves.leader,
@@ -263,6 +270,10 @@ def load(recording: Path) -> Curves | None:
             mean = data[f"mean{k}"]
             low, high = (data[f"low{k}"], data[f"high{k}"]) if f"low{k}" in data else (mean, mean)
             lines[key] = Line(key, mean, low, high)
+        axes = {
+            key: Line(key, data[f"axes{k}"], data[f"axes{k}"], data[f"axes{k}"], tuple(names))
+            for k, (key, names) in enumerate(facts["axes"])
+        }
         tracks = {
             key: Track(key, data[f"track{k}"], (origin[0], origin[1], origin[2]))
             for k, (key, origin) in enumerate(facts["tracks"])
@@ -277,5 +288,6 @@ def load(recording: Path) -> Curves | None:
         tuple(Mark(*mark) for mark in facts["marks"]),
         tuple(facts["clocks"]),
         leader=facts["leader"],
+        axes=axes,
         said=tuple(facts.get("said", ())),
     )

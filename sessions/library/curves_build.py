@@ -15,7 +15,8 @@ from google.protobuf.message import DecodeError, Message
 from numpy.typing import NDArray
 
 from inertial.rate.names import LEADER
-from messages.contract.topics import GNSS, IMU, NAV, NOTE, RATE, TACHO, TRUTH, Topic, parse
+from logs.figures.names import axis_channel
+from messages.contract.topics import ACCEL, GNSS, IMU, NAV, NOTE, RATE, TACHO, TRUTH, Topic, parse
 from sessions.library.curves import Curves, Line, Mark, bin_for, bins_of, load, save
 from sessions.library.curves_bins import Binner, PulseLine, TrackLine
 from sessions.library.scan import Block, Extent, Progress, extent, scan
@@ -30,7 +31,8 @@ PLACE = ("latitude_deg", "longitude_deg", "height_m")
 TURN = ("omega_ib_b_radps", "angle_z_rad")
 WANTED: dict[Topic, tuple[str, ...]] = {  # and which of their fields
     RATE: TURN,
-    IMU: ("omega_ib_b_radps",),
+    IMU: ("omega_ib_b_radps", "f_b_mps2"),
+    ACCEL: ("f_mps2",),
     TACHO: ("omega_radps",),
     TRUTH: TURN,
     NAV: ("p_ned_m", *(f"origin_{name}" for name in PLACE)),
@@ -87,6 +89,7 @@ class _Reading:
         self._bin_s = 0.0  # known with the first samples
         self._lines: dict[str, Binner] = {}
         self._pulses: dict[str, PulseLine] = {}
+        self._axes: dict[str, tuple[Binner, tuple[str, ...]]] = {}
         self._tracks: dict[str, TrackLine] = {}
         self._marks: list[Mark] = []
         self._clocks: set[str] = set()
@@ -94,6 +97,7 @@ class _Reading:
             RATE.name: self._rate,
             TRUTH.name: self._truth,
             IMU.name: self._imu,
+            ACCEL.name: self._accel,
             TACHO.name: self._tacho,
             NAV.name: self._nav,
             GNSS.name: self._gnss,
@@ -139,6 +143,7 @@ class _Reading:
             tuple(sorted(self._clocks)),
             self._coarse,
             leader_of(self._path),
+            {key: _means(*one, n) for key, one in self._axes.items()},
         )
 
     def _times(self, read: Samples) -> Array:
@@ -150,11 +155,14 @@ class _Reading:
 
     def _binner(self, key: str, t: Array, width: int) -> Binner:
         if key not in self._lines:
-            if not self._bin_s:
-                period = float(np.median(np.diff(t))) if len(t) > 2 else 0.01
-                self._bin_s = bin_for(self._extent.seconds, max(self._least_s, period))
-            self._lines[key] = Binner(key, self._extent.seconds, self._bin_s, width)
+            self._lines[key] = self._new_binner(key, t, width)
         return self._lines[key]
+
+    def _new_binner(self, key: str, t: Array, width: int) -> Binner:
+        if not self._bin_s:
+            period = float(np.median(np.diff(t))) if len(t) > 2 else 0.01
+            self._bin_s = bin_for(self._extent.seconds, max(self._least_s, period))
+        return Binner(key, self._extent.seconds, self._bin_s, width)
 
     def _rate(self, key: str, read: Samples, t: Array) -> None:
         omega, angle = read.fields["omega_ib_b_radps"], read.fields["angle_z_rad"]
@@ -167,6 +175,26 @@ class _Reading:
         omega = read.fields["omega_ib_b_radps"]
         if (read.lengths["omega_ib_b_radps"] == 3).all():
             self._binner(key.replace("/imu", "/gyro"), t, 3).add(t, omega)
+        if (read.lengths["f_b_mps2"] == 3).all():
+            names = tuple(f"f_{axis}" for axis in "xyz")
+            self._force(key.replace("/imu", "/force"), names, t, read.fields["f_b_mps2"])
+
+    def _accel(self, key: str, read: Samples, t: Array) -> None:
+        f = read.fields["f_mps2"]
+        if f.shape[1]:
+            names = tuple(axis_channel(k) for k in range(f.shape[1]))
+            self._force(key.replace("/accel", "/axes"), names, t, f)
+
+    def _force(self, key: str, names: tuple[str, ...], t: Array, f: Array) -> None:
+        """Readings of accelerometers; of an array that has got other axes the first ones are
+        kept.
+        """
+        width = len(names)
+        if key not in self._axes:
+            self._axes[key] = (self._new_binner(key, t, width), names)
+        binner, known = self._axes[key]
+        if known == names:
+            binner.add(t, f)
 
     def _tacho(self, key: str, read: Samples, t: Array) -> None:
         self._pulses.setdefault(key, PulseLine(key)).add(t, read.fields["omega_radps"])
@@ -194,6 +222,12 @@ class _Reading:
             moment = (at_utc_ns - self._extent.first_ns) / 1e9 if at_utc_ns else float(t[k])
             text, author = fields["text"][k] or "mark", fields["author"][k]
             self._marks.append(Mark(moment, text, author, float(fields["seconds"][k])))
+
+
+def _means(binner: Binner, names: tuple[str, ...], n: int) -> Line:
+    """The first n bins of readings, without the least and the greatest of each."""
+    line = binner.line(n)
+    return Line(line.key, line.mean, line.mean, line.mean, names)
 
 
 def _origin(latitude: float, longitude: float, height: float) -> tuple[float, float, float]:

@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 from logs.figures.names import line_colour, line_title
 from logs.figures.stretch import stretch
 from sessions.library.compare import Comparison, Overlaid, moved
-from sessions.library.curves import RATE, TACHO, TRUTH, Line
+from sessions.library.curves import RATE, TACHO, TRUTH, Line, Mark
+from sessions.library.derived import derive
 
 Array = NDArray[np.floating[Any]]
 
 POINTS = 1200  # per line, two for each bin of the window
 TRACK_POINTS = 1500
 DEG = float(np.degrees(1.0))
+PROCEDURE = "procedure"  # author of what a procedure says in a recording
 
 
 def drawing(
@@ -27,12 +29,13 @@ def drawing(
     points: int = POINTS,
     everything: bool = False,
     cursors: tuple[float, float] | None = None,
+    own: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Lines of rate, error and angle within a window, and the tracks; for JSON. Between two cursors
     (s on the first session's time) every sample of the curves is measured, too.
 
-    `everything`: all estimators of every session instead of its leading line. Units: deg/s, deg, s,
-    m.
+    `everything`: all estimators of every session instead of its leading line; `own`: expressions
+    over the channels of each session. Units: deg/s, deg, s, m.
     """
     span = found.span
     begin = span[0] if begin_s is None else begin_s
@@ -46,11 +49,53 @@ def drawing(
             lines.append(drawn)
     return {
         "span": list(span),
+        "start_utc_s": found.sessions[0].curves.start_utc_ns * 1e-9,
         "window": [begin, end],
         "sessions": [_session(one) for one in found.sessions],
         "lines": [line for line in lines if line["rate"] or line["error"]],
         "tracks": _tracks(found),
+        "own": _own(found, own, (begin, end), points, cursors),
     }
+
+
+def _own(
+    found: Comparison,
+    own: Sequence[str],
+    window: tuple[float, float],
+    points: int,
+    cursors: tuple[float, float] | None,
+) -> list[dict[str, Any]]:
+    """Each expression with its unit, its fault, and its line in every session that has what it
+    names.
+    """
+    drawn = [{"text": text, "unit": "", "fault": "", "lines": []} for text in own]
+    for number, one in enumerate(found.sessions):
+        for curve, made in zip(drawn, derive(one.curves, own), strict=True):
+            if made.y is None:
+                curve["fault"] = curve["fault"] or made.fault
+                continue
+            curve["unit"] = made.unit
+            curve["lines"].append(_own_line(one, number, made.y, window, points, cursors))
+    for curve in drawn:
+        if curve["lines"]:
+            curve["fault"] = ""
+    return drawn
+
+
+def _own_line(
+    one: Overlaid,
+    number: int,
+    y: Array,
+    window: tuple[float, float],
+    points: int,
+    cursors: tuple[float, float] | None,
+) -> dict[str, Any]:
+    inside = (window[0] - one.offset_s, window[1] - one.offset_s)
+    t, step, first, last, every = _grid(len(y), one.curves.bin_s, inside, max(1, points // 2))
+    line = {"session": number, "t0": t + one.offset_s, "dt": step}
+    if cursors is not None:
+        line["measured"] = stretch(one.curves.t + one.offset_s, y, *cursors)
+    return line | _decimated(y[first:last], y[first:last], every, 1.0)
 
 
 def _shown(one: Overlaid, number: int, everything: bool) -> list[Line]:
@@ -76,11 +121,19 @@ def _session(one: Overlaid) -> dict[str, Any]:
         "line": one.lead,
         "coarse": one.curves.coarse,
         "others": max(0, len(one.curves.of_kind(RATE)) - 1),
-        "marks": [
-            {"t": mark.t + one.offset_s, "text": mark.text, "author": mark.author}
-            for mark in one.curves.marks
-        ],
+        "bin_s": one.curves.bin_s,
+        # does a bin hold one sample at most, so that what is measured is measured of all of them?
+        "whole": all(line.low is line.mean for line in one.curves.lines.values()),
+        "marks": [_mark(mark, one.offset_s) for mark in one.curves.marks],
     }
+
+
+def _mark(mark: Mark, offset_s: float) -> dict[str, Any]:
+    """A remark; one about some time is a range of the plots, a procedure's is one of its steps."""
+    begin = mark.t + offset_s
+    kind = "step" if mark.author == PROCEDURE and mark.seconds > 0 else "mark"
+    until = begin + max(mark.seconds, 0.0)
+    return {"t": begin, "until": until, "kind": kind, "text": mark.text, "author": mark.author}
 
 
 def _line(

@@ -34,6 +34,8 @@ class ProcedureDesk:
         for what, value in (("serial number", command.unit), ("operator", command.user)):
             if fault := text.check(value):
                 raise library.ProcedureError(f"{what}: {fault}")
+        if not command.user.strip():
+            raise library.ProcedureError("operator: it is not said who runs the test: sign in")
         plan = library.find(command.procedure, self._settings.folder)
         stamp = time.strftime("%Y%m%dT%H%M%S", time.gmtime())
         start = {

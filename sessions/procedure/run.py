@@ -165,11 +165,11 @@ def _sync_folder(folder: Path) -> None:
         os.close(handle)
 
 
-def unfinished(root: Path) -> dict[str, Journal]:
-    """Of each device the newest run, where it is not closed; damaged files are named and passed
-    over.
+def unfinished(root: Path) -> dict[str, Journal | None]:
+    """Of each device the newest run, where it is not closed; None where its file is damaged, which
+    is named.
     """
-    found = {}
+    found: dict[str, Journal | None] = {}
     for folder in sorted(root.glob("*")) if root.is_dir() else []:
         paths = sorted(folder.glob("*.jsonl"))
         if not paths:
@@ -178,6 +178,7 @@ def unfinished(root: Path) -> dict[str, Journal]:
             journal = Journal.read(paths[-1])
         except (ProcedureError, OSError) as error:
             log.error("%s", error)
+            found[folder.name] = None
             continue
         if not journal.run.closed:
             found[folder.name] = journal

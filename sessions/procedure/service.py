@@ -29,6 +29,12 @@ IDLE_S = 2.0
 DATA = (ACCEL, IMU, TACHO, RATE, AXES, LINK)
 WAITING = 20_000  # messages of a device; more are dropped, which the watch takes for lost data
 COMMAND = pb.ProcedureCommand
+DONE = {
+    COMMAND.ACTION_START: "started",
+    COMMAND.ACTION_NEXT: "goes on",
+    COMMAND.ACTION_REPEAT: "the step begins anew",
+    COMMAND.ACTION_ABORT: "aborted",
+}
 
 
 class Tables(dict[str, RateTable]):
@@ -96,8 +102,14 @@ class Service:
     # --- on the service's own thread
 
     def resume(self) -> None:
-        """Go on with what a crash cut off."""
-        for device, journal in unfinished(self._settings.root).items():
+        """Go on with what a crash cut off; first of all the tables that it left turning stand."""
+        left = unfinished(self._settings.root)
+        for device in left.keys() & self._tables.keys():
+            reply = self._stop_alone(device)
+            log.warning("%s: its procedure was cut off; %s", device, reply.message)
+        for device, journal in left.items():
+            if journal is None:
+                continue
             log.info("%s: going on with %s", device, journal.run.id)
             self._start(journal)
 
@@ -141,7 +153,7 @@ class Service:
         except (library.ProcedureError, TableError, orders.OrderError, OSError) as error:
             problem = str(error)
         log.info("%s: order %d of %s: %s", device, command.action, command.user, problem or "done")
-        order.answer(pb.Reply(ok=not problem, message=problem or "done"))
+        order.answer(pb.Reply(ok=not problem, message=problem or DONE[command.action]))
 
     def _do(self, command: COMMAND, device: str, conductor: Conductor | None) -> str:
         if command.action == COMMAND.ACTION_START:

@@ -11,9 +11,17 @@ from pathlib import Path
 from typing import Literal, Protocol
 
 import serial
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
 
 from inertial.toml_file import parsed, text_of
+from sessions.procedure.guard import Guard
 
 DESCRIPTIONS = Path(__file__).parent / "tables"
 LONGEST = 4096  # bytes of one reply
@@ -74,19 +82,22 @@ class Limits(_Part):
 class Commands(_Part):
     """Texts that are sent; an empty one is not sent."""
 
-    set_rate: str
+    set_rate: str = Field(min_length=1)
     read_rate: str
     stop: str
     identify: str = ""
     remote: str = ""
     local: str = ""
     set_acceleration: str = ""
+    watchdog: str = ""
+    keep_alive: str = ""
 
-    @field_validator("set_rate")
+    @field_validator("set_rate", "watchdog")
     @classmethod
-    def _has_rate(cls, text: str) -> str:
-        if "{rate}" not in text:
-            raise ValueError("want {rate} where the number goes")
+    def _has_number(cls, text: str, info: ValidationInfo) -> str:
+        number = "{seconds}" if info.field_name == "watchdog" else "{rate}"
+        if text and number not in text:
+            raise ValueError(f"want {number} where the number goes")
         return text
 
 
@@ -115,6 +126,7 @@ class Description(_Part):
     terminator: str = Field(default="\n", min_length=1, max_length=4)
     answer: str = ""
     timeout_s: float = Field(default=1.0, gt=0, le=10)
+    watchdog_s: float = Field(default=3.0, ge=1, le=60)
     baud: int = Field(default=9600, ge=300, le=4_000_000)
     clockwise_is_positive: bool = False
     limits: Limits
@@ -151,6 +163,8 @@ class TextTable:
         )
         self._line: serial.SerialBase | None = None
         self._lock = threading.Lock()
+        self._guard = Guard(description.model_dump_json(), port)
+        self._let_go = threading.Event()  # set: nobody is kept alive
 
     @property
     def name(self) -> str:
@@ -163,7 +177,9 @@ class TextTable:
         return math.radians(self._said.limits.rate_dps)
 
     def take(self) -> None:
-        """Open the line, ask who is there, take over."""
+        """Open the line, ask who is there, take over; from here on it is stopped when this process
+        is killed or hangs.
+        """
         commands, replies = self._said.commands, self._said.replies
         if commands.identify:
             told = self._ask(commands.identify)
@@ -173,6 +189,25 @@ class TextTable:
                     " is it the table of this description?"
                 )
         self._tell(commands.remote)
+        self._tell(commands.watchdog, seconds=self._said.watchdog_s)
+        self._guard.begin()
+        if commands.watchdog:
+            self._let_go.set()  # of a taking before
+            self._let_go = threading.Event()
+            threading.Thread(target=self._keep, args=(self._let_go,), daemon=True).start()
+
+    def _keep(self, let_go: threading.Event) -> None:
+        """Keep the table's own watchdog quiet: it guards the line and this machine, the guard this
+        process.
+        """
+        while not let_go.wait(self._said.watchdog_s / 3.0):
+            try:
+                if self._said.commands.keep_alive:
+                    self._tell(self._said.commands.keep_alive)
+                else:
+                    self._ask(self._said.commands.read_rate)
+            except TableError:
+                continue  # who drives it asks on his own, and says it
 
     def set_rate(self, omega: float, acceleration: float | None = None) -> None:
         """See RateTable."""
@@ -190,6 +225,7 @@ class TextTable:
     def rate(self) -> float:
         """See RateTable."""
         told = self._ask(self._said.commands.read_rate)
+        self._guard.alive()
         found = re.search(self._said.replies.rate, told)
         try:
             value = float(found.group(1)) if found else math.nan
@@ -205,14 +241,21 @@ class TextTable:
     def stop(self) -> None:
         """See RateTable; waits for nobody longer than one answer."""
         self._tell(self._said.commands.stop)
+        self._guard.end()  # who stopped it sets no rate any more
 
     def release(self) -> None:
         """See RateTable."""
+        self._let_go.set()
         try:
             self._tell(self._said.commands.local)
         finally:
-            with self._lock:
-                self._close()
+            self._guard.end()
+            self.close()
+
+    def close(self) -> None:
+        """Close the line; it is opened again when it is needed."""
+        with self._lock:
+            self._close()
 
     def _tell(self, command: str, **numbers: float) -> None:
         if not command:

@@ -17,12 +17,13 @@ from messages.contract.topics import (
     LOCATION,
     PIPELINE_INPUTS,
     REPLAY_SUFFIX,
+    SKY,
     TRUTH,
     Address,
     Topic,
 )
 
-INPUTS: tuple[Topic, ...] = (*PIPELINE_INPUTS, LINK, BOARD, TRUTH, LOCATION)
+INPUTS: tuple[Topic, ...] = (*PIPELINE_INPUTS, LINK, BOARD, TRUTH, LOCATION, SKY)
 LONGEST_NAME = 32  # of a device, see messages.contract.topics.NAME
 MATCH_S = 0.25  # at most, for the router to say that somebody listens to a key
 DRAIN_S = (

@@ -19,10 +19,12 @@ from sessions.recording.manifest import Manifest, SessionError, read_manifest
 from sessions.report.analysis import Analysis, analyse
 from sessions.report.data import Run, load_run
 from sessions.report.document import Extra, compose
-from sessions.report.figures import pictures
+from sessions.report.figures import Picture, pictures
 from sessions.report.html import to_html
 from sessions.report.metrics import Metric, metrics
 from sessions.report.pdf import to_pdf
+from sessions.report.photo import Photo
+from sessions.report.photo import read as read_photo
 from sessions.report.segments import Segment
 from sessions.report.verdict import Check, Spec, judge, load_spec, overall
 
@@ -91,15 +93,25 @@ def build(
     one = judged(path, spec, device, boot, lambda done, what: progress(0.6 * done, what))
     extra = Extra()
     if one.outcome is not None:
-        extra = Extra(facts(one.outcome), [steps(one.outcome)], provenance(one.outcome))
+        extra = Extra(
+            facts(one.outcome),
+            [steps(one.outcome)],
+            provenance(one.outcome),
+            one.outcome.held.status.operator,
+        )
+    photo = read_photo(path.parent)
+    if photo is not None:
+        extra.provenance.append(("SHA-256 of the photo", photo.sha256))
     progress(0.65, "drawing")
     sha256, drawn = sha256_of(path), pictures(one.found)
+    if photo is not None:
+        drawn = [Picture("unit", "The unit under test.", photo.jpeg), *drawn]
     document = compose(one.found, one.manifest, sha256, one.spec, one.checks, drawn, extra)
     progress(0.85, "writing")
     report = Report(
         html=to_html(document),
         pdf=to_pdf(document),
-        json=_json(one, sha256),
+        json=_json(one, sha256, photo),
         verdict=document.verdict,
     )
     progress(1.0, "done")
@@ -119,7 +131,7 @@ def sha256_of(path: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def _json(one: Judged, sha256: str) -> str:
+def _json(one: Judged, sha256: str, photo: Photo | None) -> str:
     manifest, found, spec, outcome = one.manifest, one.found, one.spec, one.outcome
     figures, checks = one.figures, one.checks
     content: dict[str, Any] = {
@@ -129,6 +141,7 @@ def _json(one: Judged, sha256: str) -> str:
         "start_utc_s": found.run.start_utc_s,
         "seconds": found.run.seconds,
         "sha256": sha256,
+        "photo_sha256": None if photo is None else photo.sha256,
         "verdict": overall(checks),
         "specification": spec.title,
         "estimator": spec.estimator,

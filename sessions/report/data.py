@@ -138,8 +138,9 @@ def load_run(
         if address.topic in (ACCEL, RATE, NAV):
             devices[address.device] = devices.get(address.device, 0) + len(table)
     if not devices:
+        why = "".join(f"; {text}" for text in damage.said())
         raise ReportError(
-            f"{path}: no samples and no estimates of any device; nothing to report on"
+            f"{path}: no samples and no estimates of any device; nothing to report on{why}"
         )
     device = device or max(sorted(devices), key=lambda name: devices[name])
     if device not in devices:

@@ -3,6 +3,7 @@ here.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 
@@ -36,6 +37,19 @@ class Document:
     grids: list[Grid]
     pictures: list[Picture]
     provenance: list[tuple[str, str]] = field(default_factory=list)
+    # what is to be signed, and who or when, as far as the recording says it
+    signed: tuple[tuple[str, str], ...] = (("Tested by", ""), ("Approved by", ""), ("Date", ""))
+
+    def texts(self) -> Iterator[str]:
+        """All that it says beside numbers of its own."""
+        for row in (*self.facts, *self.checks):
+            yield from row
+        for grid in self.grids:
+            yield from (grid.title, *grid.head, grid.remark or "")
+            for row in grid.rows:
+                yield from row
+        for picture in self.pictures:
+            yield picture.caption
 
 
 @dataclass(frozen=True)
@@ -45,6 +59,7 @@ class Extra:
     facts: list[tuple[str, str]] = field(default_factory=list)
     grids: list[Grid] = field(default_factory=list)
     provenance: list[tuple[str, str]] = field(default_factory=list)
+    tested_by: str = ""
 
 
 def compose(
@@ -74,7 +89,17 @@ def compose(
         grids=[grid for grid in grids if grid is not None and grid.rows],
         pictures=drawn,
         provenance=extra.provenance + _provenance(found, manifest, sha256),
+        signed=(
+            ("Tested by", extra.tested_by),
+            ("Approved by", ""),
+            ("Date", _date(found) if extra.tested_by else ""),
+        ),
     )
+
+
+def _date(found: Analysis) -> str:
+    """Of the test, not of the report: the same recording gives the same bytes."""
+    return datetime.fromtimestamp(found.run.start_utc_s, UTC).strftime("%Y-%m-%d")
 
 
 def _facts(found: Analysis, manifest: Manifest | None, spec: Spec) -> list[tuple[str, str]]:

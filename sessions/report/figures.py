@@ -40,7 +40,12 @@ class Picture:
 
     name: str
     caption: str
-    png: bytes
+    png: bytes  # or JPEG, of a photo
+
+    @property
+    def kind(self) -> str:
+        """As HTML calls it, by its content."""
+        return "jpeg" if self.png.startswith(b"\xff\xd8") else "png"
 
 
 def pictures(found: Analysis) -> list[Picture]:

@@ -176,10 +176,18 @@ def consistency(found: Analysis) -> Grid | None:
             f"{one.mean:.3f}",
             f"{one.low:.3f}–{one.high:.3f}",
             f"{100 * one.beyond:.1f} %",
+            one.verdict,
         )
         for one in every
     ]
-    head = ("filter", "corrections", "NIS / dof", "95 % band, white", "beyond their 95 %")
+    head = (
+        "filter",
+        "corrections",
+        "NIS / dof",
+        "95 % band, white",
+        "beyond their 95 %",
+        "the filter is",
+    )
     remark = "1 is consistent; below, the filter is too careful; above, too sure."
     return Grid("Consistency of the filters", head, rows, remark)
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import jinja2
 
+from logs.figures.words import explained, words_of
 from messages.text import template_value
 from sessions.report.document import Document
 
@@ -16,12 +17,21 @@ _environment = jinja2.Environment(
     trim_blocks=True,
     lstrip_blocks=True,
 )
+_environment.filters["explained"] = lambda text: explained(text, _place)
+
+
+def _place(word: str) -> str:
+    """Where a word is explained: at the end of the report itself."""
+    return f"#word-{word.lower()}"
 
 
 def to_html(document: Document) -> str:
     """The page; pictures are inside."""
     pictures = [
-        (k, picture.caption, base64.b64encode(picture.png).decode())
+        (k, picture.caption, picture.kind, base64.b64encode(picture.png).decode())
         for k, picture in enumerate(document.pictures, 1)
     ]
-    return _environment.get_template("report.html").render(document=document, pictures=pictures)
+    words = words_of(list(document.texts()))
+    return _environment.get_template("report.html").render(
+        document=document, pictures=pictures, words=words
+    )

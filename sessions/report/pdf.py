@@ -23,6 +23,7 @@ from reportlab.platypus import (
     TableStyle,
 )
 
+from logs.figures.words import words_of
 from messages.text import html, paragraph
 from sessions.report.document import Document
 from sessions.report.grids import Grid
@@ -116,7 +117,15 @@ def _story(document: Document) -> list:
         story.append(KeepTogether([Spacer(0, 5 * mm), image, caption]))
     for grid in document.grids:
         story += _grid(grid)
-    story += [_title("Provenance"), _pairs(document.provenance), Spacer(0, 18 * mm), _signatures()]
+    words = words_of(list(document.texts()))
+    if words:
+        story += [_title("Words"), _pairs(list(words.items()))]
+    story += [
+        _title("Provenance"),
+        _pairs(document.provenance),
+        Spacer(0, 18 * mm),
+        _signatures(document),
+    ]
     return story
 
 
@@ -174,13 +183,15 @@ def _widths(grid: Grid) -> list[float]:
     return [WIDTH * length / sum(capped) for length in capped]
 
 
-def _signatures() -> Table:
-    style = [("LINEABOVE", (k, 0), (k, 0), 0.6, INK) for k in (0, 2, 4)]
-    labels = [
-        Paragraph(text, _style("sign", 7.5, textColor=DIM))
-        for text in ("Tested by", "Approved by", "Date")
-    ]
-    row = [labels[0], "", labels[1], "", labels[2]]
+def _signatures(document: Document) -> Table:
+    style = [("LINEABOVE", (k, 1), (k, 1), 0.6, INK) for k in (0, 2, 4)]
+    labels, names = _style("sign", 7.5, textColor=DIM), _style("name", 9)
+    rows: list[list[Paragraph | str]] = [[], []]
+    for what, who in document.signed:
+        rows[0] += [Paragraph(paragraph(who, CELL), names), ""]
+        rows[1] += [Paragraph(html(what), labels), ""]
     return Table(
-        [row], colWidths=[WIDTH * share for share in (0.3, 0.05, 0.3, 0.05, 0.3)], style=style
+        [row[:-1] for row in rows],
+        colWidths=[WIDTH * share for share in (0.3, 0.05, 0.3, 0.05, 0.3)],
+        style=style,
     )

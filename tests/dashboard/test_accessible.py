@@ -144,11 +144,12 @@ def serious(where, rules=None):
     ]
 
 
-@pytest.mark.parametrize("scheme", ["dark", "light"])
-def test_no_page_of_the_scene_has_a_serious_finding_or_clipped_text(chromium, door, scheme):
+@pytest.mark.parametrize("scheme, size", [("dark", "desk"), ("light", "phone")])
+def test_no_page_of_the_scene_has_a_serious_finding_or_clipped_text(chromium, door, scheme, size):
     # nothing to draw in software: the pages are looked at; a scheme changes only colours
     rules = None if scheme == "dark" else ["color-contrast"]
-    with visit(chromium, door, scheme=scheme, path="/?w=watch&layers=grid") as (page, said):
+    path = "/?w=watch&layers=grid"
+    with visit(chromium, door, scheme=scheme, size=size, path=path) as (page, said):
         scene = scene_of(page)
         wrong = {}
         for device in ("cube-01", "car-01"):

@@ -174,7 +174,7 @@ def test_axes_follow_the_theme(visit):
     assert page.evaluate(darkest) < in_dark - 100
 
 
-def test_two_cursors_measure_every_sample_and_escape_takes_them_away(visit):
+def test_two_cursors_measure_what_is_recorded_and_escape_takes_them_away(visit):
     page = visit(f"/sessions/{SESSION}")
     chart = plot(page, "rate z").locator(".chart")
     chart.focus()
@@ -182,7 +182,7 @@ def test_two_cursors_measure_every_sample_and_escape_takes_them_away(visit):
         page.keyboard.press("c")
     (line,) = [one for one in answer.value.json()["lines"] if one["title"] == "products filter"]
     table = plot(page, "rate z").locator(".gf-between")
-    expect(table).to_contain_text("of every sample")
+    expect(table).to_contain_text("of means over 0.01 s")  # some bins hold two samples
     assert table.locator("tr", has_text="products filter").locator("td").last.inner_text() == str(
         line["measured"]["rate"]["z"]["n"]
     )
@@ -226,3 +226,37 @@ def test_one_outlier_does_not_flatten_the_scale_and_a_signal_is_none(visit):
     plain, spike, fresh, signal, constant = visit(f"/sessions/{SESSION}").evaluate(ODD)
     assert plain is None and fresh is None and signal is None and constant is None
     assert spike["max"] < 1.1 and [(one["x"], one["y"]) for one in spike["odd"]] == [(10, 500)]
+
+
+def test_a_curve_of_ones_own_is_completed_refused_drawn_saved_and_linked(visit, door, tmp_path):
+    page = visit(f"/sessions/{SESSION}")
+    page.get_by_text("Curves of your own").click()
+    line = page.get_by_role("combobox", name="Expression")
+    line.press_sequentially("norm(omega_x, omega_y, ome")
+    expect(page.get_by_role("option").first).to_contain_text("°/s")
+    line.press("ArrowDown")
+    line.press("ArrowDown")
+    line.press("ArrowDown")
+    line.press("Enter")
+    assert line.input_value() == "norm(omega_x, omega_y, omega_z"
+    page.get_by_role("button", name="Draw").click()
+    expect(page.get_by_role("alert")).to_contain_text("cannot be read")
+    line.fill("norm(omega_x, omega_y, omega_z)")
+    line.press("Escape")
+    page.get_by_role("button", name="Draw").click()
+    figure = page.locator("figure[data-own]")
+    expect(figure.locator(".u-over")).to_be_visible()
+    expect(page.get_by_label("Your curves")).to_contain_text("°/s")
+    expect(page.get_by_role("alert")).to_be_hidden()
+    with page.expect_download() as download:
+        figure.get_by_role("button", name="Save the figure as SVG").click()
+    path = tmp_path / "figure.svg"
+    download.value.save_as(path)
+    text = path.read_text()
+    assert "norm(omega_x, omega_y, omega_z)" in text and "s since 2024-01-01" in text
+    page.goto(page.evaluate("location.href"))  # the link has it, and so has the person's next visit
+    expect(page.locator("figure[data-own] .u-over")).to_be_visible()
+    page.goto(f"{door.url}/sessions/{SESSION}")
+    expect(page.locator("figure[data-own] .u-over")).to_be_visible()
+    page.get_by_role("button", name="Take norm").click()
+    expect(figure).to_have_count(0)

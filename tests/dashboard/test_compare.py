@@ -7,7 +7,7 @@ import shutil
 import sys
 
 import pytest
-from support.front_door import open_door, wait_for
+from support.front_door import ended, open_door, wait_for
 from support.table_session import SESSION, table_root
 
 from dashboard.web.jobs import Jobs
@@ -116,18 +116,6 @@ def test_a_damaged_recording_says_why_it_cannot_be_drawn(door):
         )
         assert "no message in it" in answer.json()["error"]
     shutil.rmtree(folder)
-
-
-def ended(client, answer):
-    assert answer.status_code == 200, answer.text
-    number = answer.json()["number"]
-    return wait_for(
-        lambda: (
-            (job := client.get(f"/api/jobs/{number}").json())["state"] in ("done", "failed") and job
-        ),
-        "job",
-        240,
-    )
 
 
 def test_a_log_sent_in_pieces_becomes_a_session(door):

@@ -11,7 +11,7 @@ from urllib.parse import quote
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from support.front_door import open_door, wait_for
+from support.front_door import ended, open_door, wait_for
 from support.hostile import HOSTILE
 from support.table_session import SESSION, table_root
 
@@ -47,18 +47,6 @@ def door(tmp_path_factory):
         door.folder = folder
         yield door
     jobs.close()
-
-
-def ended(client, answer):
-    assert answer.status_code == 200, answer.text
-    number = answer.json()["number"]
-    return wait_for(
-        lambda: (
-            (job := client.get(f"/api/jobs/{number}").json())["state"] in ("done", "failed") and job
-        ),
-        "job",
-        240,
-    )
 
 
 def sent(client, *names: str, content: bytes = b"") -> tuple[int, list]:

@@ -19,8 +19,8 @@ from dashboard.desk import Desk
 from dashboard.scene.panels import PAGES
 from dashboard.scene.service import start
 from dashboard.scene.view import View
-from dashboard.terms import TERMS, glossary_link
 from dashboard.web.frame.scene_page import policy, script_hashes
+from logs.figures.words import TERMS, glossary_link
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 from sessions.library.annotations import Annotations, SessionNote
@@ -31,12 +31,13 @@ from tests.system.test_browser import CHROMIUM, FLAGS, KNOWN
 
 OURS = set(
     "p b i em small sub span div table tr td svg g defs clippath polyline polygon path text rect"
-    " line circle ellipse style ul li abbr".split()
+    " line circle ellipse style ul li title".split()
 )
 ATTRIBUTES = set(
     "class style colspan viewbox width height role aria-label points fill stroke stroke-width"
     " stroke-linecap stroke-linejoin font-size font-weight text-anchor x y x1 x2 y1 y2 cx cy r rx"
-    " ry d id transform clip-path fill-opacity title data-state data-chart".split()
+    " ry d id transform clip-path fill-opacity title data-state data-chart"
+    " xmlns font-family stroke-opacity stroke-dasharray".split()
 )
 GLOSSARY = {glossary_link(word) for word in TERMS}
 

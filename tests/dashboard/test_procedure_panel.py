@@ -61,7 +61,7 @@ def test_orders_follow_the_state_and_the_stop_is_always_there(free_port):
         for m in (idle, running(), running(M.STATE_HELD)):
             shown(m)
             assert page._buttons[pb.ProcedureCommand.ACTION_STOP].visible
-        assert len(page.orders) == 9
+        assert len(page.orders) == 8
 
         given = []
 
@@ -71,10 +71,10 @@ def test_orders_follow_the_state_and_the_stop_is_always_there(free_port):
                 raise Refused("the procedures: not now")
 
         page.desk = Heard()
-        page._unit.value = " SN-1 "
+        page._unit.value, page.user = " SN-1 ", "anna"
         server.add_notification = lambda *_, **__: None  # a client has it
         page._order(pb.ProcedureCommand.ACTION_START)
-        assert given[0].device == "cube" and given[0].unit == "SN-1"
+        assert given[0].device == "cube" and (given[0].unit, given[0].user) == ("SN-1", "anna")
         assert given[0].procedure == "published-30s" and given[0].own_session
     finally:
         server.stop()

@@ -224,7 +224,7 @@ ODD = [
     "10 s",
     "1 h",
 ]
-ODD += ["x" * 2001, "9" * 6000, b"bytes", [], [1.0], {}, {"a": 1}]
+ODD += ["x" * 6001, "9" * 7000, b"bytes", [], [1.0], {}, {"a": 1}]
 TAKEN = {
     "button": [True, False],
     "box": [True, False],
@@ -320,6 +320,20 @@ def test_hostile_messages_close_the_connection_and_nothing_else(door: Door, data
     with door.client("otto") as client, door.scene(client) as scene, door.scene(client) as other:
         scene.send(data)
         assert closed_with(scene) == code
+        other.send(message("ViewerCameraMessage", **CAMERA))
+        assert isinstance(other.recv(timeout=20.0), bytes)
+
+
+def test_text_that_is_none_ends_the_connection_with_one_line(door: Door, caplog):
+    with door.client("otto") as client, door.scene(client) as other:
+        for k, bad in enumerate((b"\xff", b"\xed\xa0\x80", b"\xe2\x82", [b"a", b"\xc3\x28"])):
+            with door.scene(client) as scene:
+                scene.send(bad, text=True)
+                assert closed_with(scene) == 1007
+            lines = [r for r in caplog.records if "not UTF-8" in r.message]
+            assert len(lines) == (1, 2, 2, 3)[k]  # the 1st, 2nd, 4th
+        assert not any(record.exc_info for record in caplog.records)
+        assert "(4 so far)" in lines[-1].message
         other.send(message("ViewerCameraMessage", **CAMERA))
         assert isinstance(other.recv(timeout=20.0), bytes)
 

@@ -16,7 +16,7 @@ from support.feeder import UTC0_NS, Feeder, cube_attitude
 from dashboard.data.feed import Feed
 from dashboard.data.pose import ned_from_geodetic
 from dashboard.data.replayed import Replayed
-from dashboard.data.ring import Ring
+from dashboard.data.ring import Ring, gap_limit
 from dashboard.data.store import DEVICES, ESTIMATORS, Store
 from dashboard.data.tables import Column, Table
 from dashboard.data.track import Track
@@ -165,7 +165,7 @@ def test_decimation_of_few_samples_interpolates_and_never_gives_nan():
 def test_gap_mask_marks_the_gap_and_nothing_else():
     t = np.concatenate([np.arange(0, 4, 0.01), np.arange(6, 10, 0.01)])
     edges, x = series.grid(0.0, 10.0)
-    mask = series.gap_mask(t, edges, series.gap_limit(t))
+    mask = series.gap_mask(t, edges, gap_limit(t))
     assert mask[(x > 4.05) & (x < 5.95)].all() and not mask[(x < 3.95) | (x > 6.05)].any()
 
 

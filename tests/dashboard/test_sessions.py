@@ -10,7 +10,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from support.front_door import open_door, wait_for
+from support.front_door import ended, open_door
 from support.table_session import SESSION, table_root
 
 from dashboard.web.jobs import Jobs
@@ -28,18 +28,6 @@ def door(tmp_path_factory):
     with open_door(folder, scene=False, jobs=jobs) as door:
         yield door
     jobs.close()
-
-
-def ended(client, answer):
-    assert answer.status_code == 200, answer.text
-    number = answer.json()["number"]
-    return wait_for(
-        lambda: (
-            (job := client.get(f"/api/jobs/{number}").json())["state"] in ("done", "failed") and job
-        ),
-        "job",
-        240,
-    )
 
 
 def test_a_report_is_made_and_served_in_three_forms(door):

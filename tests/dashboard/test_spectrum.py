@@ -10,7 +10,7 @@ from support.feeder import Feeder
 
 from dashboard.data.store import Store
 from dashboard.scene.panels import Snapshot
-from dashboard.scene.panels.motion.spectrum import Spectrum, density, unbroken
+from dashboard.scene.panels.motion.spectrum import Spectrum, _scales, density, unbroken
 
 PERIOD = 0.01
 
@@ -63,3 +63,10 @@ def test_the_page_draws_the_signal_that_is_chosen():
         assert len(x) == len(y) > 20 and (x > 0).all() and (y > 0).all()
     finally:
         server.stop()
+
+
+@pytest.mark.parametrize("lowest, highest", [(0.033, 49.9), (0.1, 50.0), (10.0, 10.0), (1e-9, 3.0)])
+def test_a_logarithmic_axis_has_limits_of_its_own(lowest, highest):
+    across = _scales(np.array([lowest, highest]))["x"]
+    low, high = across["range"]
+    assert across["auto"] is False and 0.0 < low <= lowest and high >= highest and high > low

@@ -28,6 +28,7 @@ from dashboard.web.auth import Role
 from dashboard.web.frame.scene_messages import ROLE, Widgets, may_send
 from dashboard.web.pages import own_path
 from dashboard.web.views import Views
+from logs.figures.words import glossary_link, words_of
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 
@@ -102,6 +103,18 @@ def test_a_page_that_is_offered_shows_something(view, store):
                 view._asked(Wish.of(f"p={page['key']}"))
                 view.tick_panels()
                 assert state(view)["missing"] == "" and state(view)["page"] == page["key"]
+                for words in said(view):
+                    text = re.sub('<span class="gf-name">[^<]*<', "<", words)  # of channels
+                    there = words_of([re.sub("<[^>]*>", " ", text)])
+                    assert all(f'href="{glossary_link(word)}"' in words for word in there), words
+
+
+def said(view):
+    """The HTML of the page that is open, and of the summary at its left."""
+    page = view._pages[view._page]
+    handles = [*vars(page).values(), *(chart._heading for chart in page._charts.values())]
+    handles += vars(view._devices).values()
+    return [one.content for one in handles if isinstance(one, viser.GuiHtmlHandle)]
 
 
 # --- what a link asks
@@ -215,6 +228,13 @@ def test_what_is_wrong_is_an_alarm_with_a_reason_and_a_page_that_exists(store):
     late = pb.EstimatorStatus(header=pb.Header(utc_ns=UTC), state="turning", behind_s=9.0)
     put(tp.ESTIMATOR, "cube-01", ORDER, late)
     assert {"axis", "link", "board", "late"} <= kinds(store) - before
+    sparse = pb.EstimatorStatus(
+        header=pb.Header(utc_ns=UTC), limit_hz=5.0, skipped_s=12.0, trouble="cannot be saved"
+    )
+    put(tp.ESTIMATOR, "cube-01", ORDER, sparse)
+    texts = [alarm.text for alarm in alarms(store, store.device("cube-01"))]
+    assert "cannot be saved" in texts
+    assert any("at most 5 estimates a second" in t and "12 s were passed over" in t for t in texts)
     for alarm in alarms(store, store.device("cube-01")):
         assert alarm.title and alarm.text and alarm.page in KEYS
     full = pb.RecorderStatus(recording=False, message="No space left on device: free some")
@@ -283,7 +303,8 @@ def test_a_viewer_sees_orders_disabled_and_why(view, store):
     view.tick_panels()
     assert view._rights.visible and "role operator" in view._rights.content
     assert "role operator" in view._timeline._state.content
-    view._role.value = "operator"
+    view._role.value = "operator otto"
+    assert {page.user for page in view._pages} == {"otto"}
     assert not any(handle.disabled for handle in others) and not view._rights.visible
     assert all(one.visible for one in groups)
 

@@ -187,7 +187,7 @@ def test_a_full_disk_costs_the_state_only_as_long_as_it_is_full(tmp_path, caplog
     work(worker, arrivals()[:20])
     (tmp_path / "state.new").symlink_to("/dev/full")
     saved.save(worker, publishers)
-    assert "No space left" in saved.message and "make room" in caplog.text
+    assert "No space left" in saved.message and "free some space" in caplog.text
     assert saved.load() is None
     saved.save(worker, publishers)
     assert not saved.message and "saved again" in caplog.text

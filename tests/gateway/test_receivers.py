@@ -361,7 +361,7 @@ def test_what_is_heard_is_said():
     bare = sentence(gga(at(1)), checked=False) + sentence(rmc(at(1)), checked=False)
     assert "without a checksum" in said(bare) and "GGA" in said(bare)
     assert "SiRF binary" in said(SIRF) and "Trimble" in said(TSIP)
-    status = frame(1, 0x35, bytes(8)) + sentence("GPGSV,1,1,00")
+    status = frame(1, 0x35, b"\0\0\0\0\1\0\0\0") + sentence("GPGSV,1,1,00")
     text = said(status)
     assert "UBX NAV-SAT" in text and "GSV" in text and "NAV-PVT" in text
     assert "gnss_baud" in said(bytes(range(1, 33)) * 3)

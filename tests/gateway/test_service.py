@@ -1,5 +1,6 @@
 """The whole gateway: virtual board -> pty -> gateway -> real Zenoh -> subscriber."""
 
+import datetime
 import fcntl
 import os
 import threading
@@ -16,6 +17,7 @@ from gateway import service
 from gateway.gnss.ubx import Epoch, ubx_bytes
 from gateway.settings import DeviceSettings, GatewaySettings
 from gateway.virtual.board_link import PtyLink, TcpLink
+from gateway.virtual.satellites import of_sky
 from gateway.virtual.virtual_board import (
     PLAYED,
     SIMULATED,
@@ -27,7 +29,7 @@ from gateway.virtual.virtual_board import (
 from gyrofree.running.log_items import LOG_EPOCH_S
 from messages.bus.session import BusSettings, open_client, open_router, subscribe
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import ACCEL, BOARD, GNSS, LINK, LOCATION, TACHO, history_key
+from messages.contract.topics import ACCEL, BOARD, GNSS, LINK, LOCATION, SKY, TACHO, history_key
 from messages.history.answers import ask
 from messages.history.journal_file import records, scan
 
@@ -75,7 +77,7 @@ class Bench:
                 self.bus.prefix,
                 lambda _, message, name=topic.name: self.seen[name].append(message),
             )
-            for topic in (ACCEL, TACHO, LINK, BOARD, GNSS, LOCATION)
+            for topic in (ACCEL, TACHO, LINK, BOARD, GNSS, LOCATION, SKY)
         ]
 
     def gateway(
@@ -463,6 +465,9 @@ def test_history_answers_the_very_records(bench):
     link.close()
 
 
+NOON, PLACE = datetime.datetime(2024, 1, 1, 12, tzinfo=datetime.UTC), (40.1, -105.1, 1600.0)
+
+
 def epoch_bytes(t_s: float) -> bytes:
     return ubx_bytes(
         Epoch(
@@ -487,7 +492,7 @@ def test_gnss_in_frames_of_the_board(bench):
     items = sorted(
         [
             *samples(200, period_s=0.01),
-            *(BoardBytes(k / 4, epoch_bytes(k / 4)) for k in range(1, 8)),
+            *(BoardBytes(k / 4, epoch_bytes(k / 4) + of_sky(NOON, PLACE)) for k in range(1, 8)),
         ],
         key=lambda item: item.t_s,
     )
@@ -508,6 +513,8 @@ def test_gnss_in_frames_of_the_board(bench):
         got[0].longitude_deg,
         got[0].height_m,
     )
+    skies = bench.seen["sky"]  # told four times a second, published once
+    assert 1 <= len(skies) <= 2 and skies[0].header.sequence == 1 and len(skies[0].satellites) > 9
     link.close()
 
 

@@ -14,8 +14,8 @@ import traceback
 from pathlib import Path
 
 import pytest
-import typer
 from support.broken_files import SPOILS, WHOLE, broken, good
+from support.command_tree import commands
 from typer.testing import CliRunner
 
 import gyrofree.commands
@@ -52,16 +52,6 @@ ALSO = {  # further ways of a command
 }
 KEEPS = {"sessions", "users", "export", "report", "rerun", "replay", "reprocess"}
 LONG = {"demo", "layout optimise", "reproduce in-motion", "reproduce gyro-free", "reprocess"}
-
-
-def commands(command=None, name=()):
-    command = command or typer.main.get_command(app)
-    if not hasattr(command, "commands"):
-        return {" ".join(name): command}
-    found = {}
-    for key, inner in command.commands.items():
-        found |= commands(inner, (*name, key))
-    return found
 
 
 COMMANDS = commands()

@@ -4,7 +4,7 @@ import json
 import logging
 
 import pytest
-import typer
+from support.command_tree import commands
 from typer.testing import CliRunner
 
 from estimator.settings import EstimatorSettings
@@ -36,16 +36,6 @@ ORDERS = {
     "procedure check",
     "procedure show",
 }  # they do something, and have no result to print
-
-
-def commands(command=None, name=()):
-    command = command or typer.main.get_command(app)
-    if not hasattr(command, "commands"):
-        return {" ".join(name): command}
-    found = {}
-    for key, inner in command.commands.items():
-        found |= commands(inner, (*name, key))
-    return found
 
 
 COMMANDS = commands()

@@ -2,13 +2,16 @@
 `gyrofree demo` starts.
 """
 
+import contextlib
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 
+import httpx
 import pytest
 
 from gyrofree.config import load
@@ -16,6 +19,7 @@ from messages.bus import orders
 from messages.bus.session import open_client, subscribe
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import PROCEDURE, TRUTH
+from tests.support.front_door import wait_for
 from tests.support.stack import RunningDemo
 
 M = pb.ProcedureStatus
@@ -102,6 +106,15 @@ class Bench:
     def ended(self) -> M:
         return self.until(lambda m: m.state >= M.STATE_DONE and "closed" not in m.instruction)
 
+    @contextlib.contextmanager
+    def page(self) -> Iterator[httpx.Client]:
+        """A browser that is signed in; only once, as the link is."""
+        url, token = self.demo.link.split("/login/link?token=")
+        with httpx.Client(base_url=url, timeout=30.0, headers={"origin": url}) as client:
+            assert client.post("/login/link", data={"token": token}).status_code == 303
+            client.headers["x-csrf-token"] = client.get("/api/me").json()["csrf"]
+            yield client
+
     def report(self, session: str, *more: str) -> dict:
         out = self.demo.folder / f"out-{time.monotonic_ns()}"
         words = ["report", session, "--config", str(self.demo.config), "--out", str(out), *more]
@@ -154,13 +167,34 @@ def test_a_killed_service_goes_on_where_it_was(bench):
     assert end.steps[0].until_us == m.steps[0].until_us < end.steps[1].from_us
 
 
+def test_a_table_stops_by_itself_when_its_driver_hangs_and_the_step_is_repeated(bench):
+    bench.start("longer")
+    bench.until(lambda m: m.step == 1 and m.steps[1].state == M.Step.STATE_DWELL)
+    service, until = bench.demo.children()["procedures"].pid, time.monotonic() + 30.0
+    os.kill(service, signal.SIGSTOP)
+    try:
+        while abs(bench.truth.omega_ib_b_radps[2]) > 0.02:
+            assert time.monotonic() < until, "it turns, and nobody holds it"
+            time.sleep(0.05)
+    finally:
+        os.kill(service, signal.SIGCONT)
+    assert "the table stops by itself" in bench.demo.text()
+    m = bench.until(lambda m: m.steps[1].spoilt)
+    assert "it turns at" in m.message, m.message
+    assert bench.order("ABORT").ok
+    assert bench.ended().state == M.STATE_ABORTED
+
+
 def test_an_emergency_stop_stands_the_table_and_ends_the_run(bench):
     bench.start("longer")
     bench.until(lambda m: m.step == 1 and m.steps[1].state == M.Step.STATE_DWELL)
     assert abs(bench.truth.omega_ib_b_radps[2]) > 1.0
-    assert bench.order("STOP").ok
-    m = bench.ended()
-    assert m.state == M.STATE_STOPPED and "anna" in m.message
+    with bench.page() as page:
+        assert [one["device"] for one in page.get("/api/tables").json()] == ["cube"]
+        assert page.post("/api/devices/cube/stop", json={}).json() == {"message": "stopped"}
+        m = bench.ended()
+        wait_for(lambda: page.get("/api/tables").json() == [], "the table is let go")
+    assert m.state == M.STATE_STOPPED and "by demo" in m.message
     assert abs(bench.truth.omega_ib_b_radps[2]) < 0.02 or bench.truth.profile_time_s < 5.0
     said = json.loads(bench.report(m.session)[".json"])
     assert said["verdict"] == "incomplete" and said["procedure"]["state"] == "STATE_STOPPED"

@@ -90,5 +90,5 @@ def test_a_hand_and_the_drive_do_not_meet():
 def test_what_the_drive_cannot_is_refused():
     table = driven()
     for order in ((800.0 * DEG, None), (10.0, 1000.0), (float("nan"), None), (1.0, 0.0)):
-        with pytest.raises(ValueError, match="deg/s"):
+        with pytest.raises(ValueError, match="°/s"):
             table.set_rate(*order)

@@ -63,6 +63,19 @@ def test_nothing_valid_is_contradicted_after_an_exclusion(fault, name, profile, 
     assert beyond.sum() <= 0.001 * max(valid[after].sum(), 1)
 
 
+@pytest.mark.parametrize("name", ["products-ekf", "products-ukf", "products-mhe"])
+@pytest.mark.parametrize("fault", ["a13:biased=2@0", "a43:biased=-2@0", "a22:biased=3@0"])
+@pytest.mark.parametrize("profile, seed", [("published", 2), ("wobble", 1)])
+def test_an_axis_that_was_always_far_off_is_left_out_and_no_motion(fault, name, profile, seed):
+    """Nothing is valid before; afterwards sigma is right with each of the axes missing."""
+    error, sigma, valid, since = followed(fault, profile, seed, name)
+    assert (since >= 0).any() and valid.mean() > 0.7
+    beyond = (np.abs(error) > 5.0 * sigma) & valid
+    assert beyond.sum() <= 0.001 * valid.sum()
+    nees = [np.mean((error[v, k] / sigma[v, k]) ** 2) for k, v in enumerate(valid.T)]
+    assert max(nees) < 2.5, nees
+
+
 def test_a_filter_goes_on_at_once_with_the_axes_that_stay():
     error, sigma, valid, since = followed("a21:swapped=a22@0", "published", 5, "products-ekf")
     soon = (since >= 0) & (since < 500)

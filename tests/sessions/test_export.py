@@ -303,6 +303,10 @@ def test_an_export_is_read_again_as_the_log_it_was(tmp_path, session):
     np.testing.assert_allclose(log.t_s, found[key].data["utc_s"], atol=1e-6)
     if session == "table":
         np.testing.assert_array_equal(log.counts[:, 0], found[key].data["a11_counts"])
+        reports = found["gyrofree/cube/tacho"].data
+        rates = dict(zip(np.round(reports["utc_s"], 5), reports["omega_radps"], strict=True))
+        wanted = [rates.get(t, 0.0) for t in np.round(log.t_s, 5)]  # no pulse: it stands
+        assert len(reports["utc_s"]) > 100 and np.array_equal(log.tacho, wanted)
         return
     np.testing.assert_array_equal(log.f_b[:, 1], found[key].data["f_b_mps2_y"])
     fixes = found["gyrofree/car/gnss"].data

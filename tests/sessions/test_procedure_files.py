@@ -2,7 +2,11 @@
 
 import math
 import os
+import signal
+import subprocess
+import sys
 import threading
+import time
 import tty
 
 import pytest
@@ -11,6 +15,7 @@ from hypothesis import strategies as st
 
 from sessions.procedure import library
 from sessions.procedure.batch import COLUMNS, Cell, Unit, marked, remarks
+from sessions.procedure.left_alone import watch
 from sessions.procedure.library import ProcedureError, find, names, of_text
 from sessions.procedure.model import DEG
 from sessions.procedure.profile_file import profile_of
@@ -117,6 +122,7 @@ def test_a_table_is_spoken_to_in_its_own_words():
     assert line.lines == [
         "*IDN?",
         "SYST:REM",
+        "SYST:WATC 3.0000",
         "SOUR:ACC 45.0000",
         "SOUR:RATE -90.0000",
         "SENS:RATE?",
@@ -127,6 +133,46 @@ def test_a_table_is_spoken_to_in_its_own_words():
         table.set_rate(800.0 * DEG)
     with pytest.raises(TableError):
         table.set_rate(math.nan)
+
+
+DRIVER = """
+import sys, time
+from sessions.procedure.table import TextTable, described
+table = TextTable(described("simulated"), sys.argv[1])
+table.take()
+table.set_rate(1.0)
+print("turns", flush=True)
+time.sleep(60)
+"""
+
+
+def test_a_table_whose_driver_is_killed_is_stopped_by_the_guard():
+    replies = {"*IDN?": "gyrofree,simulated rate table", "SENS:RATE?": "57.3"}
+    line = Answers(lambda text: replies.get(text, "OK"))
+    words = [sys.executable, "-P", "-c", DRIVER, line.path]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, start_new_session=True) as driver:
+        assert driver.stdout.readline() == b"turns\n"
+        assert "OUTP:STOP" not in line.lines
+        os.killpg(driver.pid, signal.SIGKILL)
+    end = time.monotonic() + 30.0
+    while "OUTP:STOP" not in line.lines:
+        assert time.monotonic() < end, line.lines
+        time.sleep(0.05)
+
+
+def test_a_driver_that_hangs_and_one_that_lets_go():
+    line = Answers(lambda _: "OK")
+    table = TextTable(described("simulated"), line.path)
+    source, driver = os.pipe()
+    done: list[int] = []
+    guard = threading.Thread(target=lambda: done.append(watch(source, table, 0.2)))
+    guard.start()
+    end = time.monotonic() + 30.0
+    while "OUTP:STOP" not in line.lines and time.monotonic() < end:
+        time.sleep(0.05)
+    os.write(driver, b"q")
+    guard.join(10.0)
+    assert done == [0] and line.lines == ["OUTP:STOP"]
 
 
 @pytest.mark.parametrize("reply", [None, "ERR busy", "nan", "\x00\xff" * 9])

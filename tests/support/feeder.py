@@ -257,6 +257,18 @@ class Feeder:
         fix.v_n_mps.extend(v)
         fix.header.sequence = self._k
         self._put(tp.GNSS, device, fix)
+        sky = pb.Sky(header=header, talker="UBX")
+        for number in range(1, 13):
+            sky.satellites.add(
+                name=f"G{number:02d}",
+                constellation=pb.Sky.CONSTELLATION_GPS,
+                number=number,
+                elevation_deg=7.0 * number,
+                azimuth_deg=(77.0 * number) % 360,
+                cn0_dbhz=20.0 + 2.5 * number if number > 1 else math.nan,
+                use=pb.Sky.USE_YES if number > 2 else pb.Sky.USE_NO,
+            )
+        self._put(tp.SKY, device, sky)
         nis = self._random.chisquare(6) * (1 if good else 30)
         correction = pb.Innovation(
             header=header, estimator="ekf", nis=nis, dof=6, accepted=good, for_sequence=self._k

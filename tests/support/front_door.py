@@ -41,6 +41,18 @@ def wait_for(condition: Callable[[], Any], what: str, seconds: float = 20.0) -> 
 
 
 @functools.cache
+def ended(client: httpx.Client, answer: httpx.Response) -> dict[str, Any]:
+    """The job that an order began, once it has ended."""
+    assert answer.status_code == 200, answer.text
+    number = answer.json()["number"]
+    states = ("done", "failed")
+    return wait_for(
+        lambda: (job := client.get(f"/api/jobs/{number}").json())["state"] in states and job,
+        "job",
+        240,
+    )
+
+
 def _users() -> str:
     """A users file, made once: argon2 is slow on purpose."""
     with tempfile.TemporaryDirectory() as folder:

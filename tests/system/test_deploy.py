@@ -3,6 +3,11 @@
 import tomllib
 from pathlib import Path
 
+import yaml
+
+from gyrofree.config import load
+from gyrofree.running.watch import SERVICES
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -44,3 +49,33 @@ def test_every_package_is_listed():
     """An installation that is not editable has only what the list names."""
     found = {path.parent.name for path in ROOT.glob("*/__init__.py")}
     assert packages() == found - {"tests"}
+
+
+def compose() -> dict:
+    return yaml.safe_load((ROOT / "docker-compose.yml").read_text())["services"]
+
+
+def test_the_containers_are_the_services_of_up_and_a_board():
+    """Each as `up` starts it, with its sign of life; besides them the simulated board alone."""
+    run = {name: words["command"][0] for name, words in compose().items()}
+    assert sorted(set(run.values()) - {"simulate"}) == sorted(SERVICES)
+    assert len(run) == len(SERVICES) + 1 and run["board"] == "simulate"
+    for name, words in compose().items():
+        if name != "board":
+            assert words["healthcheck"]["test"] == ["CMD", "gyrofree", "doctor", "--health", name]
+
+
+def test_what_the_containers_are_configured_to_write_is_kept_in_a_volume():
+    settings = load(ROOT / "deploy" / "gyrofree.toml")
+    written = {
+        "gateway": settings.gateway.journal,
+        "estimator": settings.estimator.journal,
+        "recorder": settings.recorder.root,
+        "procedures": settings.procedures.root,
+        "dashboard": settings.dashboard.users,
+    }
+    volumes = yaml.safe_load((ROOT / "docker-compose.yml").read_text())["volumes"]
+    for name, path in written.items():
+        kept = [entry.split(":")[:2] for entry in compose()[name]["volumes"]]
+        inside = [volume for volume, at in kept if Path(at) in (path, *Path(path).parents)]
+        assert inside and set(inside) <= set(volumes), (name, path)

@@ -19,8 +19,9 @@ from typing import Any
 import numpy as np
 import viser
 
+from dashboard.data.ring import gap_limit
 from dashboard.scene.drawing import series
-from dashboard.scene.drawing.page import tag
+from dashboard.scene.drawing.page import explained, tag
 from dashboard.scene.drawing.palette import number, rgba
 from logs.figures.stretch import stretch
 
@@ -174,15 +175,22 @@ class Chart:
             stale = " gf-stale" if curve.stale else ""
             sample = tag("i", class_=mark, style=f"border-color:{curve.colour}")
             items.append(
-                tag("span", sample, curve.label, " ", tag("b", value), class_=f"gf-item{stale}")
+                tag(
+                    "span",
+                    sample,
+                    explained(curve.label),
+                    " ",
+                    tag("b", value),
+                    class_=f"gf-item{stale}",
+                )
             )
         for shade in shades:
             if shade.on.any():
                 style = f"border-color:{shade.colour};border-width:8px"
                 sample = tag("i", class_="gf-line", style=style)
-                items.append(tag("span", sample, shade.label, class_="gf-item"))
+                items.append(tag("span", sample, explained(shade.label), class_="gf-item"))
         items = items or [tag("span", "no data yet", class_="gf-item gf-stale")]
-        title = tag("span", self._title, " ", tag("em", self._unit), class_="gf-title")
+        title = tag("span", explained(self._title), " ", tag("em", self._unit), class_="gf-title")
         legend = tag("span", *items, class_="gf-legend")
         data = json.dumps(told, separators=(",", ":"), ensure_ascii=False)
         return str(tag("div", title, legend, class_="gf-chart", data_chart=data))
@@ -207,7 +215,7 @@ class Chart:
                     "strip": {"range": (0, 1 / LATE_HEIGHT)},
                 },
                 axes=(
-                    {"size": 26, "font": "11px sans-serif"},
+                    {"size": 42, "font": "11px sans-serif"},  # with the origin below the numbers
                     {"size": 46, "font": "11px sans-serif"},
                 ),
                 legend={"show": False},
@@ -288,7 +296,7 @@ def _data(
     t, y = curves[primary].t, curves[primary].y
     if not np.isfinite(y).any():
         t = t[:0]  # samples without a value are no values: all of it is a gap
-    pause = max(series.gap_limit(t), 2.5 * (edges[1] - edges[0]))
+    pause = max(gap_limit(t), 2.5 * (edges[1] - edges[0]))
     out.append(series.gap_mask(t, edges, pause).astype(np.uint8))
     return tuple(out)
 

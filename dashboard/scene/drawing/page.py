@@ -1,14 +1,15 @@
 """HTML of the panels, made of elements: whatever is text is escaped on its way in.
 
 A panel never writes tags into a text of its own: what `Panel.html` gets as a plain str is shown as
-it stands, so that a forgotten place shows its tags instead of obeying somebody else's.
+it stands, so that a forgotten place shows its tags instead of obeying somebody else's. Words of the
+trade are explained where they stand in notes, alerts, tables and headings of charts.
 """
 
 from collections.abc import Iterable
 
 from markupsafe import Markup
 
-from dashboard.terms import TERMS, glossary_link
+from logs.figures.words import explained, glossary_link, link
 from messages.text import html
 
 __all__ = [
@@ -16,6 +17,7 @@ __all__ = [
     "Markup",
     "alert",
     "bad",
+    "explained",
     "html",
     "joined",
     "note",
@@ -47,12 +49,12 @@ def tag(name: str, *inside: object, **attributes: object) -> Markup:
 
 def note(*inside: object) -> Markup:
     """A paragraph in small print; nothing when there is nothing to say."""
-    return tag("p", *inside, class_="gf-note") if any(inside) else EMPTY
+    return tag("p", *map(explained, inside), class_="gf-note") if any(inside) else EMPTY
 
 
 def alert(*inside: object) -> Markup:
     """A paragraph that calls; nothing when there is nothing to say."""
-    return tag("p", *inside, class_="gf-alert") if any(inside) else EMPTY
+    return tag("p", *map(explained, inside), class_="gf-alert") if any(inside) else EMPTY
 
 
 def bad(*inside: object) -> Markup:
@@ -67,13 +69,10 @@ def sub(letter: str, index: str) -> Markup:
 
 def term(word: str, shown: str = "") -> Markup:
     """A word of the trade with what it means, and a link to the glossary."""
-    meaning = TERMS[word]
-    inside = tag("abbr", shown or word, title=meaning, aria_label=f"{shown or word}: {meaning}")
-    link = {"href": glossary_link(word), "target": "_blank", "rel": "noopener"}
-    return tag("a", inside, class_="gf-term", **link)
+    return link(word, shown or word, glossary_link(word))
 
 
 def rows(items: Iterable[tuple[object, object]], stale: bool = False) -> Markup:
     """A two-column table."""
-    body = (tag("tr", tag("td", label), tag("td", value)) for label, value in items)
+    body = (tag("tr", *(tag("td", explained(cell)) for cell in item)) for item in items)
     return tag("table", *body, class_="gf-rows gf-stale" if stale else "gf-rows")

@@ -61,13 +61,6 @@ def gap_mask(t: np.ndarray, edges: np.ndarray, gap_s: float) -> np.ndarray:
     return (bounds[after] - bounds[after - 1] > gap_s).astype(float)
 
 
-def gap_limit(t: np.ndarray, least: float = 0.25) -> float:
-    """The pause between samples above which a series counts as interrupted: five usual periods, at
-    least `least` s.
-    """
-    return least if len(t) < 3 else max(least, 5.0 * float(np.median(np.diff(t))))
-
-
 def stretch_mask(stretches: Sequence[Sequence[float]], edges: np.ndarray) -> np.ndarray:
     """1 inside the stretches [from, until], s, else 0; (2 b,) for b buckets, one bucket at least
     for each.

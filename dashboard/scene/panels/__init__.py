@@ -14,6 +14,7 @@ from dashboard.scene.panels.guided.wiring import Wiring
 from dashboard.scene.panels.motion.acceleration import Acceleration
 from dashboard.scene.panels.motion.angle import Angle
 from dashboard.scene.panels.motion.axes import Axes
+from dashboard.scene.panels.motion.derived import Derived
 from dashboard.scene.panels.motion.errors import Errors
 from dashboard.scene.panels.motion.innovations import Innovations
 from dashboard.scene.panels.motion.race import Race
@@ -23,6 +24,7 @@ from dashboard.scene.panels.motion.tilt import Tilt
 from dashboard.scene.panels.navigation.filters import Navigation
 from dashboard.scene.panels.navigation.horizon import Horizon
 from dashboard.scene.panels.navigation.position import Position
+from dashboard.scene.panels.navigation.sky import SkyPanel
 from dashboard.scene.panels.session.record import Record
 from dashboard.scene.panels.session.timeline import Timeline
 
@@ -32,6 +34,7 @@ PAGES: tuple[type[Panel], ...] = (
     Angle,
     Tilt,
     Race,
+    Derived,
     ProcedurePanel,
     Axes,
     Health,
@@ -44,6 +47,7 @@ PAGES: tuple[type[Panel], ...] = (
     LayoutBench,
     Position,
     Navigation,
+    SkyPanel,
     Horizon,
     Errors,
 )

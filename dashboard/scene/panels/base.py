@@ -42,6 +42,7 @@ class Snapshot:
     now: float  # time.monotonic(), s; of a replay that is paused, when it was
     dark: bool
     cursors: tuple[float, float] | tuple[()] = ()  # s, of the stretch that is measured
+    derived: tuple[str, ...] = ()  # expressions of this browser, as people typed them
 
     def rows(self, topic: str, estimator: str = "") -> tuple[np.ndarray, np.ndarray]:
         """Times (n,) s and rows (n,) of a topic inside the window; columns by name (tables.py)."""
@@ -60,6 +61,7 @@ class Panel:
     title = ""
     workspace = ""  # key of one of dashboard.scene.workspaces.WORKSPACES
     desk: Desk  # set by the view: how a panel gives orders
+    user = ""  # set by the view: who is signed in, as the relay says
     own_inputs: tuple[str, ...] = ()  # labels of inputs that change this browser's own view only
     own_scene = False  # True: the page shows something else than the device in 3-D
 

@@ -124,7 +124,7 @@ class Relay:
         self._rate = Rate(settings.message_rate)
         self._refused: set[str] = set()  # names said already
         self._who = "nobody"
-        self._told = ""  # role that the scene knows of
+        self._told = ""  # role and name that the scene knows of
 
     async def run(self, port: int) -> None:
         """Until either side ends."""
@@ -233,12 +233,12 @@ class Relay:
             log.warning("refused %s of %s (%s) to the scene", plain(name, 64), self._who, role.name)
 
     async def _tell_role(self, scene: websockets.ClientConnection) -> None:
-        """Let the scene know whose orders are his, so that it greys the others'."""
+        """Let the scene know who looks: it greys what is not his, and orders bear his name."""
         found = self._gate.look_up(self._key)
-        role = "" if found is None else found[1].role.name
-        if role and self._widgets.role and role != self._told:
-            self._told = role
-            await scene.send(update(self._widgets.role, role))
+        who = "" if found is None else f"{found[1].role.name} {found[1].name}"
+        if who and self._widgets.role and who != self._told:
+            self._told = who
+            await scene.send(update(self._widgets.role, who))
 
     async def _watch(self, scene: websockets.ClientConnection) -> tuple[int, str]:
         """Ends the connection of a browser that was signed out, also when it sends nothing."""

@@ -19,7 +19,7 @@ from dashboard.web.auth import Role
 log = logging.getLogger(__name__)
 
 ROLE = "Role"  # label of the input by which the scene is told who looks; nobody else writes there
-TEXT_LENGTH = 2000  # characters of an input
+TEXT_LENGTH = 6000  # characters of an input
 NAME_LENGTH = 300  # of an identifier or a node's name
 FAR = 1e9  # of a number without a bound of its own
 WHOLE = 1 << 62

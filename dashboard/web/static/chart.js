@@ -3,11 +3,11 @@
 // all of it, arrow keys to move, + and - to zoom.
 
 import { Cursors } from "/static/cursors.js";
+import { keyed, selectable } from "/static/drag.js";
 import { dress } from "/static/figure.js";
 
 const { uPlot } = window; // vendor/uplot, a classic script before this module
 const FONT = "12px system-ui, 'DejaVu Sans', sans-serif";
-const DRAGGED = 8; // px that make a drag of a click
 const LOOK_MS = 120; // a window that still changes asks for no new points
 const UNTOLD = 2; // uPlot.join: null is a gap, also for the times that only another line has
 
@@ -99,7 +99,7 @@ export class Plot {
     this.chart = new uPlot({
       width, height, ...seriesOf(this.lines), legend: { show: false }, padding: [8, 10, 0, 0],
       scales: { x: { time: false, auto: false, range: (_, a, b) => [a, b] }, y: { range } },
-      axes: [axis(" s", { space: 60, size: 28 }), axis("", { space: 30, size: 58 })],
+      axes: [axis(" s", { space: 60, size: 42 }), axis("", { space: 30, size: 58 })],
       cursor: {
         y: false, points: { show: false }, drag: { x: false, y: false },
         sync: { key: this.group.cursorKey, scales: ["x", null] },
@@ -108,7 +108,7 @@ export class Plot {
       hooks: { setCursor: [(u) => this.say(u)] },
     }, table(this.lines), this.root);
     dress(this.chart, () => this.described());
-    this.listen(this.chart.over);
+    selectable(this.chart, (a, b) => this.group.look(a, b), (t) => this.group.click(t));
     const figure = this.root.parentElement;
     figure.querySelectorAll(".gf-tools, .gf-between").forEach((old) => old.remove());
     this.group.cursors.add(this.chart, figure, () => this.described());
@@ -135,7 +135,7 @@ export class Plot {
     });
     const fresh = this.lines.every((line) => line.measured && line.asked === this.group.asked);
     return {
-      title: this.title, unit: this.unit, origin: "s since the recording began",
+      title: this.title, unit: this.unit, origin: this.group.origin, of: this.group.of, provisional: this.group.provisional, done: true,
       ranges: this.marks.map((mark) => [mark.t, mark.until ?? mark.t, mark.text, mark.kind ?? "mark"]), lines: () => lines,
       measured: fresh ? Object.fromEntries(this.lines.map((line) => [line.short, line.measured])) : null,
     };
@@ -151,35 +151,6 @@ export class Plot {
     }).filter(Boolean);
     this.readout.textContent = `${t.toFixed(2)} s: ${values.join(", ")}`;
   }
-
-  // uPlot selects with a mouse only; this does with a finger, too.
-  listen(over) {
-    let from = null;
-    const at = (event) => Math.min(over.clientWidth, Math.max(0, event.clientX - over.getBoundingClientRect().left));
-    const show = (left, width) => this.chart.setSelect({ left, width, top: 0, height: width ? over.clientHeight : 0 }, false);
-    over.addEventListener("pointerdown", (event) => {
-      if (event.button) return;
-      from = at(event);
-      over.setPointerCapture(event.pointerId);
-    });
-    over.addEventListener("pointermove", (event) => {
-      const x = at(event);
-      if (event.pointerType !== "mouse") this.chart.setCursor({ left: x, top: 0 });
-      if (from !== null) show(Math.min(from, x), Math.abs(x - from));
-    });
-    const end = (event) => {
-      if (from === null) return;
-      const [a, b] = [from, at(event)].sort((p, q) => p - q).map((x) => this.chart.posToVal(x, "x"));
-      const far = Math.abs(at(event) - from) > DRAGGED;
-      from = null;
-      show(0, 0);
-      if (event.type === "pointercancel") return; // the browser scrolls the page
-      if (far) this.group.look(a, b);
-      else this.group.click(b);
-    };
-    over.addEventListener("pointerup", end);
-    over.addEventListener("pointercancel", end);
-  }
 }
 
 // Charts with one axis of time. `onLook(begin, end)` after a change of the window, `click(t)` for a click.
@@ -190,6 +161,7 @@ export class Group {
     this.plots = [];
     this.span = this.window = [0, 1];
     this.asked = ""; // the stretch that the server is asked to measure
+    Object.assign(this, { origin: "s", of: "every sample", provisional: false });
     this.cursors = new Cursors((a, b) => {
       this.asked = a === null ? "" : `${a}_${b}`;
       clearTimeout(this.timer);
@@ -198,6 +170,11 @@ export class Group {
     this.cursorKey = `charts ${Group.count++}`;
     Object.assign(this, { onLook, click });
     onTheme(() => this.plots.forEach((plot) => { if (plot.chart) { plot.build(); plot.look(); } }));
+  }
+
+  remove(plot) {
+    plot.chart?.destroy();
+    this.plots = this.plots.filter((one) => one !== plot);
   }
 
   look(begin, end) {
@@ -212,10 +189,9 @@ export class Group {
 
   key(event) {
     if (event.defaultPrevented) return;
-    const [a, b] = this.window, w = b - a;
-    const moves = { ArrowLeft: [a - w / 4, b - w / 4], ArrowRight: [a + w / 4, b + w / 4], "+": [a + w / 4, b - w / 4], "-": [a - w / 2, b + w / 2], 0: this.span };
-    if (!(event.key in moves)) return;
+    const to = keyed(event.key, this.window, this.span);
+    if (!to) return;
     event.preventDefault();
-    this.look(...moves[event.key]);
+    this.look(...to);
   }
 }

@@ -16,11 +16,12 @@ const more = () => {
   return query;
 };
 
-const overlay = new Overlay(page, ids, more, { state: say, data: showTables, click: () => {} });
+const overlay = new Overlay(page, ids, more, { state: say, data: showTables, asked: (anew) => { if (anew) settled(false, "Provisional: being computed anew."); }, click: () => {} });
 
 function say(text, fault = false) {
   state.textContent = text;
   state.className = fault ? "fault" : "dim";
+  if (fault) settled(false, "Not computed; what is dimmed is of before.");
 }
 
 const HOW = { reference: "the others are moved", clock: "one board's clock", tacho: "tachometer", rate: "rate of turn", start: "by their starts", given: "by hand" };
@@ -46,15 +47,20 @@ function showTables(answer) {
     `${d.session}: ${d.track.split("/").slice(1).join(" ")}`, "track: north / east / down, m",
     ...d.rms_ned_m.map((v) => v === null ? "–" : v.toPrecision(3)), `${d.seconds.toFixed(1)} s`,
   ])));
-  const provisional = answer.state === "reading"; // part of a recording: its figures will change
-  for (const table of document.querySelectorAll("main table")) {
-    table.classList.toggle("provisional", provisional);
-    table.setAttribute("aria-busy", String(provisional));
-  }
-  document.getElementById("provisional").hidden = !provisional;
-  document.getElementById("provisional").textContent = provisional
-    ? `Provisional: ${Math.floor(100 * answer.done)} % of the recordings is read, these figures will change.` : "";
+  // part of a recording: its figures will change
+  settled(answer.state !== "reading", `Provisional: ${Math.floor(100 * answer.done)} % of the recordings is read, these figures will change.`);
   document.body.dataset.plotted = answer.state;
+}
+
+// Figures that will change are dimmed, and it is said why.
+function settled(is, why) {
+  for (const table of document.querySelectorAll("main table:not(.gf-between table)")) {
+    table.classList.toggle("provisional", !is);
+    table.setAttribute("aria-busy", String(!is));
+  }
+  const words = document.getElementById("provisional");
+  words.hidden = is;
+  words.textContent = is ? "" : why;
 }
 
 function line(cells) {

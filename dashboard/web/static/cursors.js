@@ -25,6 +25,24 @@ export function drawn(line, a, b) {
   };
 }
 
+// The tools that save a chart as a picture; host gets them.
+export function pictures(u, host, describe) {
+  const doc = host.ownerDocument, bar = doc.createElement("div");
+  bar.className = "gf-tools";
+  const button = (label, title, work) => {
+    const made = doc.createElement("button");
+    Object.assign(made, { type: "button", textContent: label, title });
+    made.setAttribute("aria-label", title);
+    made.addEventListener("click", work);
+    bar.append(made);
+    return made;
+  };
+  button("SVG", "Save the figure as SVG", () => saveSvg(u, describe()));
+  button("PNG", "Save the figure as PNG", () => savePng(u, describe()));
+  (host.querySelector("figcaption") ?? host).append(bar);
+  return { bar, button };
+}
+
 // Charts that share two cursors. changed(a, b) after each change, with nulls when there are none.
 export class Cursors {
   constructor(changed = () => {}) {
@@ -44,20 +62,9 @@ export class Cursors {
   }
 
   tools(one) {
-    const doc = one.host.ownerDocument, bar = doc.createElement("div");
-    bar.className = "gf-tools";
-    const button = (label, title, work) => {
-      const made = doc.createElement("button");
-      Object.assign(made, { type: "button", textContent: label, title });
-      made.setAttribute("aria-label", title);
-      made.addEventListener("click", work);
-      bar.append(made);
-      return made;
-    };
+    const { bar, button } = pictures(one.u, one.host, one.describe);
     one.switch = button("‖", "Two cursors (key C; arrows move one, X takes the other, Esc clears)", () => this.toggle(one.u));
-    button("SVG", "Save the figure as SVG", () => saveSvg(one.u, one.describe()));
-    button("PNG", "Save the figure as PNG", () => savePng(one.u, one.describe()));
-    (one.host.querySelector("figcaption") ?? one.host).append(bar);
+    bar.prepend(one.switch);
     if (!one.host.querySelector("[tabindex]")) one.host.tabIndex = 0;
   }
 
@@ -165,7 +172,8 @@ export class Cursors {
       made.firstChild.style.color = line.color;
       table.append(made);
     }
-    const words = `A to B, ${a.toFixed(3)} s to ${b.toFixed(3)} s: ${(b - a).toFixed(3)} s, ${rough ? "of the points drawn" : "of every sample"}`;
+    const words = `A to B, ${a.toFixed(3)} s to ${b.toFixed(3)} s: ${(b - a).toFixed(3)} s, ${rough ? "of the points drawn" : `of ${figure.of ?? "every sample"}`}${figure.provisional ? "; provisional: the recording is still being read" : ""}`;
+    one.table.classList.toggle("provisional", Boolean(figure.provisional || rough));
     one.table.replaceChildren(cell("p", words), table);
   }
 }

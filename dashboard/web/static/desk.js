@@ -1,5 +1,6 @@
 // The row of workspaces: tabs, window, pause, view, notes; and what of it is kept for the person and for a link.
 import { call, toast } from "/static/rest.js";
+import { Derived } from "/static/derived.js";
 import { listen } from "/static/keys.js";
 import { drawTabs, moveByArrows } from "/static/tabs.js";
 import { ask, choose, link, state, whenStated } from "/static/view.js";
@@ -7,7 +8,7 @@ import { ask, choose, link, state, whenStated } from "/static/view.js";
 const byId = (id) => document.getElementById(id);
 const desk = byId("desk"), rooms = byId("rooms"), pages = byId("pages"), absent = byId("absent"), note = byId("note");
 const ROOMS = ["watch", "test", "diagnose", "calibrate", "navigate"];
-const KEPT = ["w", "p", "device", "window", "layers"];
+const KEPT = ["w", "p", "device", "window", "layers", "derived", "zoom"];
 const SAVE_MS = 1500;
 export const mayOperate = desk.dataset.operator === "1";
 const BARRED = "Takes the role operator; you look as viewer";
@@ -33,7 +34,7 @@ let saving = 0;
 function keep() {
   clearTimeout(saving);
   saving = setTimeout(() => {
-    if (state) call("me/view", { view: link(state) }).catch(() => {});
+    if (state) call("me/view", { view: link(state, false) }).catch(() => {});
   }, SAVE_MS);
 }
 
@@ -55,6 +56,7 @@ function draw(now) {
   if (!tabs.some((page) => page.key === now.page)) tabs.push({ key: now.page, title: now.title, hint: now.missing });
   drawTabs(pages, tabs, now.page, (key) => chosen({ p: key }));
   drawAbsent(now.rooms.filter((one) => one === room || !one.pages.length).flatMap((one) => one.absent));
+  derived.show(now.derived);
   byId("window").value = now.window;
   const pause = byId("pause");
   pause.setAttribute("aria-pressed", String(now.paused));
@@ -65,6 +67,11 @@ function draw(now) {
   byId("stage").setAttribute("aria-label", `${now.title}, ${now.device || "no device"}`);
   history.replaceState(null, "", `/?${link(now)}`);
 }
+
+const derived = new Derived(byId("derived"), {
+  named: async () => (state?.device ? call(`devices/${encodeURIComponent(state.device)}/channels`) : { channels: [], functions: [] }),
+  changed: (list) => chosen(list.length ? { derived: list.join(";"), p: "derived" } : { derived: "" }),
+});
 
 function drawAbsent(missing) {
   absent.hidden = !missing.length;
@@ -95,7 +102,7 @@ const togglePause = () => ask({ pause: state?.paused ? "0" : "1" });
 const resetCamera = () => ask({ do: "camera" });
 const toggleFollow = () => choose({ follow: state?.follow ? "0" : "1" });
 
-byId("window").addEventListener("change", (event) => chosen({ window: event.target.value }));
+byId("window").addEventListener("change", (event) => chosen({ window: event.target.value, zoom: "none" }));
 byId("pause").addEventListener("click", togglePause);
 byId("paused").querySelector("button").addEventListener("click", togglePause);
 byId("follow").addEventListener("change", toggleFollow);

@@ -10,7 +10,8 @@ const FACE = "system-ui, 'DejaVu Sans', sans-serif";
 const number = (v) => (v === 0 ? "0" : Math.abs(v) >= 1e5 || Math.abs(v) < 1e-3 ? v.toExponential(2) : String(Number(v.toPrecision(4))));
 
 // Least and greatest to be shown of the lines within [a, b], and the points that lie far outside.
-export function robust(lines, a, b) {
+// `done`: nothing more comes, so the newest points are no beginning of something.
+export function robust(lines, a, b, done = false) {
   const points = [];
   for (const line of lines) {
     for (let k = 0; k < line.x.length; k++) {
@@ -27,7 +28,7 @@ export function robust(lines, a, b) {
   const low = at(0.02), high = at(0.98), width = high - low;
   // rounding alone is no width: uPlot has no ticks so small
   if (!(width > 1e-9 * Math.max(Math.abs(low), Math.abs(high), 1e-3))) return null;
-  const settled = ([, x]) => x < b - FRESH * (b - a);
+  const settled = ([, x]) => done || x < b - FRESH * (b - a);
   const above = points.filter(([y]) => y > high + FAR * width), below = points.filter(([y]) => y < low - FAR * width);
   const odd = [above, below].flatMap((some) => (places(some) <= FEW && some.every(settled) ? some : []));
   if (!odd.length) return null;
@@ -43,7 +44,8 @@ export function dress(u, describe) {
   const scale = u.scales.y, usual = scale.range;
   scale.range = (self, min, max, key) => {
     const { min: a, max: b } = self.scales.x;
-    u.odd = a < b ? robust(describe().lines(), a, b) : null;
+    const figure = describe();
+    u.odd = a < b ? robust(figure.lines(), a, b, figure.done) : null;
     if (!u.odd) return usual(self, min, max, key);
     const margin = 0.12 * (u.odd.max - u.odd.min);
     return [u.odd.min - margin, u.odd.max + margin];
@@ -115,16 +117,18 @@ function drawOdd(u) {
   });
 }
 
+// Below the numbers of the time axis: what they count, and from when.
 function drawOrigin(u, { origin }) {
   if (!origin) return;
-  pen(u, (c, box, px) => {
-    c.fillStyle = ink(u);
-    c.globalAlpha = 0.6;
-    c.font = `${10 * px}px ${FACE}`;
-    c.textAlign = "right";
-    c.textBaseline = "bottom";
-    c.fillText(origin, box.right - 3 * px, box.bottom - 2 * px);
-  });
+  const c = u.ctx, { left, width } = u.bbox, px = devicePixelRatio;
+  c.save();
+  c.fillStyle = ink(u);
+  c.globalAlpha = 0.75;
+  c.font = `${11 * px}px ${FACE}`;
+  c.textAlign = "right";
+  c.textBaseline = "bottom";
+  c.fillText(origin, left + width, c.canvas.height - 2 * px, width);
+  c.restore();
 }
 
 // ---- the figure for a paper: white, black axes, units, legend
@@ -153,16 +157,25 @@ function trace(line, a, b, X, Y) {
   return path;
 }
 
+// The place of a value on an axis from `from` to `to`, px, and its ticks; over decades where the chart's scale is.
+function placed(scale, from, to, most) {
+  const { min, max, distr } = scale;
+  if (distr !== 3) return [(v) => from + ((v - min) / (max - min)) * (to - from), steps(min, max, most)];
+  const [a, b] = [Math.log10(min), Math.log10(max)], decades = [];
+  for (let k = Math.ceil(a - 1e-9); k <= b + 1e-9; k++) decades.push([10 ** k, k >= -3 && k <= 4 ? String(Number((10 ** k).toPrecision(1))) : `1e${k}`.replace("-", "−")]);
+  return [(v) => from + ((Math.log10(v) - a) / (b - a)) * (to - from), decades];
+}
+
 export function svg(u, figure) {
-  const { min: a, max: b } = u.scales.x, { min: low, max: high } = u.scales.y;
-  const X = (t) => L + ((t - a) / (b - a)) * (W - L - R), Y = (v) => H - B - ((v - low) / (high - low)) * (H - T - B);
+  const across = u.scales.x, upright = u.scales[figure.high ?? "y"], { min: a, max: b } = across, { max: high } = upright;
+  const [X, along] = placed(across, L, W - R, 8), [Y, up] = placed(upright, H - B, T, 6);
   const out = [
     `<svg xmlns="http://www.w3.org/2000/svg" width="${W}" height="${H}" viewBox="0 0 ${W} ${H}" font-family="DejaVu Sans, Helvetica, Arial, sans-serif" font-size="11">`,
     `<title>${escape(figure.title)}</title><rect width="${W}" height="${H}" fill="#fff"/>`,
     `<clipPath id="box"><rect x="${L}" y="${T}" width="${W - L - R}" height="${H - T - B}"/></clipPath>`,
   ];
-  for (const [v, words] of steps(low, high, 6)) out.push(`<path d="M${L} ${Y(v).toFixed(2)}H${W - R}" stroke="#ddd" stroke-width="0.6"/>`, text(L - 6, Y(v) + 4, words, 'text-anchor="end"'));
-  for (const [v, words] of steps(a, b, 8)) out.push(`<path d="M${X(v).toFixed(2)} ${T}V${H - B}" stroke="#ddd" stroke-width="0.6"/>`, text(X(v), H - B + 15, words, 'text-anchor="middle"'));
+  for (const [v, words] of up) out.push(`<path d="M${L} ${Y(v).toFixed(2)}H${W - R}" stroke="#ddd" stroke-width="0.6"/>`, text(L - 6, Y(v) + 4, words, 'text-anchor="end"'));
+  for (const [v, words] of along) out.push(`<path d="M${X(v).toFixed(2)} ${T}V${H - B}" stroke="#ddd" stroke-width="0.6"/>`, text(X(v), H - B + 15, words, 'text-anchor="middle"'));
   out.push('<g clip-path="url(#box)">');
   for (const [t0, t1, words, kind] of figure.ranges) {
     if (t1 < a || t0 > b) continue;
@@ -193,7 +206,7 @@ export function svg(u, figure) {
     out.push(`<path d="M${x} ${T - 10}h18" stroke="${line.color}" stroke-width="2"${line.dash?.length ? ` stroke-dasharray="${line.dash.join(" ")}"` : ""}/>`, text(x + 22, T - 6, line.label));
   }
   out.push(text(L, T - 6, figure.title, 'font-weight="bold" font-size="12"'));
-  out.push(text((L + W - R) / 2, H - 12, `time, ${figure.origin || "s"}`, 'text-anchor="middle"'));
+  out.push(text((L + W - R) / 2, H - 12, figure.across || `time, ${figure.origin || "s"}`, 'text-anchor="middle"'));
   out.push(`<text transform="translate(16 ${(T + H - B) / 2}) rotate(-90)" text-anchor="middle">${escape(figure.unit)}</text></svg>`);
   return out.join("");
 }

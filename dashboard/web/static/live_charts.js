@@ -1,15 +1,17 @@
 // The charts inside the scene's frame, which has the same origin: they get the tools of figure.js and cursors.js. What
 // they show stands in the heading above each (data-chart); see dashboard/scene/drawing/chart.py.
-import { Cursors } from "/static/cursors.js";
+import { Cursors, pictures } from "/static/cursors.js";
+import { keyed, selectable } from "/static/drag.js";
 import { dress } from "/static/figure.js";
-import { ask } from "/static/view.js";
+import { ask, choose, state, whenStated, zoomed } from "/static/view.js";
 
-const LOOK_MS = 500;
-const NEW_MS = 3000;
+const LOOK_MS = 250;
+const LEAST_S = 0.01; // of a zoom
 const EDGE = /[+−]3σ$/;
 const NAMELESS = "Value"; // what uPlot calls a series without a label
 const frame = document.getElementById("scene");
-const known = new WeakMap(); // chart -> when it was first seen
+const known = new WeakSet(); // charts that have their tools
+const banner = document.getElementById("zoomed");
 let stretch = "";
 
 const cursors = new Cursors((a, b) => {
@@ -38,15 +40,48 @@ function told(chart) {
 
 const asked = (measured) => Object.values(measured ?? {}).every(({ at }) => `${at[0]}_${at[1]}` === stretch);
 
+const overTime = (chart) => chart.scales.x.distr !== 3; // a spectrum has logarithmic axes
+const upright = (chart) => (overTime(chart) ? "y" : "level");
+
 function describe(chart) {
-  const { title = "", unit = "", origin = "", ranges = [], measured = null } = told(chart);
+  const { title = "", unit = "", origin = "", across = "", ranges = [], measured = null } = told(chart), high = upright(chart);
   const [x, ...data] = chart.data;
-  const lines = () => chart.series.slice(1).map((series, k) => ({ series, k })).filter(({ series }) => series.scale === "y" && series.show && series.label && series.label !== NAMELESS && !EDGE.test(series.label))
+  const lines = () => chart.series.slice(1).map((series, k) => ({ series, k })).filter(({ series }) => series.scale === high && series.show && series.label && series.label !== NAMELESS && !EDGE.test(series.label))
     .map(({ series, k }) => ({
-      label: series.label, color: series._stroke ?? series.stroke, dash: series.dash, width: 1.4, x, low: data[k], high: data[k],
+      label: overTime(chart) ? series.label : "", color: series._stroke ?? series.stroke, dash: series.dash, width: 1.4, x, low: data[k], high: data[k],
       half: EDGE.test(chart.series[k + 2]?.label ?? "") ? [data[k + 1], data[k + 2]] : null,
     })).map((line) => ({ ...line, color: typeof line.color === "function" ? line.color(chart, 0) : line.color }));
-  return { title, unit, origin, ranges, lines, measured: measured && asked(measured) ? measured : null };
+  return { title, unit, origin, across, ranges, lines, high, measured: measured && asked(measured) ? measured : null };
+}
+
+// A zoom is the view's, so that its charts are drawn anew from every sample, stay while data come in, and are the same
+// on every page and in the link. Times of a chart are s on the device's axis; those of a zoom are UTC.
+function zoom(a, b) {
+  if (!state || !(b - a >= LEAST_S)) return;
+  choose({ zoom: zoomed([a + state.utc0, b + state.utc0]) });
+}
+const follow = () => choose({ zoom: "none" });
+
+function press(event, chart) {
+  if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
+  if (event.key === "0") { event.preventDefault(); return follow(); }
+  const to = keyed(event.key, [chart.scales.x.min, chart.scales.x.max], null);
+  if (!to) return;
+  event.preventDefault();
+  event.stopPropagation();
+  zoom(...to);
+}
+
+function equip(chart) {
+  known.add(chart);
+  if (!overTime(chart)) return pictures(chart, chart.root, () => describe(chart));
+  dress(chart, () => describe(chart));
+  cursors.add(chart, chart.root, () => describe(chart));
+  const mine = (event) => event.stopImmediatePropagation(); // uPlot would zoom in what it has been sent
+  chart.over.addEventListener("mousedown", mine, true);
+  chart.over.addEventListener("dblclick", (event) => { mine(event); follow(); }, true);
+  selectable(chart, zoom);
+  chart.root.addEventListener("keydown", (event) => press(event, chart));
 }
 
 function look() {
@@ -54,17 +89,25 @@ function look() {
   for (const { chart } of Object.values(charts)) {
     const t = chart.data?.[0];
     if (!t?.length) continue;
-    if (!known.has(chart)) {
-      known.set(chart, Date.now());
-      if (chart.scales.y) {
-        dress(chart, () => describe(chart));
-        cursors.add(chart, chart.root, () => describe(chart));
-      }
-    }
+    if (!known.has(chart)) equip(chart);
     // The scene keeps a chart's zoom as a share of its time axis, and reads that from a chart just made before the axis
-    // has its limits: one second of thirty is then shown for good. Nobody can have zoomed a chart that is so new.
-    if (Date.now() - known.get(chart) < NEW_MS) chart.setScale("x", { min: t[0], max: t[t.length - 1] });
+    // has its limits: one second of thirty is then shown for good. Over time, what is sent is what is to be seen.
+    const { min, max } = chart.scales.x, off = min !== t[0] || max !== t[t.length - 1];
+    if (off && overTime(chart) && t[t.length - 1] > t[0]) chart.setScale("x", { min: t[0], max: t[t.length - 1] });
   }
   if (cursors.at) cursors.refresh();
 }
 setInterval(look, LOOK_MS);
+
+const clock = (s) => new Date(s * 1000).toISOString().slice(11, 23);
+
+whenStated((now) => {
+  const is = now.zoom.length === 2;
+  banner.hidden = !is;
+  if (!is) return;
+  const [a, b] = now.zoom, long = (b - a).toPrecision(3);
+  banner.querySelector("span").textContent = now.kept
+    ? `Zoomed: ${clock(a)} to ${clock(b)} UTC, ${long} s · data keep coming in`
+    : `Zoomed: ${clock(a)} to ${clock(b)} UTC: data of that time are not held here any more`;
+});
+banner.querySelector("button").addEventListener("click", follow);

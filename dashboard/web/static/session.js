@@ -1,6 +1,8 @@
 // The page of one session: plots, replay, report, export, notes, labels, deletion.
+import { showMap, showSky } from "/static/map/session.js";
+import { Derived } from "/static/derived.js";
 import { Overlay } from "/static/overlay.js";
-import { call, ended, toast } from "/static/rest.js";
+import { call, ended, send, toast } from "/static/rest.js";
 
 const session = document.querySelector("main").dataset.session;
 const path = `sessions/${encodeURIComponent(session)}`;
@@ -38,6 +40,36 @@ by("report")?.addEventListener("click", (event) => guarded(event.target, async (
   await ended(await call(`${path}/report`, {}), by("report-state"));
   location.reload();
 }));
+
+// The link at the end of a test, /sessions/ID?report: the report opens, and is made first where there is none.
+async function openReport() {
+  const { state, reported } = document.querySelector("main").dataset;
+  const there = `/api/${path}/report.html`;
+  if (reported === "1") return location.replace(there);
+  if (state === "recording" || state === "open") return setTimeout(() => location.reload(), 1000); // just being closed
+  if (!by("report")) return toast("There is no report yet; to make one takes the role operator");
+  by("report").scrollIntoView({ block: "center" });
+  await guarded(by("report"), async () => {
+    await ended(await call(`${path}/report`, {}), by("report-state"));
+    location.replace(there);
+  });
+}
+if (new URLSearchParams(location.search).has("report")) openReport();
+
+by("photo")?.addEventListener("submit", (event) => {
+  event.preventDefault();
+  const file = event.target.photo.files[0];
+  guarded(event.target.querySelector("button"), async () => {
+    const { upload, piece_bytes: piece } = await call("imports", {});
+    const name = file.type === "image/png" ? "photo.png" : "photo.jpg"; // told by its content there
+    for (let at = 0; at < file.size; at += piece) {
+      by("photo-state").textContent = `Sending, ${Math.round((100 * at) / file.size)} %`;
+      await send(`imports/${upload}/files/${name}?at=${at}`, file.slice(at, at + piece));
+    }
+    await call(`${path}/photo`, { upload });
+    location.reload();
+  }).finally(() => { by("photo-state").textContent = by("report") && document.querySelector("main").dataset.reported === "1" ? "A report made before does not show it: make it again." : ""; });
+});
 
 by("export")?.addEventListener("submit", (event) => {
   event.preventDefault();
@@ -109,21 +141,46 @@ by("delete")?.addEventListener("click", (event) => guarded(event.target, async (
   location.assign("/sessions");
 }));
 
-// The session's own curves; a click sets the moment that a remark, or a replay, is about.
+// What is recorded over time; a click sets the moment that a remark, or a replay, is about.
 if (by("plots")) {
-  const overlay = new Overlay(by("plots"), [session], () => ({ everything: "true" }), {
+  const asked = new URLSearchParams(location.search).get("derived") ?? document.querySelector("main").dataset.derived;
+  let lines = asked.split(";").map((line) => line.trim()).filter(Boolean);
+  const overlay = new Overlay(by("plots"), [session], () => ({ everything: "true", ...(lines.length && { derived: lines.join(";") }) }), {
     state: (text, fault = false) => {
       by("plot-state").textContent = text;
       by("plot-state").className = fault ? "fault" : "dim";
     },
-    data: (answer) => { document.body.dataset.plotted = answer.state; },
+    data: (answer) => {
+      document.body.dataset.plotted = answer.state;
+      editor.show(answer.own);
+    },
     click: (t) => {
       if (t < 0) return;
       moment = Math.round(t * 100) / 100;
       if (by("note")) by("note").at_s.value = moment;
       if (by("replay")) by("replay").textContent = `Replay from ${moment} s`;
-      history.replaceState(null, "", `?t=${moment}`);
+      address({ t: moment });
+      showSky(path, moment);
     },
   });
+  const editor = new Derived(by("own-curves"), {
+    named: () => call(`${path}/channels`),
+    changed: (now) => {
+      lines = now;
+      address({ derived: lines.join(";") });
+      call("me/view", { view: new URLSearchParams({ derived: lines.join(";") }).toString(), page: "session" }).catch(() => {});
+      overlay.load(...overlay.group.window);
+    },
+  });
+  if (lines.length) by("own-curves").open = true;
   overlay.load();
+  showMap(path);
+  showSky(path, moment || 0);
+}
+
+// The link to what is seen.
+function address(fields) {
+  const query = new URLSearchParams(location.search);
+  for (const [key, value] of Object.entries(fields)) value === "" ? query.delete(key) : query.set(key, value);
+  history.replaceState(null, "", `?${query}`);
 }

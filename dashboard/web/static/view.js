@@ -22,17 +22,25 @@ export function choose(fields) {
   ask(fields);
 }
 
+// A stretch of time as a link has it: UTC, s.
+export const zoomed = (zoom) => (zoom?.length === 2 ? zoom.map((t) => t.toFixed(4)).join("_") : "none");
+export const lines = (derived) => derived.map((one) => one.text).join(";");
+
 const stated = (now) => ({
   w: now.workspace, p: now.page, device: now.device, window: now.window,
   size: now.size, layers: now.layers.join("."), follow: now.follow ? "1" : "0", dark: now.dark ? "1" : "0", pause: now.paused ? "1" : "0",
+  zoom: zoomed(now.zoom), derived: lines(now.derived),
 });
 
-export function link(now) {
+// `moment`: with what is of this moment only, which a link has and what is kept for the person has not.
+export function link(now, moment = true) {
   const of = stated(now);
   const fields = new URLSearchParams({ w: of.w, p: of.p });
   if (of.device) fields.set("device", of.device);
   fields.set("window", of.window);
   if (of.layers !== "truth.estimates.sensors.rate.trajectory.fixes.ellipsoid.grid") fields.set("layers", of.layers);
+  if (of.derived) fields.set("derived", of.derived);
+  if (moment && of.zoom !== "none") fields.set("zoom", of.zoom);
   return fields.toString();
 }
 

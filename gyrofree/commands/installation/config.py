@@ -6,8 +6,10 @@ from typing import Annotated
 
 import typer
 
+from dashboard.web.map.archive import ArchiveError, open_archive
 from gyrofree.commands.options import AsJson, Config, say, settings_of
 from gyrofree.config import DEFAULT_PATH
+from gyrofree.running.process import EXIT_CONFIG, fail
 from gyrofree.setup import reference, written
 
 app = typer.Typer(
@@ -22,6 +24,7 @@ def check(as_json: AsJson = False, config: Config = None) -> None:
     """Read the configuration as the services do; every fault is a line, and exit code 2."""
     settings = settings_of(config)
     source = _source(config)
+    _check_map(settings.dashboard.map, source)
     boards = {device.name: device.port for device in settings.gateway.devices}
     if as_json:
         return say(json.dumps({"file": source, "boards": boards}, indent=2))
@@ -55,6 +58,15 @@ def default() -> None:
 def print_reference() -> None:
     """Print docs/configuration.md: every key with type, unit, default, range and what it does."""
     say(reference.page(), end="")
+
+
+def _check_map(path: Path | None, source: str) -> None:
+    """The file of map tiles, where one is named, can be used."""
+    try:
+        if path is not None:
+            open_archive(path)
+    except ArchiveError as error:
+        raise fail(f"{source}: [dashboard] map = {str(path)!r}: {error}", EXIT_CONFIG) from None
 
 
 def _source(config: Path | None) -> str:

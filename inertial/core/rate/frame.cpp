@@ -32,7 +32,7 @@ void Frame::gap() {
 void Frame::restart() {
   gap();
   since_rest_.forget();
-  started_ = still_ = moved_ = false;
+  started_ = still_ = moved_ = constant_ = false;
   agreement_.forget();
   inexact_.begin_anew();
   perhaps_still_ = false;
@@ -114,6 +114,8 @@ bool Frame::passed_over(const Constants& c, double t_s, const double* a) {
 // standstill now.
 bool Frame::settle_start(const Constants& c) {
   constexpr int BELIEVED = 100;  // samples in which nothing denies a standstill, the first second not counted
+  constexpr double FAR_OFF = 9.0;  // times the variance of a bias: axes have been seen that are so far off
+  constant_ = constant_ && watch_.never_stood() && watch_.could_stand(c.sensor, c.limits, FAR_OFF * c.tuning.bias);
   perhaps_still_ = branches_ == 2 && watch_.never_stood() && watch_.could_stand(c.sensor, c.limits, c.tuning.bias);
   perhaps_for_ = perhaps_still_ ? perhaps_for_ + 1 : 0;
   if (perhaps_for_ < c.limits.steady_span + c.limits.window + BELIEVED) return false;
@@ -139,7 +141,7 @@ bool Frame::contradicted() {
 
 Doubt Frame::doubt() const {
   if (intake_.missing() > 0) return Doubt::NO_DATA;
-  if (perhaps_still_) return Doubt::STANDING;
+  if (perhaps_still_ || constant_) return Doubt::STANDING;
   return against_s_ > 0.0 ? Doubt::CONTRADICTED : Doubt::NONE;
 }
 
@@ -148,7 +150,7 @@ void Frame::wait(const Constants& c, bool still) {
   if (still) {
     begin(c);
   } else if (turns(watch_, c.sensor, c.tuning)) {
-    started_ = moved_ = true;
+    started_ = moved_ = constant_ = true;
     branches_ = 2;
     fitted_ = FEWEST;
     balance_ = fit(c);
@@ -159,6 +161,7 @@ void Frame::begin(const Constants& c) {
   inexact_.begin_anew();
   begin_still(first_.filter, c.sensor, c.tuning, watch_.mean_of(c.limits.window));
   started_ = true;
+  constant_ = false;
   branches_ = 1;
 }
 

@@ -158,6 +158,7 @@ class Frame {
   SinceRest since_rest_;
   bool perhaps_still_ = false;  // a start while turning that may be a standstill with biases
   int perhaps_for_ = 0;         // samples of it
+  bool constant_ = false;       // a start while turning in which no reading has changed: an axis may be far off
   double against_s_ = 0.0;      // s in which innovations contradict the filter
   Said said_;
   Said other_said_;

@@ -81,7 +81,7 @@ Transition move(StateVector& x, const Drive& drive, const Sensor& s) {
     const Vector3 alpha = free_alpha(drive.alpha_m, x, s);
     F.back = 0.5 * dt;
     F.D = dt * N;
-    if (s.feedback) F.A -= dt * product(s.SQ_alpha, squares_jacobian(omega));
+    if (s.feedback) F.A -= dt * product(N, product(s.SQ_alpha, squares_jacobian(omega)));
     if (drive.along.fixed)  // a wrong direction grows with omega
       F.A += dt * dot(alpha, omega) / square_of(omega) * (Matrix3::Identity() - N);
     x.segment<3>(OMEGA) += dt * (N * alpha);

@@ -182,6 +182,8 @@ class Devices(Panel):
             items.append((estimator_title(name), f"{state} · {number(m.us_per_sample, 0, 'µs')}"))
             if m.behind_s > BEHIND_SHOWN_S:
                 items.append(("", bad(f"{m.behind_s:.1f} s behind")))
+            if m.skipped_s:
+                items.append(("", bad(f"{m.skipped_s:.1f} s passed over")))
             items += [
                 (f"fixes {what}", number(count, 0))
                 for what, count in (counts(m.message) or {}).items()

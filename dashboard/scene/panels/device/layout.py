@@ -5,11 +5,13 @@ Its scene, in body axes and units of half the side, stands at /bench while the p
 device's is hidden.
 """
 
+import re
+
 import numpy as np
 import viser
 
 from dashboard.scene.drawing import geometry as geo
-from dashboard.scene.drawing.page import EMPTY, Markup, html, joined, note, rows, tag
+from dashboard.scene.drawing.page import EMPTY, Markup, joined, note, rows, tag
 from dashboard.scene.drawing.palette import GREY, ORANGE, SKY, number, rgb
 from dashboard.scene.panels.base import DEG, Panel, Snapshot
 from inertial.constants import MILLI_G
@@ -194,6 +196,15 @@ class LayoutBench(Panel):
         )
 
 
+def symbols(name: str) -> Markup:
+    """An unknown of least squares (w'x, px, wxwy) as it is written on paper."""
+    parts = re.findall(r"(w'?|p)([xyz])", name)
+    return joined(
+        joined([letter.replace("w", "ω").replace("'", "′"), tag("sub", axis)])
+        for letter, axis in parts
+    )
+
+
 def figures(q: Quality, cube: Quality) -> Markup:
     """The figures of a layout beside the cube's, as HTML."""
 
@@ -204,7 +215,7 @@ def figures(q: Quality, cube: Quality) -> Markup:
     feedback = {(0, 0): "none", (1, 0): "in ω′", (0, 1): "in p", (1, 1): "in ω′ and p"}
     seen = joined(
         (
-            tag("span", MARKS[g], " ", html(n), style="white-space:nowrap")
+            tag("span", MARKS[g], " ", symbols(n), style="white-space:nowrap")
             for n, g in zip(UNKNOWNS, q.seen, strict=True)
         ),
         " ",

@@ -67,14 +67,13 @@ class ProcedurePanel(Guided):
             gui = client.gui
             self._choice = gui.add_dropdown("Procedure", ("–",), order=0.2, visible=False)
             self._unit = gui.add_text("Serial number", "", order=0.3, visible=False)
-            self._operator = gui.add_text("Operator", "", order=0.4, visible=False)
             self._read = gui.add_text("What was read", "", order=1.5, visible=False)
         self._buttons[ACTION.ACTION_STOP].order = 0.1
 
     @property
     def orders(self) -> tuple[Input, ...]:
         """Buttons, and what is given with them."""
-        return *super().orders, self._choice, self._unit, self._operator, self._read
+        return *super().orders, self._choice, self._unit, self._read
 
     @classmethod
     def missing(cls, device: Device) -> str:
@@ -95,7 +94,9 @@ class ProcedurePanel(Guided):
         step = m.steps[m.step] if m.step < len(m.steps) else STEP()
         waits = active and step.kind == "open"
         self._fields(not active, waits and m.state == M.STATE_RUNNING)
-        self._status = self.html(content(m, silent(s, "procedure", active), s.dark), self._status)
+        self._status = self.html(
+            content(m, silent(s, "procedure", active), s.dark, self.user), self._status
+        )
         wanted = {ACTION.ACTION_STOP}
         if active:
             wanted |= {ACTION.ACTION_REPEAT, ACTION.ACTION_ABORT}
@@ -118,14 +119,14 @@ class ProcedurePanel(Guided):
             self._choice.value = was if was in names else first
 
     def _fields(self, to_start: bool, to_read: bool) -> None:
-        for handle in (self._choice, self._unit, self._operator):
+        for handle in (self._choice, self._unit):
             if handle.visible != to_start:
                 handle.visible = to_start
         if self._read.visible != to_read:
             self._read.visible = to_read
 
     def _order(self, action: int) -> None:
-        command = ACTION(action=action, device=self._device, user=self._operator.value.strip())
+        command = ACTION(action=action, device=self._device, user=self.user)
         if action == ACTION.ACTION_START:
             command.procedure = self._choice.value
             command.unit = self._unit.value.strip()
@@ -146,8 +147,8 @@ class ProcedurePanel(Guided):
         )
 
 
-def content(m: pb.ProcedureStatus, gone: bool, dark: bool) -> Markup:
-    """The panel's HTML."""
+def content(m: pb.ProcedureStatus, gone: bool, dark: bool, user: str = "") -> Markup:
+    """The panel's HTML; `user`: who is signed in, and would be the operator."""
     alarm = alert("the procedures are silent: does `gyrofree procedures` run?") if gone else EMPTY
     if m.state == M.STATE_IDLE:
         table = f"The table is driven: {m.table}." if m.table else "You turn the table by hand."
@@ -155,7 +156,8 @@ def content(m: pb.ProcedureStatus, gone: bool, dark: bool) -> Markup:
             "Choose a procedure and start. It watches the data itself, goes on by itself and ends"
             " with a report."
         )
-        return alarm + note(text) + note(table)
+        who = f"Operator: {user}, who is signed in." if user else EMPTY
+        return alarm + note(text) + note(table) + (note(who) if who else EMPTY)
     done = sum(s.state in (STEP.STATE_DONE, STEP.STATE_SKIPPED) for s in m.steps)
     state = tag("span", STATES.get(m.state, ""), class_="gf-name")
     detail = tag("span", f"{done} of {len(m.steps)} steps")
@@ -180,8 +182,10 @@ def _report(m: pb.ProcedureStatus) -> Markup:
     if m.state in ACTIVE or not m.session or m.instruction.endswith("being closed"):
         return EMPTY
     way = f"/sessions/{m.session}"
-    link = tag("a", "Open the session and its report", href=way, target="_blank", rel="noopener")
-    return tag("p", link, class_="gf-note")
+    new = {"target": "_blank", "rel": "noopener"}
+    report = tag("a", "Open the report", href=f"{way}?report", **new)
+    session = tag("a", "the session, to add a photo of the unit", href=way, **new)
+    return tag("p", report, ", or ", session, class_="gf-note")
 
 
 def steps_of(m: pb.ProcedureStatus) -> Markup:
@@ -189,9 +193,9 @@ def steps_of(m: pb.ProcedureStatus) -> Markup:
     items = []
     for k, step in enumerate(m.steps):
         mark, colour, word = MARKS.get(step.state, MARKS[STEP.STATE_TODO])
-        name = tag("span", f"{mark} {step.name}", style=f"color:{colour}", title=word)
-        if k == m.step and m.state in ACTIVE:
-            name = tag("b", name)
+        now = k == m.step and m.state in ACTIVE
+        sign = tag("b", mark, style=f"color:{colour}", title=word)
+        name = joined([sign, tag("b" if now else "span", step.name)], " ")
         parts: list[object] = [figure(one) for one in step.figures]
         if step.spoilt:
             parts.append(tag("span", f"{step.spoilt}× spoilt", title=step.reason))

@@ -12,9 +12,8 @@ from dashboard.scene.drawing.page import Markup, bad, joined, note, rows, sub, t
 from dashboard.scene.drawing.palette import AXES, GREY, estimator_title, number
 from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve
 from inertial.layouts.layout import PRODUCTS
+from sessions.report.stability import TOO_CAREFUL, TOO_SURE, nis_verdict
 
-FEWEST = 20  # values that a verdict takes
-MATTERS = 0.25  # share by which a mean may be off its degrees of freedom
 INSIDE = 0.95  # share of NIS values that an honest filter has between the two bounds
 
 
@@ -52,7 +51,7 @@ class Innovations(Panel):
                 nis, value, sigma = r["nis"], r["innovation"], r["innovation_sigma"]
                 dof = r["nis_dof"]
                 if message.innovation_unit:
-                    self._units[name] = message.innovation_unit
+                    self._units[name] = message.innovation_unit.replace("^2", "²")
                 unit = self._units.get(name, "")
                 labels = _PRODUCTS if value.shape[1] == 6 else []
             good = np.isfinite(nis)
@@ -122,18 +121,9 @@ class Innovations(Panel):
 
 
 def verdict(nis: np.ndarray, dof: int) -> Markup:
-    """What values of NIS (n,) say of a filter, for people: beyond their chi-square bounds and by so
-    much that it matters.
-    """
-    count, mean = len(nis), float(np.mean(nis))
-    if count < FEWEST:
-        return tag("span", "too few to judge")
-    low, high = chi2.interval(INSIDE, count * max(dof, 1))
-    if mean > max(high / count, dof * (1.0 + MATTERS)):
-        return bad("too sure of itself")
-    if mean < min(low / count, dof * (1.0 - MATTERS)):
-        return bad("too careful")
-    return tag("span", "honest")
+    """What values of NIS (n,) say of a filter, as it is shown."""
+    said = nis_verdict(nis, dof)
+    return bad(said) if said in (TOO_SURE, TOO_CAREFUL) else tag("span", said)
 
 
 # The products w_i w_j in the estimators' order.

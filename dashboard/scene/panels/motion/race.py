@@ -5,17 +5,25 @@ step costs.
 import numpy as np
 
 from dashboard.data.device import Device
-from dashboard.scene.drawing.page import Markup, joined, note, tag
+from dashboard.scene.drawing.page import Markup, explained, joined, note, sub, tag
 from dashboard.scene.drawing.palette import estimator_colour, estimator_title, number
 from dashboard.scene.panels.base import DEG, NO_RATE, Panel, Snapshot
+from dashboard.scene.panels.motion.innovations import verdict
 
-HEAD = Markup(
-    "<tr><td><b>estimator</b></td><td>RMS ω<sub>z</sub>, °/s</td><td>NIS over its"
-    " freedom</td><td>µs per step</td><td>state</td></tr>"
+HEAD = (
+    tag("b", "estimator"),
+    joined(["RMS ", sub("ω", "z"), ", °/s"]),
+    "NIS over its freedom",
+    "µs per step",
+    "state",
 )
-NOTE = Markup(
-    "RMS of ω<sub>z</sub> against the tachometer over the window shown; NIS over its degrees of"
-    " freedom is 1 for a filter whose innovations are as large as it says."
+NOTE = joined(
+    [
+        "RMS of ",
+        sub("ω", "z"),
+        " against the tachometer over the window shown; NIS over its degrees of freedom is 1 for a"
+        " filter whose innovations are as large as it says.",
+    ]
 )
 
 
@@ -43,7 +51,8 @@ class Race(Panel):
             return
         found = sorted((_error(s, name), name) for name in names)
         body = (_row(s, name, error) for error, name in found)
-        table = tag("table", HEAD, *body, class_="gf-rows")
+        head = tag("tr", *(tag("td", explained(cell)) for cell in HEAD))
+        table = tag("table", head, *body, class_="gf-rows")
         self._table = self.html(table + note(NOTE), self._table)
 
 
@@ -77,8 +86,8 @@ def _aid(s: Snapshot, name: str) -> str:
 
 def _row(s: Snapshot, name: str, error: float) -> Markup:
     _, rows = s.rows("rate", name)
-    ratio = rows["nis"] / np.maximum(rows["nis_dof"], 1.0)
-    ratio = ratio[np.isfinite(ratio)]
+    known = np.isfinite(rows["nis"])
+    nis, dof = rows["nis"][known], np.maximum(rows["nis_dof"][known], 1.0)
     status = s.device.get("estimator", name)
     cost = status.message.us_per_sample if status else float("nan")
     state = status.message.state if status else "–"
@@ -86,6 +95,8 @@ def _row(s: Snapshot, name: str, error: float) -> Markup:
     score = f"not scored: aided by the {aid}" if aid else number(error, 2)
     colour = estimator_colour(name, s.device.estimators("rate"))
     title = joined([tag("span", "■", style=f"color:{colour}"), " ", estimator_title(name)])
-    honest = number(float(ratio.mean()) if len(ratio) else None, 2)
+    honest = "–"
+    if len(nis):
+        honest = joined([number(float(np.mean(nis / dof)), 2), " · ", verdict(nis, dof)])
     cells = (tag("td", cell) for cell in (title, score, honest, number(cost, 0), state))
     return tag("tr", *cells, class_="gf-stale" if s.stale("rate", name) else "")

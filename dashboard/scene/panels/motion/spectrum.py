@@ -1,62 +1,52 @@
 """Power spectral density and Allan deviation of one signal, of the window that is shown."""
 
+import json
+import math
 import time
-from dataclasses import dataclass
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 from scipy.signal import welch
 
+from dashboard.data.channels import Channel, channels, derived
 from dashboard.data.device import Device
-from dashboard.scene.drawing.page import Markup, note, tag
-from dashboard.scene.panels.base import DEG, Panel, Snapshot
-from logs.figures.names import BLUE, RATE_UNIT, line_title
+from dashboard.scene.drawing.page import Markup, alert, note, tag
+from dashboard.scene.panels.base import Panel, Snapshot
+from logs.figures.expression import read
+from logs.figures.names import BLUE
+from logs.figures.quantity import ExpressionError
 from sessions.report.stability import LEAST, allan_of
 
 Array = NDArray[np.float64]
 EVERY_S = 2.0  # between two computations
 SEGMENTS = 8  # of Welch's method, half over one another, at least; more average more
+FIRST = "omega_z"  # what the table turns about, of the leading estimator
+ORDER = {"psd": 2.0, "allan": 4.0}  # of the charts on the page
+NEARLY = 1e-3  # of a decade: a period of 9.9999 ms is one of 10 ms
 HOLE = 1.6  # usual periods; a longer pause ends a stretch
-# topic, column, unit, factor to it, names of the parts
-SOURCES = (
-    ("rate", "omega_ib_b", RATE_UNIT, DEG, "xyz"),
-    ("rate", "f_b", "m/s²", 1.0, "xyz"),
-    ("imu", "omega_ib_b", RATE_UNIT, DEG, "xyz"),
-    ("imu", "f_b", "m/s²", 1.0, "xyz"),
-    ("tacho", "omega", RATE_UNIT, DEG, ""),
-    ("accel", "f", "m/s²", 1.0, ""),
-)
-SYMBOLS = {"omega_ib_b": "ω", "omega": "ω", "f_b": "f", "f": "a"}
+COLUMNS = ("omega_ib_b", "omega", "f_b", "f", "counts", "roll", "pitch")  # that have a spectrum
 
 
-@dataclass(frozen=True)
-class Signal:
-    """One component of a table."""
+def signals(device: Device, lines: Sequence[str]) -> dict[str, Channel | str]:
+    """What may be chosen, by its title: what a device measures, and what a person derives of that.
+    Call under the store's lock.
+    """
+    found: dict[tuple, tuple[str, Channel]] = {}
+    for one in channels(device).values():
+        if one.column in COLUMNS:  # the shorter of two names stands last
+            found[one.topic, one.estimator, one.column, one.part] = one
+    titled = {f"{symbol(one.name)} · {one.who}": one for one in found.values()}
+    return dict(sorted(titled.items())) | {line: line for line in lines}
 
-    title: str
-    topic: str
-    estimator: str
-    column: str
-    part: int | None
-    unit: str
-    factor: float
 
-
-def signals(device: Device) -> dict[str, Signal]:
-    """What a device has, by its title. Call under the store's lock."""
-    found: dict[str, Signal] = {}
-    for (topic, estimator), ring in device.rings.items():
-        for source, column, unit, factor, parts in SOURCES:
-            if source != topic or column not in (ring.dtype.names or ()):
-                continue
-            width = (ring.dtype[column].shape or (0,))[0]
-            for k in range(width) if width else (None,):
-                axis = "" if k is None else parts[k] if parts else f"{k // 3 + 1}{k % 3 + 1}"
-                who = line_title(estimator or topic)
-                title = f"{SYMBOLS[column]}{axis} · {who}"
-                found[title] = Signal(title, topic, estimator, column, k, unit, factor)
-    return dict(sorted(found.items()))
+def symbol(name: str) -> str:
+    """A channel's name as it is written in a formula: omega_x is ωx."""
+    word, _, part = name.rpartition("_")
+    short = word.rsplit("_", 1)[-1]
+    return {"omega": "ω", "f": "f"}.get(short, f"{word}_" if word else "") + part
 
 
 def unbroken(t: Array, y: Array) -> tuple[Array, float]:
@@ -86,6 +76,30 @@ def density(y: Array, period: float) -> tuple[Array, Array]:
     return f[1:], p[1:]
 
 
+def samples(s: Snapshot, signal: Channel | str) -> tuple[Array, Array, str]:
+    """Times (n,) s, values (n,) and unit of what was chosen, in the window. Raises
+    ExpressionError.
+    """
+    if isinstance(signal, str):
+        drawn = derived(s.device, read(signal), s.t0, s.t1, channels(s.device))
+        return drawn.t, drawn.y, drawn.unit
+    t, rows = s.rows(signal.topic, signal.estimator)
+    return np.asarray(t), np.asarray(signal.of(rows)), signal.unit
+
+
+def _scales(x: Array) -> dict[str, Any]:
+    """Logarithmic scales, x over whole decades.
+
+    Left to itself the chart keeps its limits in shares of the data's span, and these lead to
+    negative ones while the span grows; on a logarithmic axis the search for its ticks does not end
+    then.
+    """
+    low = math.floor(math.log10(x[0]) + NEARLY)
+    high = max(math.ceil(math.log10(x[-1]) - NEARLY), low + 1)
+    across = {"time": False, "distr": 3, "auto": False, "range": (10.0**low, 10.0**high)}
+    return {"x": across, "level": {"distr": 3}}
+
+
 class Spectrum(Panel):
     """Welch's spectrum and the overlapping Allan deviation of the signal that is chosen."""
 
@@ -103,44 +117,52 @@ class Spectrum(Panel):
 
     @classmethod
     def missing(cls, device: Device) -> str:
-        return "" if signals(device) else "no samples have come from this device yet"
+        return "" if signals(device, ()) else "no samples have come from this device yet"
 
     def update(self, s: Snapshot) -> None:
-        known = signals(s.device)
+        known = signals(s.device, s.derived)
         if known and tuple(self._choice.options) != tuple(known):
             before = self._choice.value
             self._choice.options = tuple(known)
-            self._choice.value = before if before in known else next(iter(known))
+            leading = (title for title, one in known.items() if getattr(one, "name", "") == FIRST)
+            first = next(leading, next(iter(known)))
+            self._choice.value = before if before in known else first
         chosen, now = self._choice.value, time.monotonic()
         if chosen not in known or (self._of == chosen and now - self._at < EVERY_S):
             return
         self._of, self._at = chosen, now
-        signal = known[chosen]
-        t, rows = s.rows(signal.topic, signal.estimator)
-        y = rows[signal.column] if signal.part is None else rows[signal.column][:, signal.part]
-        y, period = unbroken(np.asarray(t), np.asarray(y) * signal.factor)
+        try:
+            t, y, unit = samples(s, known[chosen])
+        except ExpressionError as error:
+            self._say(alert(str(error)))
+            return
+        y, period = unbroken(t, y)
         if len(y) < LEAST:
             self._say(note(f"{len(y)} samples without a hole; {LEAST} are needed: wait"))
             return
         rate = f"{len(y)} samples without a hole, {len(y) * period:.1f} s at {1 / period:.1f} Hz"
         self._say(note(rate))
         f, p = density(y, period)
-        self._draw("psd", "Spectral density", f"{signal.unit}/√Hz over Hz", f, np.sqrt(p), 2.0)
+        self._draw(
+            "psd", f"Spectral density of {chosen}", f"{unit}/√Hz", "frequency, Hz", f, np.sqrt(p)
+        )
         allan = allan_of(chosen, y, period)
         if allan is not None:
-            title = f"Allan deviation, N = {allan.random_walk:.3g} {signal.unit}·√s"
-            self._draw("allan", title, f"{signal.unit} over s", allan.tau, allan.deviation, 4.0)
+            title = f"Allan deviation, N = {allan.random_walk:.3g} {unit}·√s"
+            self._draw("allan", title, unit, "τ, s", allan.tau, allan.deviation)
 
     def _say(self, words: Markup) -> None:
         self._note = self.html(words, self._note)
 
-    def _draw(self, key: str, title: str, unit: str, x: Array, y: Array, order: float) -> None:
+    def _draw(self, key: str, title: str, unit: str, across: str, x: Array, y: Array) -> None:
+        order = ORDER[key]
         keep = (x > 0) & (y > 0)
         data = (x[keep].astype(float), y[keep].astype(float))
         if len(data[0]) < 2:
             return
-        named = tag("span", title, " ", tag("em", unit), class_="gf-title")
-        heading = str(tag("div", named, class_="gf-chart"))
+        named = tag("span", title, " ", tag("em", f"{unit} over {across}"), class_="gf-title")
+        told = json.dumps({"title": title, "unit": unit, "across": across}, ensure_ascii=False)
+        heading = str(tag("div", named, class_="gf-chart", data_chart=told))
         if key not in self._plots:
             with self.folder:
                 self._headings[key] = self.client.gui.add_html(heading, order=order)
@@ -148,7 +170,10 @@ class Spectrum(Panel):
             return
         if self._headings[key].content != heading:
             self._headings[key].content = heading
-        self._plots[key].data = data
+        plot = self._plots[key]
+        if plot.scales != (scales := _scales(data[0])):
+            plot.scales = scales
+        plot.data = data
 
     def _plot(self, data: tuple[Array, Array], order: float) -> viser.GuiUplotHandle:
         points = {"show": False}
@@ -156,7 +181,7 @@ class Spectrum(Panel):
         return self.client.gui.add_uplot(
             data,
             series=({"label": "x"}, line),
-            scales={"x": {"time": False, "distr": 3}, "level": {"distr": 3}},
+            scales=_scales(data[0]),
             axes=({"size": 26}, {"size": 62, "scale": "level"}),
             legend={"show": False},
             height=230,

@@ -1,5 +1,5 @@
-"""Navigation filters against each other: the map, the race on unseen fixes, and the button that
-takes GNSS away.
+"""Navigation filters against each other, beside the map: the race on unseen fixes, and the button
+that takes GNSS away.
 """
 
 import numpy as np
@@ -7,8 +7,16 @@ import viser
 
 from dashboard.data.device import Device
 from dashboard.scene.drawing.chart import Curve
-from dashboard.scene.drawing.map import map_svg
-from dashboard.scene.drawing.page import EMPTY, Markup, alert, joined, note, rows, tag
+from dashboard.scene.drawing.page import (
+    EMPTY,
+    Markup,
+    alert,
+    explained,
+    joined,
+    note,
+    rows,
+    tag,
+)
 from dashboard.scene.drawing.palette import (
     GREY,
     GYRO_FREE,
@@ -17,6 +25,7 @@ from dashboard.scene.drawing.palette import (
     number,
 )
 from dashboard.scene.panels.base import Input, Panel, Snapshot, estimator_curve
+from dashboard.scene.panels.motion.innovations import verdict
 from dashboard.scene.panels.navigation import drift
 from messages.contract import gyrofree_pb2 as pb
 
@@ -34,15 +43,16 @@ class Navigation(Panel):
 
     title = "Map"
     workspace = "navigate"
+    own_scene = True  # the page around the scene lays its map over it
     _top = None
 
     @classmethod
     def missing(cls, device: Device) -> str:
-        if device.estimators("nav"):
+        if device.estimators("nav") or device.get("gnss"):
             return ""
         return (
-            "no navigation filter runs for this device: it needs a GNSS receiver, and a six-axis"
-            " board or a cube for which [estimator] gyro_free_navigation names filters"
+            "nothing says where this device is: it needs a GNSS receiver, and to navigate a"
+            " six-axis board, or a cube for which [estimator] gyro_free_navigation names filters"
         )
 
     def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
@@ -69,10 +79,10 @@ class Navigation(Panel):
         names = s.device.estimators("nav")
         if not names:
             text = (
-                "No navigation yet: it needs a GNSS receiver, and a six-axis board, or a cube for"
-                " which "
+                "The receiver's fixes alone: no navigation filter runs for this device. It takes"
+                " a six-axis board, or a cube for which [estimator] gyro_free_navigation names"
+                " filters."
             )
-            text += "[estimator] gyro_free_navigation names filters."
             self._top = self.html(note(text), self._top)
             return
         messages = {name: s.device.get("nav", name).message for name in names}
@@ -84,7 +94,7 @@ class Navigation(Panel):
             self._button.visible = True
         alone = self._alone(s, names)
         drifted = rows(drift.table_of(alone)) if alone else EMPTY
-        self._top = self.html(self._map(s, names) + self._race(s, names) + drifted, self._top)
+        self._top = self.html(self._said(s, names) + self._race(s, names) + drifted, self._top)
         if alone:
             title = "Without fixes since it began to move: horizontal error"
             self.show("alone", title, "m", drift.curves_of(alone), s, height=170)
@@ -120,22 +130,12 @@ class Navigation(Panel):
         lead = next((name for name in names if name.startswith(GYRO_FREE)), "")
         return drift.unaided(s, rates[0], lead) if rates and lead else None
 
-    def _map(self, s: Snapshot, names: list[str]) -> Markup:
-        ways = []
-        for name in names:
-            _, r = s.rows("nav", name)
-            ways.append((estimator_title(name), estimator_colour(name, names), r["p_n"]))
-        _, fixes = s.rows("gnss")
-        track = s.device.tracks.get("rejected")
-        pieces = [np.asarray(piece) for piece in track.pieces if len(piece)] if track else []
-        rejected = np.concatenate(pieces)[:, :3] if pieces else np.empty((0, 3))
-        _, lead = s.rows("nav", names[0])
-        sigma = tuple(lead["sigma_p_n"][-1, :2]) if len(lead) else None
-        drawn = map_svg(ways, fixes["p_n"], rejected, sigma, s.dark)
+    def _said(self, s: Snapshot, names: list[str]) -> Markup:
+        """What holds the filters back; the map itself stands in the place of the scene."""
         alarm = alert("GNSS is muted: the filters go on without fixes.") if self._muted else EMPTY
         m = s.device.get("nav", names[0]).message
         waits = note(m.alignment) if m.mode != pb.NavSolution.MODE_NAVIGATING else EMPTY
-        return alarm + waits + drawn
+        return alarm + waits
 
     def _race(self, s: Snapshot, names: list[str]) -> Markup:
         """Three metrics, which are not the same: see docs/navigation.md."""
@@ -153,11 +153,14 @@ class Navigation(Panel):
             found, key=lambda f: (np.nan_to_num(f[0], nan=1e9), f[3])
         ):
             dot = tag("span", "●", style=f"color:{estimator_colour(name, names)}")
-            honest = number(float(np.mean(nis)), 1) if len(nis) else "–"
+            dof = s.device.get("innovation", name).message.dof
+            honest = "–"
+            if len(nis):
+                honest = joined([number(float(np.mean(nis)), 1), " · ", verdict(nis, dof)])
             cells = [number(v, 3) for v in (error, ahead, left)] + [honest]
             title = joined([dot, " ", estimator_title(name)])
             items.append([title, *cells])
-        body = (tag("tr", *(tag("td", cell) for cell in row)) for row in [HEAD, *items])
+        body = (tag("tr", *(tag("td", explained(cell)) for cell in row)) for row in [HEAD, *items])
         return tag("table", *body, class_="gf-rows") + note(METRICS)
 
     def _order(self) -> None:

@@ -8,7 +8,7 @@ from dashboard.data.device import Device
 from dashboard.scene.drawing.chart import Curve
 from dashboard.scene.drawing.geometry import MODES
 from dashboard.scene.drawing.page import Markup, note, rows
-from dashboard.scene.drawing.palette import FIX, number
+from dashboard.scene.drawing.palette import FIX, estimator_title, number
 from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
@@ -101,6 +101,11 @@ def _cube_note(s: Snapshot) -> Markup:
     for name in names:
         m = rates.row(s.device.get("rate", name).message, -1)
         if len(m.p_n_m) == 3:
-            items.append((f"distance, {name}", number(float(np.linalg.norm(m.p_n_m)), 1, "m")))
+            items.append(
+                (
+                    f"distance, {estimator_title(name)}",
+                    number(float(np.linalg.norm(m.p_n_m)), 1, "m"),
+                )
+            )
     text = "Inertial navigation from the start without any aid: it drifts by nature."
     return note(text) + rows(items)

@@ -1,0 +1,58 @@
+"""Where filters and receiver were in a recording, and its sky, as a browser draws them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dashboard.scene.drawing.sky import said, sky_svg
+from inertial.earth import place_from_ned
+from logs.figures.names import line_colour, line_title
+from sessions.library.curves import Curves
+from sessions.library.sky import sky_near
+
+NOWHERE_RAD = 1e-5  # from 0, 0: where a filter counts from that waits for its first fix
+POINTS = 4000  # of each way
+SVG = '<svg xmlns="http://www.w3.org/2000/svg"'
+Way = dict[str, Any]
+
+
+def ways_of(curves: Curves) -> list[Way]:
+    """Each track of a session, latitude and longitude in deg; a receiver's fixes as dots."""
+    ways = []
+    for key, track in curves.tracks.items():
+        points = track.points[:: max(1, -(-len(track.points) // POINTS))]
+        points = points[np.isfinite(points[:, 1:3]).all(axis=1)]
+        if not len(points):
+            continue
+        device, name = key.split("/", 1)
+        name = name.removeprefix("nav/")
+        latitude, longitude, _ = place_from_ned(track.origin, points[:, 1], points[:, 2], 0.0)
+        there = np.hypot(latitude, longitude) > NOWHERE_RAD
+        points, latitude, longitude = points[there], latitude[there], longitude[there]
+        if not len(points):
+            continue
+        ways.append(
+            {
+                "key": key,
+                "device": device,
+                "title": line_title(name),
+                "colour": line_colour(name),
+                "dots": key.endswith("/gnss"),
+                "t": np.round(points[:, 0], 2).tolist(),
+                "latitude_deg": np.round(np.degrees(latitude), 9).tolist(),
+                "longitude_deg": np.round(np.degrees(longitude), 9).tolist(),
+            }
+        )
+    return ways
+
+
+def sky_at(path: Path, at_s: float, dark: bool) -> dict[str, Any] | None:
+    """The sky near a moment: when, in words, and drawn; None without one. Raises OSError."""
+    found = sky_near(path, at_s)
+    if found is None:
+        return None
+    t_s, sky = found
+    # on its own, not within a page, it has to say what it is
+    drawn = str(sky_svg(sky.satellites, dark)).replace("<svg", SVG, 1)
+    return {"t_s": round(t_s, 2), "said": said(sky.satellites), "svg": drawn}
