@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from inertial.core import native
 from inertial.layouts.layout import Layout
 from inertial.rate import parity
-from inertial.rate.health_config import Config
+from inertial.rate.health_config import STANDSTILL, Config
 from inertial.rate.products_ekf import BIAS
 
 Array = NDArray[np.float64]
@@ -84,10 +84,11 @@ class Belief:
         c, scale = self.config, (width or self.width).scale
         return parity.Tuning(c.sigma_alpha, c.sigma_force, max(self._scale, scale), scale)
 
-    def credible(self, off: Array, used: NDArray[np.bool_]) -> bool:
-        """May good axes have these offsets (N,) at a standstill? More is believed of axes that
-        were never seen at rest.
+    def credible(self, mean: Array, used: NDArray[np.bool_]) -> bool:
+        """May good axes have the offsets that a standstill of these mean readings (N,) shows? More
+        is believed of axes that were never seen at rest.
         """
+        off = parity.offsets_at_rest(self._theta, mean, used)
         allowed = self.constants().offset + self.white + (self.tuning().scale * 9.8) ** 2 * 0.1
         most = 20.0 * allowed
         if not self.learned.any():
@@ -131,12 +132,18 @@ class Belief:
         noise = np.maximum(self.white, np.mean(np.diff(window, axis=0) ** 2, axis=0) / 2.0)
         return not np.any(trend > 6.0 * np.sqrt(4.0 * noise[used] / len(window)))
 
-    def learn(self, off: Array, mean: Array, used: NDArray[np.bool_]) -> bool:
-        """Offsets `off` (N,) of the used axes at a standstill of these mean readings; False where
-        they are beyond belief.
+    def standing(self, blocks: list[Array], used: NDArray[np.bool_]) -> Array | None:
+        """Mean readings (N,) of the newest blocks; None where these are not of a standstill."""
+        window = np.array(blocks[-STANDSTILL:])
+        return window.mean(axis=0) if self.steady(window, used) else None
+
+    def learn(self, mean: Array, used: NDArray[np.bool_]) -> bool:
+        """Offsets of the used axes at a standstill of these mean readings (N,); False where they
+        are beyond belief.
         """
-        if not self.credible(off, used):
+        if not self.credible(mean, used):
             return False
+        off = parity.offsets_at_rest(self._theta, mean, used)
         self.bias = np.where(used, off, self.bias)
         self.reference = np.where(used, mean, self.reference)
         self.offset = np.where(used, self.config.offset_left**2, self.offset)

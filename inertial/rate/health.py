@@ -295,14 +295,12 @@ class HealthMonitor:
         self._quiet = self._quiet + 1 if full and ready else 0
         if self._quiet % 10 != 1:
             return
-        window = np.array(self.history.blocks[-STANDSTILL:])
-        if not self.belief.steady(window, self.used):
+        mean = self.belief.standing(self.history.blocks, self.used)
+        if mean is None:
             return
-        mean, used = window.mean(axis=0), self.used
         if not self.belief.learned.any():
             self._leave_out_far_off(mean)
-        off = parity.offsets_at_rest(self.layout.theta_b, mean, used)
-        if not self.belief.learn(off, mean, used):
+        if not self.belief.learn(mean, self.used):
             return
         self.history.clear()  # states of before belong to other offsets
         if self._sum > 0.0:  # it believed in a motion that there is not
@@ -324,9 +322,5 @@ class HealthMonitor:
         """No standstill was learned yet, and so far the readings are those of one."""
         if self.belief.learned.any():
             return False
-        window = np.array(self.history.blocks[-STANDSTILL:])
-        if not self.belief.steady(window, self.used):
-            return False
-        mean = window.mean(axis=0)
-        off = parity.offsets_at_rest(self.layout.theta_b, mean, self.used)
-        return self.belief.credible(off, self.used)
+        mean = self.belief.standing(self.history.blocks, self.used)
+        return mean is not None and self.belief.credible(mean, self.used)
