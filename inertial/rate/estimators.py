@@ -214,8 +214,7 @@ class ProductsRate(_Stepping):
         self.core.exclude(mask)
 
     def widen(self, scale: float) -> None:
-        """See RateEstimator.widen."""
-        self.core.widen(scale)
+        """See RateEstimator.widen; how inexact axes are, the filter sees by itself (E-90)."""
 
     def tacho_axis(self, axis_b: Sequence[float]) -> None:
         """Axis in b that tachometer rates are about, any length. Raises ValueError for no

@@ -34,7 +34,7 @@ Sensor = native.RateSensor
     R_c       (6, 6)   (rad/s)^4; identity where not used
     known     (6, 6)   M^T R_c^-1 M: information of one sample on the products, (rad/s)^-4
     drift     (12, 12) W W^T
-    Q         (n, 6)   z of every axis, m; theta_b (n, 3)
+    Q         (n, 6)   z of every axis, m; theta_b (n, 3), r_b (n, 3), m
     used      (n,)     0 for an excluded axis, else 1; limit (n,) largest reading, m/s^2
     basis     (9, 9)   rows turn [alpha_m, c_m] into uncorrelated numbers of variances spread (9,)
     feedback           SQ is not zero
@@ -86,7 +86,7 @@ def sensor(layout: Layout, sigma_axis: float | None = None, excluded: int = 0) -
     out.SQ_alpha, out.SQ_force = SQ[:3], SQ[3:]
     out.R_alpha, out.R_p, out.R_c = R[:3, :3], R[9:, 9:], R_c
     out.known = _product(M.T, native.solve_positive(R_c, M))
-    out.Q, out.theta_b, out.used = layout.Q, layout.theta_b, used
+    out.Q, out.theta_b, out.r_b, out.used = layout.Q, layout.theta_b, layout.r_b, used
     out.limit = np.array([one.limit for one in layout.sensors])
     spread, directions = native.eigh(quiet)
     out.basis, out.spread = directions.T, spread

@@ -7,7 +7,7 @@ products use those; the rest is integration.
 Model: products_model.py (E-30 to E-39). What is done at each sample: inertial/core/rate/frame.hpp.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -201,11 +201,3 @@ class ProductsFilter:
         old, new = self.sensor, sensor(self.layout, self.config.still.sigma_axis, mask)
         self.native.exclude(new, *carry_biases(old, new, axis_bias(self.layout, self.config)))
         self.sensor, self.excluded = new, mask
-
-    def widen(self, scale: float) -> None:
-        """Scale errors of that sigma, of 1: what was said since the last standstill is told anew
-        with them (E-89). Less than is believed already changes nothing.
-        """
-        if scale > axis_scale(self.layout, self.config):
-            self.config = replace(self.config, scale=scale)
-            self.native.tune(tuning(self.layout, self.config, self.method))

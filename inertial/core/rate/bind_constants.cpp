@@ -49,6 +49,7 @@ Sensor blank_sensor() {
   s.SQ_force.setZero();
   s.Q.setZero();
   s.theta_b.setZero();
+  s.r_b.setZero();
   s.used.setZero();
   s.limit.setZero();
   return s;
@@ -70,6 +71,7 @@ void bind_sensor(nb::module_& m) {
   matrix(c, "drift", &Sensor::drift);
   matrix(c, "Q", &Sensor::Q);
   matrix(c, "theta_b", &Sensor::theta_b);
+  matrix(c, "r_b", &Sensor::r_b);
   vector(c, "used", &Sensor::used);
   vector(c, "limit", &Sensor::limit);
   matrix(c, "basis", &Sensor::basis);

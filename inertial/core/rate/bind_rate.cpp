@@ -187,6 +187,11 @@ void bind_products(nb::module_& m) {
         nb::arg("knowledge"), "Say the bound along the estimate, of all axes.");
   c.def_prop_ro("noise", [](const ProductsFilter& f) { return nb::make_tuple(f.noise().quiet(), f.noise().force()); },
                 "Measured variances over the configured ones: of omega' and c, of p.");
+  c.def_prop_ro("inexact", [](const ProductsFilter& f) {
+    const Inexact& inexact = f.frame().inexact();
+    return nb::make_tuple(inexact.seen(), to_numpy(inexact.unit_of_rate()), to_numpy(Eigen::MatrixXd(inexact.rate())));
+  }, "Variance of the axes' errors, of 1, as it is seen; the rate's covariance by errors of variance 1; its "
+     "derivative by the errors, three to an axis.");
   c.def("exclude", &ProductsFilter::exclude, nb::arg("sensor"), nb::arg("T"), nb::arg("unknown"));
   c.def("correct", &ProductsFilter::correct, nb::arg("t_s"), nb::arg("rate"), nb::arg("sigma"), nb::arg("signed"),
         nb::arg("axis_b"), "A tachometer's report (E-50); False where it is not used.");

@@ -11,7 +11,8 @@ Products spread_mean(const Matrix3& P) {
   return mean;
 }
 
-// Covariance of it: cov(e_i e_j, e_k e_l) = P_ik P_jl + P_il P_jk (E-34).
+}  // namespace
+
 Matrix<PRODUCTS> spread_covariance(const Matrix3& P) {
   Matrix<PRODUCTS> S;
   for (int a = 0; a < PRODUCTS; ++a) {
@@ -23,8 +24,6 @@ Matrix<PRODUCTS> spread_covariance(const Matrix3& P) {
   }
   return S;
 }
-
-}  // namespace
 
 ForceModel force_model(const StateVector& x, const Vector3& alpha, const Sensor& s) {
   const Vector3 omega = x.segment<3>(OMEGA), r = x.segment<3>(PIVOT);

@@ -11,6 +11,7 @@ constexpr int STILL_STEPS = 100;  // of the standstill, at most, that tell the b
 void Frame::exchange_axes(const Constants& configured, const Axes& axes) {
   watch_.unlearn();
   agreement_.forget();
+  inexact_.forget();
   renewed_ = true;
   kept_.clear();
   arrivals_.clear();
@@ -53,12 +54,17 @@ void Frame::from_rest(const Constants& c) {
   f.x(ANGLE) = past.angle();
   f.P(ANGLE, ANGLE) = past.angle_variance();
   branches_ = 1;
-  for (int k = std::min(STILL_STEPS, rest.samples); k > 0; --k)
-    step(f, c.sensor, c.tuning, mean, {dt, false, false, k % EVERY == 0 ? EVERY * dt : 0.0, nullptr}, said_);
+  for (int k = std::min(STILL_STEPS, rest.samples); k > 0; --k) {
+    const bool eighth = k % EVERY == 0;
+    step(f, c.sensor, c.tuning, mean, {dt, false, false, eighth ? EVERY * dt : 0.0, nullptr}, said_);
+    if (eighth) inexact_.step(f, c.sensor, c.tuning, {mean, dt, EVERY, false, false});
+  }
   for (int k = 0; k < past.blocks(); ++k) {
     const Block& block = past.block(k);
     const Measurement y = c.sensor.measure(Vector<MOST_AXES>(block.mean()).data());
     step(f, c.sensor, c.tuning, y, {block.seconds, !still_, false, block.seconds, nullptr}, said_);
+    inexact_.observe(said_);
+    inexact_.step(f, c.sensor, c.tuning, {y, block.seconds, 1, !still_, false});
   }
   if (still_ && !moved_) stay();
   diverged();

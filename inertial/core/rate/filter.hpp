@@ -190,6 +190,9 @@ Vector3 measured_force(const StateVector& x, const ForceModel& h, const Sensor& 
 // d c / d omega (E-33).
 Matrix<PRODUCTS, 3> products_model(const Vector3& omega, const Sensor& s);
 
+// Covariance of what the spread of omega adds to its products: P_ik P_jl + P_il P_jk (E-34).
+Matrix<PRODUCTS> spread_covariance(const Matrix3& P);
+
 // correct.cpp: measurements by their model (E-33 to E-38), shares of the noise for the bound.
 Seen<6> see_products(const Covariance& P, const Vector3& at, const Sensor& s, double share);
 Seen<3> see_force(const StateVector& x, const Covariance& P, const Vector3& p, const Vector3& alpha,

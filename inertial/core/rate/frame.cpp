@@ -34,6 +34,7 @@ void Frame::restart() {
   since_rest_.forget();
   started_ = still_ = moved_ = constant_ = false;
   agreement_.forget();
+  inexact_.begin_anew();
   perhaps_still_ = false;
   perhaps_for_ = 0;
   against_s_ = 0.0;
@@ -157,6 +158,7 @@ void Frame::wait(const Constants& c, bool still) {
 }
 
 void Frame::begin(const Constants& c) {
+  inexact_.begin_anew();
   begin_still(first_.filter, c.sensor, c.tuning, watch_.mean_of(c.limits.window));
   started_ = true;
   constant_ = false;
@@ -209,7 +211,10 @@ long Frame::begin_of_motion(const Constants& c, const Verdict& verdict, long now
   } else if (first >= 0) {
     first_.filter = *kept_.of(first);
   }
-  if (first >= 0) taken_back_ += now - first;
+  if (first >= 0) {
+    taken_back_ += now - first;
+    inexact_.jumped(first_.filter);
+  }
   kept_.clear();
   if (noisier_) first_.filter.P.block<3, 3>(OMEGA, OMEGA) += late(c) * Matrix3::Identity();
   return first >= 0 ? first : now;
@@ -257,8 +262,17 @@ void Frame::run(const Constants& c, long first, long now, bool fixed, const Stat
     const Moment moment{watch_.dt(sample), !still_, fixed, eighth ? EVERY * dt_ : 0.0, end == nullptr ? nullptr : &at,
                         agreement_.forgetting(), watch_.wander()};
     step(first_.filter, c.sensor, c.tuning, watch_.y(sample), moment, said_);
+    if (end == nullptr) watch_errors(c, sample, moment);
     if (branches_ == 2) step(second_.filter, c.sensor, c.tuning, watch_.y(sample), moment, other_said_);
   }
+}
+
+// What errors of the axes do to the state after a sample.
+void Frame::watch_errors(const Constants& c, long sample, const Moment& moment) {
+  if (branches_ == 1) inexact_.observe(said_);
+  if (moment.grow == 0.0) return;
+  const Measurement mean = (watch_.total(sample) - watch_.total(sample - EVERY)) / EVERY;
+  inexact_.step(first_.filter, c.sensor, c.tuning, {mean, dt_, EVERY, moment.turning, moment.fixed});
 }
 
 // The window again, about what its end says, when it is due and all of it was turning (E-49).

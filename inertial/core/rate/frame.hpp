@@ -9,6 +9,7 @@
 #pragma once
 
 #include "rate/agreement.hpp"
+#include "rate/inexact.hpp"
 #include "rate/intake.hpp"
 #include "rate/since_rest.hpp"
 #include "rate/start.hpp"
@@ -106,6 +107,7 @@ class Frame {
   bool still() const { return still_; }
   bool two_signs() const { return branches_ == 2; }
   const Agreement& agreement() const { return agreement_; }
+  const Inexact& inexact() const { return inexact_; }
   double balance() const { return balance_; }  // log of the likelihood ratio of the two signs
   double last_s() const { return last_s_; }
   double dt() const { return dt_; }
@@ -130,6 +132,7 @@ class Frame {
   bool on_axis(const Constants& c);
   void free_for_a_while(const Constants& c);
   void run(const Constants& c, long first, long now, bool fixed, const StateVector* end);
+  void watch_errors(const Constants& c, long sample, const Moment& moment);
   void horizon(const Constants& c, long now, bool fixed);
   void two_signs(bool still);
   void swap_signs();
@@ -150,6 +153,7 @@ class Frame {
   Filter before_rest_;   // as it was before the newest standstill
   long rest_from_ = -DEPTH;  // sample that one begins with
   Agreement agreement_;
+  Inexact inexact_;
   Intake intake_;
   SinceRest since_rest_;
   bool perhaps_still_ = false;  // a start while turning that may be a standstill with biases

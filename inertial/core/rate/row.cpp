@@ -14,18 +14,18 @@ struct Mixed {
   double angle;
 };
 
-Mixed mixed(const Frame& frame) {
+Mixed mixed(const Frame& frame, const Matrix3& inexact) {
   const Filter& f = frame.filter();
   if (!frame.two_signs()) {
     const double turned = square(DIRECTION) * f.speed_squared();
-    return {f.omega(), f.omega_covariance() + turned * Matrix3::Identity(), f.x(ANGLE)};
+    return {f.omega(), f.omega_covariance() + turned * Matrix3::Identity() + inexact, f.x(ANGLE)};
   }
   const Filter& g = frame.other();
   const double wrong = 1.0 / (1.0 + elementary::exp(frame.balance()));
   const Vector3 apart = g.omega() - f.omega();
   return {f.omega() + wrong * apart,
           (1.0 - wrong) * f.omega_covariance() + wrong * g.omega_covariance() +
-              wrong * (1.0 - wrong) * apart * apart.transpose(),
+              wrong * (1.0 - wrong) * apart * apart.transpose() + inexact,
           f.x(ANGLE) + wrong * (g.x(ANGLE) - f.x(ANGLE))};
 }
 
@@ -82,7 +82,8 @@ void write(const Frame& frame, const Constants& c, Row& row) {
   const Filter& f = frame.filter();
   const Said& said = frame.said();
   const Measurement y = frame.newest();
-  const Mixed mean = mixed(frame);
+  const Matrix3 inexact = frame.inexact().of_rate(c.tuning);
+  const Mixed mean = mixed(frame, inexact);
   put(row.omega_b, mean.omega);
   put(row.P[0], mean.P);
   if (!frame.started())

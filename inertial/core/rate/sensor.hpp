@@ -38,6 +38,7 @@ struct Sensor {
   Matrix<MEASURED> drift;         // W W^T
   Matrix<MOST_AXES, PRODUCTS> Q;  // z of every axis, m
   Matrix<MOST_AXES, 3> theta_b;
+  Matrix<MOST_AXES, 3> r_b;  // m, where it is
   Vector<MOST_AXES> used;  // 0 for an excluded axis, else 1
   Vector<MOST_AXES> limit;  // m/s^2, the largest reading; 0 where it is not known
   Matrix<9> basis;         // rows turn [alpha_m, c_m] into uncorrelated numbers
