@@ -30,7 +30,7 @@ SIZES = {"desk": (1440, 900), "tablet": (1024, 768), "narrow": (768, 1024), "pho
 CLIPPED = """() => [...document.querySelectorAll('body *')].filter((e) => {
   const style = getComputedStyle(e), own = [...e.childNodes].some((n) => n.nodeType === 3 && n.data.trim());
   const hidden = style.visibility === 'hidden' || style.display === 'none' || !e.getClientRects().length;
-  if (hidden || !own || e.closest('.hidden, [inert], [aria-hidden=true]') || style.display === 'inline') return false;
+  if (hidden || !own || e.closest('.hidden, [inert], [aria-hidden=true], details:not([open]) > :not(summary)') || style.display === 'inline') return false;
   if (e.closest('#webgl-software-rendering') || style.clipPath !== 'none') return false;
   return e.scrollWidth > e.clientWidth + 1 && !['auto', 'scroll'].includes(style.overflowX);
 }).map((e) => `${e.tagName} ${e.id} ${e.className}: ${e.textContent.slice(0, 60)}`)"""  # noqa: E501

@@ -23,8 +23,6 @@ from dashboard.scene.workspaces import Wish
 from dashboard.web.views import VIEW
 from logs.figures.expression import MOST_CHARACTERS, MOST_CURVES, read
 
-pytest.importorskip("simpleeval")
-
 LINE = "norm(omega_x, omega_y, omega_z)"
 
 

@@ -19,8 +19,6 @@ from logs.figures.expression import (
 from logs.figures.quantity import FUNCTIONS, HINTS, ExpressionError, Quantity
 from logs.figures.units import spelt, times, unit
 
-pytest.importorskip("simpleeval")
-
 N = 50
 T = np.linspace(0.0, 1.0, N)
 UNITS = {"a": "°/s", "b": "°/s", "f": "m/s²", "angle": "°", "plain": "", "t": "s"}

@@ -170,13 +170,11 @@ def recorded_sky(
     who: SignedIn,
     at_s: Annotated[float, Query(ge=0, le=1e9, description="s from the session's start")] = 0.0,
     dark: bool = False,
-) -> dict[str, Any]:
+) -> dict[str, Any] | None:
+    """None where no receiver of the recording says which satellites it sees."""
     front = front_of(request)
     path = file_of(front, session)
     try:
-        found = sky_at(path, at_s, dark)
+        return sky_at(path, at_s, dark)
     except OSError as error:
         raise HTTPException(409, f"session {session}: {error.strerror}") from None
-    if found is None:
-        raise HTTPException(404, "no receiver of this recording says which satellites it sees")
-    return found

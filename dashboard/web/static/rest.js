@@ -19,7 +19,7 @@ export async function send(path, blob) {
 async function answered(answer) {
   if (answer.status === 401) location.assign(`/login?${new URLSearchParams({ next: location.pathname + location.search })}`);
   const value = await answer.json();
-  const faults = (value.faults ?? []).map((fault) => `${fault.at.slice(1).join(".")}: ${fault.what}`).join("; ");
+  const faults = (value?.faults ?? []).map((fault) => `${fault.at.slice(1).join(".")}: ${fault.what}`).join("; ");
   if (!answer.ok) throw new Error(faults || (value.error ?? `the dashboard answered ${answer.status}`));
   return value;
 }

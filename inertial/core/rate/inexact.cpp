@@ -142,7 +142,7 @@ void Inexact::correct(const Filter& f, const Sensor& s, const Tuning& t, const S
 }
 
 void Inexact::step(const Filter& f, const Sensor& s, const Tuning& t, const Stretch& stretch) {
-  if (by_.cols() != ERRORS_OF_AXIS * s.n) begin(f, s);
+  if (by_.cols() != Eigen::Index{ERRORS_OF_AXIS} * s.n) begin(f, s);
   const Vector3 alpha = stretch.turning ? free_alpha(stretch.mean.segment<3>(ALPHA_M), f.x, s) : Vector3(Vector3::Zero());
   const ByErrors<MEASURED> Y = by_errors(f.x, alpha, s);
   carried_ *= std::max(0.0, 1.0 - stretch.dt * stretch.samples / MEMORY_S);
