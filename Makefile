@@ -27,7 +27,7 @@ demo: setup $(if $(filter emulated,$(BOARD)),.make/board firmware)
 
 # Packages come while the core compiles; neither needs the other.
 setup: .make/tools
-	@$(MAKE) --no-print-directory --silent --output-sync=line -j2 .make/runtime .make/core
+	@$(MAKE) --no-print-directory --silent --output-sync=line -j2 BUILDS=$(BUILDS) .make/runtime .make/core
 
 .make/venv:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed; this is $$($(PYTHON) --version). Name another: make PYTHON=python3.12"; exit 1; }
@@ -48,18 +48,18 @@ setup: .make/tools
 	@touch $@
 
 # The package itself, editable, with the build of its core that this machine runs.
+# For tests both builds at once.
+BUILDS := $(if $(filter test dev cases,$(MAKECMDGOALS)),both,here)
 CORE := $(wildcard inertial/core/*.c* inertial/core/CMakeLists.txt inertial/core/*/*.?pp)
 .make/core: pyproject.toml $(CORE) .make/tools
 	@echo "Compiling the core ..."
 	@CXX="$$(cat .make/compiler)" $(PIP) install --quiet --no-deps --no-build-isolation \
-		--config-settings=cmake.define.Python_INCLUDE_DIR="$$(cat .make/headers)" --config-settings=cmake.define.BUILDS=here --editable .
-	@touch $@
+		--config-settings=cmake.define.Python_INCLUDE_DIR="$$(cat .make/headers)" --config-settings=cmake.define.BUILDS=$(BUILDS) --editable .
+	@echo $(BUILDS) > $@
 
 # Both builds of the core: what the tests compare.
 .make/both-cores: .make/core
-	@echo "Compiling the core a second time, for any processor ..."
-	@CXX="$$(cat .make/compiler)" $(PIP) install --quiet --no-deps --no-build-isolation \
-		--config-settings=cmake.define.Python_INCLUDE_DIR="$$(cat .make/headers)" --config-settings=cmake.define.BUILDS=both --editable .
+	@[ "$$(cat $<)" = both ] || { rm $<; $(MAKE) --no-print-directory --silent BUILDS=both $<; }
 	@touch $@
 
 # A wheel in dist/ that needs no compiler where it is installed.

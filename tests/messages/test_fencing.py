@@ -1,5 +1,6 @@
 """Whose number is believed: real sessions over a real router."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -102,6 +103,7 @@ def test_nobody_is_taken_for_gone_while_the_router_does_not_answer(monkeypatch):
         with open_client(settings) as session:
             assert alive(session, [BASE]) == []
             router.send_signal(signal.SIGSTOP)
+            os.waitpid(router.pid, os.WUNTRACED)  # until it has stopped
             assert alive(session, [BASE]) is None
             monkeypatch.setattr(fencing, "RETRY_S", 0.01)
             stop, ended = threading.Event(), []
