@@ -13,6 +13,7 @@ from dashboard.data.alarms import alarms, bench_alarms
 from dashboard.web.auth import Role
 from dashboard.web.control import ControlError
 from dashboard.web.front import Asker, Front, asker, front_of, needs
+from dashboard.web.readings import Reading
 from dashboard.web.schemas import (
     DeviceOut,
     Health,
@@ -31,6 +32,7 @@ from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import STATUS
 from messages.text import composed
 from sessions.library.catalogue import SessionError, SessionInfo
+from sessions.library.curves import Curves
 
 routes = APIRouter(prefix="/api")
 RECORDER_STALE_S = 5.0
@@ -91,6 +93,16 @@ def file_of(front: Front, session: str) -> Path:
     if info.state == "open":
         raise HTTPException(409, f"session {session} is being recorded: stop the recording first")
     return info.path
+
+
+def reading_of(front: Front, session: str) -> tuple[Curves | None, Reading | None]:
+    """A session's curves as far as they are read, and the reading that goes on or failed; HTTP 404
+    and 409 as file_of.
+    """
+    try:
+        return front.readings.get(file_of(front, session))
+    except OSError as error:
+        raise HTTPException(409, f"session {session}: {error.strerror}") from None
 
 
 def recording_out(front: Front) -> RecordingOut:

@@ -9,7 +9,7 @@ from fastapi import APIRouter, HTTPException, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, Response
 
 from dashboard.web import api
-from dashboard.web.api import SignedIn, file_of
+from dashboard.web.api import SignedIn, reading_of
 from dashboard.web.desk_api import ChannelsOut, NamedOut, functions
 from dashboard.web.front import Front, front_of
 from dashboard.web.pages import render
@@ -73,10 +73,7 @@ def comparison(
     chosen = _ids(ids)
     curves, done = [], []
     for session in chosen:
-        try:
-            found, reading = front.readings.get(file_of(front, session))
-        except OSError as error:
-            raise HTTPException(409, f"session {session}: {error.strerror}") from None
+        found, reading = reading_of(front, session)
         if reading is not None and reading.fault:
             raise HTTPException(409, f"session {session} cannot be drawn: {reading.fault}")
         if reading is not None:
@@ -105,11 +102,7 @@ def comparison(
 @routes.get("/api/sessions/{session}/channels", summary="What an expression over it may name")
 def session_channels(request: Request, session: str, who: SignedIn) -> ChannelsOut:
     """Empty while the recording is still being read."""
-    front = front_of(request)
-    try:
-        found, _ = front.readings.get(file_of(front, session))
-    except OSError as error:
-        raise HTTPException(409, f"session {session}: {error.strerror}") from None
+    found, _ = reading_of(front_of(request), session)
     known = channels(found).values() if found is not None else ()
     return ChannelsOut(
         channels=[NamedOut(name=one.name, unit=one.unit, who=one.who) for one in known],

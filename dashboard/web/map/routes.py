@@ -10,7 +10,7 @@ from fastapi.responses import JSONResponse, Response
 from pydantic import BaseModel, Field
 
 from dashboard.data.whereabouts import Known, whereabouts
-from dashboard.web.api import file_of
+from dashboard.web.api import file_of, reading_of
 from dashboard.web.front import Asker, asker, front_of
 from dashboard.web.map.archive import ArchiveError, open_archive, tag_of
 from dashboard.web.map.recorded import sky_at, ways_of
@@ -149,11 +149,7 @@ def _known(text: str) -> dict[str, Known]:
 @routes.get("/sessions/{session}/map", summary="Where filters and receiver were in a recording")
 def recorded_places(request: Request, session: str, who: SignedIn) -> Response:
     """202 with the share done while the recording is still being read."""
-    front = front_of(request)
-    try:
-        curves, reading = front.readings.get(file_of(front, session))
-    except OSError as error:
-        raise HTTPException(409, f"session {session}: {error.strerror}") from None
+    curves, reading = reading_of(front_of(request), session)
     if reading is not None and reading.fault:
         raise HTTPException(409, f"session {session} cannot be drawn: {reading.fault}")
     done = 1.0 if reading is None else reading.done
