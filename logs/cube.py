@@ -240,14 +240,14 @@ def run_estimator(
     estimator, n = make(ESTIMATORS[name], shape, card), len(data.t_s)
     reports = _reports(data) if tacho_aid else {}
     said = _Said(n, SCORED if lean else SAID)
-    busy, trust, refused = 0, (0, 0.0), ""
+    busy, left_out, refused = 0, 0, ""
     for part in cut(parts, list(reports)):
         began = time.thread_time_ns()
         if part.missing:
             estimator.skip(part.missing)
-        if (part.mask, part.scale) != trust:
-            trust = part.mask, part.scale
-            if (error := leave_out(estimator, *trust)) is not None:
+        if part.mask != left_out:
+            left_out = part.mask
+            if (error := leave_out(estimator, left_out)) is not None:
                 refused = f"{name} knew nothing while axes were not good: {error}"
         for begin in range(part.begin, part.end, BLOCK):
             rows = slice(begin, min(begin + BLOCK, part.end))

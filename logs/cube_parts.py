@@ -25,7 +25,6 @@ class Part:
     end: int
     missing: int  # samples before its first
     mask: int  # bit k: axis k is not believed
-    scale: float = 0.0  # scale errors of all axes beyond what is expected, sigma, of 1
 
 
 @dataclass(frozen=True)
@@ -55,8 +54,8 @@ def monitored(data: CubeLog, shape: Layout, f_axis: Array) -> Monitored:
         if missing:
             monitor.skip(missing)
         at = begin
-        for stop, *trust in monitor.feed(data.t_s[begin:end], f_axis[begin:end]):
-            parts.append(Part(at, begin + stop, missing if at == begin else 0, *trust))
+        for stop, mask in monitor.feed(data.t_s[begin:end], f_axis[begin:end]):
+            parts.append(Part(at, begin + stop, missing if at == begin else 0, mask))
             at = begin + stop
     return Monitored(tuple(parts), tuple(monitor.faults), monitor.belief.width.text)
 

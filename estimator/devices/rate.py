@@ -83,7 +83,7 @@ class RateBoard:
         self._last_t: float | None = None
         self._period_s = 0.01
         self.health: Any = None  # inertial.rate.health.HealthMonitor
-        self._trust = 0, 0.0  # axes that the estimators were told to leave out, and the scale
+        self._left_out = 0  # axes that the estimators were told to leave out
         self._watch = SettingsWatch(self.layout)
         self._doubts, self._doubted_s = "", 0.0
 
@@ -96,7 +96,7 @@ class RateBoard:
             name: make(kind, self.layout, self.card, self._beliefs)
             for name, kind in self._make.items()
         }
-        self.health, self._trust = HealthMonitor(self.layout, self._period_s), (0, 0.0)
+        self.health, self._left_out = HealthMonitor(self.layout, self._period_s), 0
 
     def feed(
         self,
@@ -149,8 +149,8 @@ class RateBoard:
         self._watch.feed(t_s, f_axis)
         f_axis = np.ascontiguousarray(f_axis, dtype=np.float64)
         out, begin = [], 0
-        for end, mask, scale in self.health.feed(t_s, f_axis, stale):
-            self._tell(mask, scale)
+        for end, mask in self.health.feed(t_s, f_axis, stale):
+            self._tell(mask)
             out += self._run(
                 first_index, begin, t_s[begin:end], f_axis[begin:end], every(period_s, self._limit)
             )
@@ -192,7 +192,7 @@ class RateBoard:
         """What the data say of wrong settings, looked at every DOUBT_S of data; empty for none."""
         if abs(t_s - self._doubted_s) >= DOUBT_S:
             self._doubted_s, before = t_s, self._doubts
-            found = self._watch.doubts(spoilt=self._trust[0] != 0)
+            found = self._watch.doubts(spoilt=self._left_out != 0)
             self._doubts = "; ".join(doubt.text for doubt in found)
             if self._doubts and not before:
                 log.warning("%s: is a setting wrong? %s", self.device, self._doubts)
@@ -204,19 +204,18 @@ class RateBoard:
         self.cost_ns[name] = self.cost_samples[name] = 0
         return cost
 
-    def _tell(self, mask: int, scale: float) -> None:
-        """Tell the estimators when the axes they may use have changed, or how far those may be off;
-        one that cannot do without says so itself.
+    def _tell(self, mask: int) -> None:
+        """Tell the estimators when the axes they may use have changed; one that cannot do without
+        says so itself.
         """
         from inertial.rate.estimators import leave_out  # here: loads only where it is needed
 
-        if (mask, scale) == self._trust:
+        if mask == self._left_out:
             return
-        if mask != self._trust[0]:
-            self._say_left_out(mask)
-        self._trust = mask, scale
+        self._say_left_out(mask)
+        self._left_out = mask
         for estimator in self._estimators.values():
-            if (error := leave_out(estimator, mask, scale)) is not None:
+            if (error := leave_out(estimator, mask)) is not None:
                 log.warning(
                     "%s: %s knows nothing until axes are good again: %s",
                     self.device,

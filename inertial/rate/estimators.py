@@ -70,12 +70,6 @@ class RateEstimator(Protocol):
         """
         ...
 
-    def widen(self, scale: float) -> None:
-        """Scales of the axes may be off by `scale` of 1, sigma, and what is known changes with it;
-        less than is believed already changes nothing.
-        """
-        ...
-
     def exclude(self, mask: int) -> None:
         """Go on without the axes whose bits are set; 0 takes all back. The axes in use are solved
         anew.
@@ -144,9 +138,6 @@ class LeastSquaresRate(_Stepping):
         """See RateEstimator.exclude."""
         self._core.exclude(mask)
 
-    def widen(self, scale: float) -> None:
-        """See RateEstimator.widen; turning, it says itself that it knows nothing."""
-
 
 class ProductsRate(_Stepping):
     """Estimator "products-ekf": Kalman filter on the six products (products_ekf.py)."""
@@ -212,9 +203,6 @@ class ProductsRate(_Stepping):
     def exclude(self, mask: int) -> None:
         """See RateEstimator.exclude."""
         self.core.exclude(mask)
-
-    def widen(self, scale: float) -> None:
-        """See RateEstimator.widen; how inexact axes are, the filter sees by itself (E-90)."""
 
     def tacho_axis(self, axis_b: Sequence[float]) -> None:
         """Axis in b that tachometer rates are about, any length. Raises ValueError for no
@@ -293,9 +281,8 @@ class FreeBodyRate(ProductsRate):
     default = products_ekf.Config(fixed_axis=False, gravity_aid=False)
 
 
-def leave_out(estimator: RateEstimator, mask: int, scale: float = 0.0) -> GeometryError | None:
-    """Go on without the axes of the mask's bits, those in use off by `scale` of 1, sigma, or as
-    expected; where the rest cannot see omega' and p, samples
+def leave_out(estimator: RateEstimator, mask: int) -> GeometryError | None:
+    """Go on without the axes of the mask's bits; where the rest cannot see omega' and p, samples
     are taken for none until another mask comes, and the error says why.
     """
     try:
@@ -303,8 +290,6 @@ def leave_out(estimator: RateEstimator, mask: int, scale: float = 0.0) -> Geomet
     except GeometryError as error:
         estimator.withhold(True)
         return error
-    if scale:
-        estimator.widen(scale)
     estimator.withhold(False)
     return None
 

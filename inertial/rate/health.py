@@ -75,11 +75,6 @@ class HealthMonitor:
         """Bit k: axis k is excluded; all of them where so many do not fit that none is believed."""
         return (1 << self.layout.axes) - 1 if self._beyond_belief else self._mask
 
-    @property
-    def scale(self) -> float:
-        """Sigma of scale errors and directions, of 1, beyond what is expected; 0: as expected."""
-        return self.belief.width.scale
-
     def _known(self) -> Known:
         belief = self.belief
         return Known(
@@ -94,15 +89,15 @@ class HealthMonitor:
         """
         self.feed(np.array([t_s]), np.asarray(f_axis)[None], stale)
 
-    def feed(self, t_s: Array, f_axis: Array, stale: int = 0) -> list[tuple[int, int, float]]:
+    def feed(self, t_s: Array, f_axis: Array, stale: int = 0) -> list[tuple[int, int]]:
         """Samples at t_s (n,), s, board's clock, readings (n, N) m/s^2; how they are batched
         changes nothing.
 
-        Returns the batch cut where the mask or the scale changed: (end, mask, scale) of each part.
+        Returns the batch cut where the mask changed: (end, mask) of each part.
         A change holds from the very sample that made it.
         """
         f, row, parts = np.ascontiguousarray(f_axis, dtype=np.float64), 0, []
-        trust = self.mask, self.scale
+        mask = self.mask
         near, marks = self._near, self._marks
         while row < len(f):
             row = axis_samples.gather(
@@ -126,10 +121,10 @@ class HealthMonitor:
             near[axis_samples.SUM] = 0.0
             self._block(block, dt)
             self._stale = 0
-            if (self.mask, self.scale) != trust:
-                parts.append((row - 1, *trust))
-                trust = self.mask, self.scale
-        return [*(part for part in parts if part[0] > 0), (len(f), *trust)]
+            if self.mask != mask:
+                parts.append((row - 1, mask))
+                mask = self.mask
+        return [*(part for part in parts if part[0] > 0), (len(f), mask)]
 
     def skip(self, samples: int) -> None:
         """Samples are missing before the next one."""

@@ -34,15 +34,15 @@ def followed(fault: str, profile: str, seed: int, name: str, until_s: float = 30
     faults = Faults([parse(text, NAMES) for text in fault.split()])
     monitor, estimator = HealthMonitor(table.layout), ESTIMATORS[name](table.layout)
     error, sigma, valid, since = [], [], [], []
-    mask, ago = (0, 0.0), -1
+    mask, ago = 0, -1
     for number in range(int(np.ceil(until_s / 10.0))):
         block = faults.into(table.block(number))
         for k, t in enumerate(block.t_s):
             readings = block.readings[k]
             monitor.step(float(t), readings)
-            if (monitor.mask, monitor.scale) != mask:
-                mask, ago = (monitor.mask, monitor.scale), 0
-                leave_out(estimator, *mask)
+            if monitor.mask != mask:
+                mask, ago = monitor.mask, 0
+                leave_out(estimator, mask)
             said = estimator.feed(block.t_s[k : k + 1], block.readings[k : k + 1])
             error.append(said.omega_b[0] - block.omega_b[k])
             sigma.append(np.sqrt(np.diag(said.P[0])))
@@ -110,7 +110,7 @@ def test_where_many_axes_do_not_fit_none_is_believed():
         readings = block.readings[:, [3, 4, 5, 0, 1, 2, *range(6, 12)]]
         for k in range(0, len(readings), 50):
             part = slice(k, k + 50)
-            for _, *trust in monitor.feed(block.t_s[part], readings[part]):
-                error = leave_out(estimator, *trust)
+            for _, mask in monitor.feed(block.t_s[part], readings[part]):
+                error = leave_out(estimator, mask)
     assert monitor.mask == 0xFFF and "none is believed" in monitor.message
     assert error is not None and "wiring" in str(error)

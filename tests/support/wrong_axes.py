@@ -116,21 +116,21 @@ def followed(log: Log, name: str = "products-ekf", batch: int = BATCH) -> Run:
     """The monitor and an estimator over a log, as live."""
     layout = CUBE(0.05)
     monitor, estimator = HealthMonitor(layout), ESTIMATORS[name](layout)
-    omega, P, valid, masks, trust = [], [], [], [], (0, 0.0)
+    omega, P, valid, masks, left_out = [], [], [], [], 0
     for first in range(0, len(log.t_s), batch):
         t_s, f_axis = (column[first : first + batch] for column in log[:2])
         at = 0
-        for end, *new in monitor.feed(t_s, f_axis):
-            if tuple(new) != trust:
-                trust = tuple(new)
-                leave_out(estimator, *trust)
+        for end, mask in monitor.feed(t_s, f_axis):
+            if mask != left_out:
+                left_out = mask
+                leave_out(estimator, left_out)
             if end == at:
                 continue
             said = estimator.feed(t_s[at:end], f_axis[at:end])
             omega.append(said.omega_b.copy())
             P.append(said.P.copy())
             valid.append(said.sight == sight.VALID)
-            masks += [trust[0]] * (end - at)
+            masks += [left_out] * (end - at)
             at = end
     covariance, error = np.concatenate(P), np.concatenate(omega) - log.omega_b
     return Run(

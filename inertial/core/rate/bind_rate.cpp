@@ -73,13 +73,6 @@ class ProductsFilter {
     memory_->frame.exchange_axes(c_, {fewer, Matrix<MEASURED>(map(T)), Matrix<MEASURED>(map(unknown))});
   }
 
-  // Other beliefs about the same axes.
-  void tune(const Tuning& tuning) {
-    c_.tuning = tuning;
-    const Matrix<MEASURED> none = Matrix<MEASURED>::Identity();
-    memory_->frame.exchange_axes(c_, {true, none, none});
-  }
-
   bool correct(double t_s, double rate, double sigma, bool is_signed, const VectorIn& axis_b) {
     return memory_->frame.correct(c_, {t_s, rate, sigma, is_signed, Vector3(map(axis_b))});
   }
@@ -182,7 +175,6 @@ void bind_products(nb::module_& m) {
   nb::class_<ProductsFilter> c(m, "RateProductsFilter", "Memory and constants of one products filter.");
   c.def(nb::init<const Sensor&, const Tuning&, const StillLimits&>());
   bind_running(c);
-  c.def("tune", &ProductsFilter::tune, nb::arg("tuning"), "Go on with other beliefs about the axes, from the last standstill on.");
   c.def("follow", nb::overload_cast<const Sensor&, const Knowledge&>(&ProductsFilter::follow), nb::arg("sensor"),
         nb::arg("knowledge"), "Say the bound along the estimate, of all axes.");
   c.def_prop_ro("noise", [](const ProductsFilter& f) { return nb::make_tuple(f.noise().quiet(), f.noise().force()); },
