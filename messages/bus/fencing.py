@@ -8,10 +8,10 @@ messages with a smaller number than it has heard on the same key. The one with t
 finds out by the other's token and steps back.
 
 A claim is a Zenoh liveliness token `<base>/<number>-<id>`, which goes with its process's
-connection. While another has one, a newcomer waits; of two that claim at the same time the greater
-number serves. A number is believed when its publisher has claimed it: whoever sends a great one
-beside the process that serves silences nobody, and when the one with the greater number has gone,
-the one that is left is heard again.
+connection. While another has one, a newcomer waits, with a token `<base>/waiting-<id>` of its own;
+of two that claim at the same time the greater number serves. A number is believed when its
+publisher has claimed it: whoever sends a great one beside the process that serves silences nobody,
+and when the one with the greater number has gone, the one that is left is heard again.
 """
 
 import logging
@@ -29,6 +29,7 @@ log = logging.getLogger(__name__)
 
 QUERY_S = 1.0  # how long to wait for other tokens; a router answers in milliseconds
 RETRY_S = 2.0
+BOTH = 2  # a session's own token in an answer: as the session knows it, and as the router does
 BYTES = 8  # of a number in an attachment
 KEYS = 1 << 16  # whose numbers are remembered
 FAR_NS = 100 * 365 * 86400 * 10**9  # a number is about a time; further ahead it is none
@@ -214,7 +215,7 @@ class Claim:
 
     def look(self) -> bool:
         """Ask now; False when another has it, and `lost` is set, or when that is not known."""
-        ranks = alive(self._session, self._bases)
+        ranks = alive(self._session, self._bases, f"{self.number:020d}-{self._id}")
         if self._outdone(ranks or ()):
             self.lost.set()
         return ranks is not None and not self.lost.is_set()
@@ -254,40 +255,68 @@ def claim(
     own: the number to claim under, at least; heard(): the greatest that others know of.
     on_refused(id) is called once, before waiting, when another has it.
     """
-    names, greatest, said = tuple(bases), 0, False
+    names = tuple(bases)
+    name = f"waiting-{session.zid()}"
+    waiting = [session.liveliness().declare_token(f"{base}/{name}") for base in names]
+    try:
+        return _claim(session, names, name, own, stop, on_refused, heard)
+    finally:
+        for token in waiting:
+            token.undeclare()
+
+
+def _claim(
+    session: zenoh.Session,
+    bases: tuple[str, ...],
+    waiting: str,
+    own: int,
+    stop: threading.Event,
+    on_refused: Callable[[str], None],
+    heard: Callable[[], int],
+) -> Claim | None:
+    greatest, looks, wanted = 0, 0, 1  # looks in a row that found nobody, and how many it takes
     while not stop.is_set():
-        ranks = alive(session, names)
-        if ranks is None:
-            stop.wait(RETRY_S)
-            continue
-        others = [rank for rank in ranks if rank[1] != str(session.zid())]
-        if not others:
+        ranks = alive(session, bases, waiting)
+        others = [rank for rank in ranks or () if rank[1] != str(session.zid())]
+        looks = looks + 1 if ranks is not None and not others else 0
+        refused = others[0][1] if others else ""
+        if looks >= wanted:
             greatest = max(greatest, heard())
-            mine = Claim(session, names, max(own, greatest + 1) if greatest else own)
+            mine = Claim(session, bases, max(own, greatest + 1) if greatest else own)
             if mine.look():
                 mine.watch()
                 return mine
             mine.release()
+            refused = "one that came at the same time"
         greatest = max([greatest, *(number for number, _ in others)])
-        if not said:
-            on_refused(others[0][1] if others else "one that came at the same time")
-            said = True
+        if refused and wanted == 1:
+            on_refused(refused)
+            wanted = 2  # who was there may only be late in coming back to a router that began anew
         stop.wait(RETRY_S)
     return None
 
 
-def alive(session: zenoh.Session, bases: Iterable[str]) -> list[Rank] | None:
+def alive(session: zenoh.Session, bases: Iterable[str], own: str) -> list[Rank] | None:
     """Numbers and ids of the tokens below the bases. None when that is not known: without a router,
-    or when it does not answer in time, nobody may be taken for gone.
+    or when it does not answer, nobody may be taken for gone.
+
+    own: name of a token of this session below each base. The session itself answers with it, and so
+    does the router: only an answer that has it twice is the router's. (While a connection is being
+    made anew, a query ends at once, and without an error, with what the session knows itself.)
     """
     found = []
     for base in bases:
+        seen = 0
         for reply in session.liveliness().get(f"{base}/*", timeout=QUERY_S):
             if reply.ok is None:
                 return None
-            rank = rank_of(str(reply.ok.key_expr))
+            key = str(reply.ok.key_expr)
+            seen += key == f"{base}/{own}"
+            rank = rank_of(key)
             found += [] if rank is None else [rank]
-    return sorted(found) if list(session.info.routers_zid()) else None
+        if seen < BOTH:
+            return None
+    return sorted(found)
 
 
 def rank_of(key: str) -> Rank | None:

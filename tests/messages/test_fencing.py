@@ -1,5 +1,6 @@
 """Whose number is believed: real sessions over a real router."""
 
+import functools
 import os
 import signal
 import subprocess
@@ -13,7 +14,7 @@ from support.stack import free_port
 
 from messages.bus import fencing
 from messages.bus.fencing import FAR_NS, Claim, Fence, alive, claim, heard_of, packed
-from messages.bus.session import BusSettings, open_client, open_router
+from messages.bus.session import BusSettings, connected, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import GATEWAY
 from messages.history import answers
@@ -99,12 +100,18 @@ def test_nobody_is_taken_for_gone_while_the_router_does_not_answer(monkeypatch):
     )
     try:
         assert router.stdout.readline() == b"ready\n"
-        settings = BusSettings(prefix="t", router=endpoint, listen=[])
-        with open_client(settings) as session:
-            assert alive(session, [BASE]) == []
-            router.send_signal(signal.SIGSTOP)
-            os.waitpid(router.pid, os.WUNTRACED)  # until it has stopped
-            assert alive(session, [BASE]) is None
+        settings = BusSettings(prefix="t", router=endpoint, listen=[], lease_ms=500)
+        with open_client(settings) as session, open_client(settings) as other:
+            own = session.liveliness().declare_token(f"{BASE}/waiting-one")
+            look = functools.partial(alive, session, [BASE], "waiting-one")
+            with other.liveliness().declare_token(f"{BASE}/1-other"):
+                while look() != [(1, "other")]:
+                    time.sleep(0.01)
+                router.send_signal(signal.SIGSTOP)
+                os.waitpid(router.pid, os.WUNTRACED)  # until it has stopped
+                while connected(session):  # also at the moment when the connection is given up
+                    assert look() is None
+                assert look() is None
             monkeypatch.setattr(fencing, "RETRY_S", 0.01)
             stop, ended = threading.Event(), []
             args = session, [BASE], time.time_ns(), stop, ended.append
@@ -119,8 +126,9 @@ def test_nobody_is_taken_for_gone_while_the_router_does_not_answer(monkeypatch):
             router.wait()
             while session.info.routers_zid():
                 time.sleep(0.01)
-            assert alive(session, [BASE]) is None and not ended[0].look()
+            assert look() is None and not ended[0].look()
             assert not ended[0].lost.is_set()
+            own.undeclare()
     finally:
         router.kill()
         router.communicate()

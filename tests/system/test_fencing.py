@@ -98,13 +98,6 @@ def start(program: str, log: Path, *arguments: object) -> subprocess.Popen:
         )
 
 
-def until(condition, what: str, seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, f"no {what}"
-        time.sleep(0.05)
-
-
 class Bench:
     """Router and recorder in this process, and a bystander that hears everything."""
 
@@ -123,6 +116,15 @@ class Bench:
         )
         self._recorder.start()
         self.processes: list[subprocess.Popen] = []
+
+    def until(self, condition, what: str, seconds: float = 60.0) -> None:
+        """Wait for it; what all processes said where it does not come."""
+        end = time.monotonic() + seconds
+        while not condition():
+            if time.monotonic() > end:
+                said = [f"{log.name}:\n{log.read_text()}" for log in self.folder.glob("*.log")]
+                pytest.fail("\n".join([f"no {what}", *said]))
+            time.sleep(0.05)
 
     def _on(self, sample) -> None:
         if sample.attachment is not None:
@@ -190,17 +192,17 @@ def test_a_gateway_that_was_stopped_steps_back_behind_the_one_that_took_its_devi
         places = [(bench.folder / f"journal{k}", board.path) for k, board in enumerate(boards)]
         ends = (bench.endpoint, LEASE_MS)
         first = bench.start(GATEWAY, "first", *places[0], *ends)
-        until(lambda: bench.numbers("accel"), "samples of the first")
+        bench.until(lambda: bench.numbers("accel"), "samples of the first")
         bench.start(GATEWAY, "second", *places[1], *ends)
-        until(lambda: "another gateway serves" in bench.log("second"), "refusal")
+        bench.until(lambda: "another gateway serves" in bench.log("second"), "refusal")
         first.send_signal(signal.SIGSTOP)
         old = max(bench.numbers("accel"))
-        until(lambda: max(bench.numbers("accel")) > old, "samples of the second")
+        bench.until(lambda: max(bench.numbers("accel")) > old, "samples of the second")
         new = max(bench.numbers("accel"))
         first.send_signal(signal.SIGCONT)
-        until(lambda: "stepping back" in bench.log("first"), "stepping back")
+        bench.until(lambda: "stepping back" in bench.log("first"), "stepping back")
         before = bench.heard["accel"][new]
-        until(lambda: bench.heard["accel"][new] > before + 100, "samples of the second")
+        bench.until(lambda: bench.heard["accel"][new] > before + 100, "samples of the second")
         left = bench.heard["accel"][old]
         time.sleep(1.0)
         assert bench.heard["accel"][old] == left
@@ -222,17 +224,17 @@ def test_a_second_estimator_waits_and_takes_over_and_the_first_steps_back(bench)
         ends = (bench.endpoint, LEASE_MS)
         bench.start(GATEWAY, "gateway", bench.folder / "journal", board.path, *ends)
         first = bench.start(ESTIMATOR, "first", bench.folder / "one", *ends)
-        until(lambda: bench.numbers("rate"), "estimates of the first")
+        bench.until(lambda: bench.numbers("rate"), "estimates of the first")
         bench.start(ESTIMATOR, "second", bench.folder / "two", *ends)
-        until(lambda: "another estimator runs" in bench.log("second"), "refusal")
+        bench.until(lambda: "another estimator runs" in bench.log("second"), "refusal")
         first.send_signal(signal.SIGSTOP)
         old = max(bench.numbers("rate"))
-        until(lambda: max(bench.numbers("rate")) > old, "estimates of the second")
+        bench.until(lambda: max(bench.numbers("rate")) > old, "estimates of the second")
         new = max(bench.numbers("rate"))
         first.send_signal(signal.SIGCONT)
-        until(lambda: "stepping back" in bench.log("first"), "stepping back")
+        bench.until(lambda: "stepping back" in bench.log("first"), "stepping back")
         before = bench.heard["rate"][new]
-        until(lambda: bench.heard["rate"][new] > before + 100, "estimates of the second")
+        bench.until(lambda: bench.heard["rate"][new] > before + 100, "estimates of the second")
         assert max(bench.numbers("rate")) == new
     finally:
         folder = bench.close()
