@@ -116,6 +116,11 @@ class Recorder:
         ):
             self._intake.resume(manifest)
 
+    def take_over(self, session: str) -> None:
+        """Begin a session where another recorder, which is gone, was recording that one."""
+        log.info("going on where %s ended: its recorder is gone", plain(session))
+        self._begin(name=slug(session[16:48]), continues=plain(session))
+
     def step(self) -> None:
         """Write what came in, answer orders, close a chunk when it is time."""
         self.wake.clear()
@@ -166,11 +171,8 @@ class Recorder:
         return Door("recorder", most_devices=self.settings.max_devices)
 
     def _auto_start(self) -> None:
-        if (
-            self._store is None
-            and self._retry_at is not None
-            and time.monotonic() >= self._retry_at
-        ):
+        due = self._retry_at is not None and time.monotonic() >= self._retry_at
+        if self._store is None and due:
             self._begin(name=self.settings.name)
 
     def _begin(
