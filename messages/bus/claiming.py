@@ -28,6 +28,7 @@ import zenoh
 log = logging.getLogger(__name__)
 
 QUERY_S = 1.0  # how long to wait for other tokens; a router answers in milliseconds
+LOOK_S = 0.01  # between two questions, until the own token is known to the router
 RETRY_S = 2.0
 FAR_NS = 100 * 365 * 86400 * 10**9  # a number is about a time; further ahead it is none
 WAITING = "waiting"  # first part of the name of a token of who waits
@@ -106,8 +107,10 @@ def claim(
     stop: threading.Event,
     on_refused: Callable[[str], None],
     heard: Callable[[], int] = lambda: 0,
+    wait: bool = True,
 ) -> Claim | None:
-    """Wait until what the bases name is free and claim it; None when `stop` came first.
+    """Wait until what the bases name is free and claim it; None when `stop` came first, or when
+    it is not free and there is no time to `wait`.
 
     own: the number to claim under, at least; heard(): the greatest that others know of.
     on_refused(id) is called once, before waiting, when another has it, or came earlier.
@@ -116,7 +119,7 @@ def claim(
     since = time.time_ns(), str(claimant.session.zid())
     waiting = _tokens(claimant.session, names, f"{WAITING}-{name_of(since)}")
     try:
-        return _claim(claimant, names, since, own, stop, on_refused, heard)
+        return _claim(claimant, names, since, own, stop, on_refused, heard, wait)
     finally:
         for token in waiting:
             token.undeclare()
@@ -130,6 +133,7 @@ def _claim(
     stop: threading.Event,
     on_refused: Callable[[str], None],
     heard: Callable[[], int],
+    wait: bool,
 ) -> Claim | None:
     greatest, looks, wanted = 0, 0, 1  # looks in a row that found nobody, and how many it takes
     while not stop.is_set():
@@ -149,6 +153,8 @@ def _claim(
             greatest = max([greatest, *(number for number, _ in there.serving)])
         if refused and wanted == 1:
             on_refused(refused)
+            if not wait:
+                break
             wanted = 2  # who was there may only be late in coming back to a router that began anew
         stop.wait(RETRY_S)
     return None
@@ -172,22 +178,31 @@ def alive(onlooker: zenoh.Session, bases: Iterable[str], own: str) -> There | No
 
     own: name of a token below each base, of the onlooker's neighbour: an answer without it is none.
     """
-    there = There([], [])
+    end, all_of_them = time.monotonic() + QUERY_S, There([], [])
     for base in bases:
-        seen = False
-        for reply in onlooker.liveliness().get(f"{base}/*", timeout=QUERY_S):
-            if reply.ok is None:
+        while (there := _there(onlooker, base, own)) is None:
+            if time.monotonic() > end:
                 return None
-            name = str(reply.ok.key_expr).rsplit("/", 1)[-1]
-            seen = seen or name == own
-            rank, waits = rank_of(name), rank_of(name.removeprefix(f"{WAITING}-"))
-            if rank is not None:
-                there.serving.append(rank)
-            elif waits is not None:
-                there.waiting.append(waits)
-        if not seen:
+            time.sleep(LOOK_S)  # the two have a connection each: the question may come first
+        all_of_them.serving.extend(there.serving)
+        all_of_them.waiting.extend(there.waiting)
+    return There(sorted(all_of_them.serving), sorted(all_of_them.waiting))
+
+
+def _there(onlooker: zenoh.Session, base: str, own: str) -> There | None:
+    """One question about one base."""
+    there, seen = There([], []), False
+    for reply in onlooker.liveliness().get(f"{base}/*", timeout=QUERY_S):
+        if reply.ok is None:
             return None
-    return There(sorted(there.serving), sorted(there.waiting))
+        name = str(reply.ok.key_expr).rsplit("/", 1)[-1]
+        seen = seen or name == own
+        rank, waits = rank_of(name), rank_of(name.removeprefix(f"{WAITING}-"))
+        if rank is not None:
+            there.serving.append(rank)
+        elif waits is not None:
+            there.waiting.append(waits)
+    return there if seen else None
 
 
 def rank_of(key: str) -> Rank | None:

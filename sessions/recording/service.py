@@ -95,12 +95,13 @@ def _serve(
     # against recovery.
     # When the process ends first, the session stays open and the next start does it.
     threading.Thread(target=_tend, args=(settings,), name="recovery", daemon=True).start()
-    next_status = 0.0
+    next_status, said = 0.0, None
     try:
         while not (stop.is_set() or claimed.lost.is_set()):
             recorder.step()
-            if time.monotonic() >= next_status:
-                next_status = time.monotonic() + STATUS_S
+            # at once where it begins or ends: who takes over goes on by what was heard last
+            if time.monotonic() >= next_status or recorder.recording != said:
+                next_status, said = time.monotonic() + STATUS_S, recorder.recording
                 publishers.put(STATUS, RECORDER, recorder.status())
             recorder.wake.wait(DRAIN_S)
     finally:
