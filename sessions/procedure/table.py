@@ -25,6 +25,7 @@ from sessions.procedure.guard import Guard
 
 DESCRIPTIONS = Path(__file__).parent / "tables"
 LONGEST = 4096  # bytes of one reply
+DRAIN_S = 0.2
 PER_UNIT = {"deg/s": math.pi / 180.0, "rad/s": 1.0, "rpm": 2.0 * math.pi / 60.0}  # rad/s
 
 
@@ -65,6 +66,10 @@ class RateTable(Protocol):
 
     def release(self) -> None:
         """Leave it to others, and close the line."""
+        ...
+
+    def abandon(self) -> None:
+        """Leave one that does not stand, or does not answer, to its guard; raises nothing."""
         ...
 
 
@@ -162,9 +167,10 @@ class TextTable:
             -1.0 if description.clockwise_is_positive else 1.0
         )
         self._line: serial.SerialBase | None = None
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._guard = Guard(description.model_dump_json(), port)
         self._let_go = threading.Event()  # set: nobody is kept alive
+        self._hurry = threading.Event()  # set: a stop waits, nobody listens to an answer any more
 
     @property
     def name(self) -> str:
@@ -239,8 +245,11 @@ class TextTable:
         return value * self._per_unit
 
     def stop(self) -> None:
-        """See RateTable; waits for nobody longer than one answer."""
-        self._tell(self._said.commands.stop)
+        """See RateTable; what waits for an answer gives way."""
+        self._hurry.set()
+        with self._lock:
+            self._hurry.clear()
+            self._tell(self._said.commands.stop)
         self._guard.end()  # who stopped it sets no rate any more
 
     def release(self) -> None:
@@ -251,6 +260,12 @@ class TextTable:
         finally:
             self._guard.end()
             self.close()
+
+    def abandon(self) -> None:
+        """See RateTable."""
+        self._let_go.set()
+        self.close()  # the guard opens it
+        self._guard.leave()
 
     def close(self) -> None:
         """Close the line; it is opened again when it is needed."""
@@ -283,13 +298,15 @@ class TextTable:
 
     def _talk(self, command: str, answered: bool) -> str:
         line, end = self._open(), self._said.terminator.encode()
-        line.reset_input_buffer()
+        _drain(line)
         line.write(command.encode() + end)
         if not answered:
             return ""
         until, told = time.monotonic() + self._said.timeout_s, b""
         while not told.endswith(end):
             told += line.read(1) if len(told) < LONGEST else b""
+            if self._hurry.is_set():
+                raise TableError(f"{self.name}: {command!r} was given up for a stop")
             if time.monotonic() > until or len(told) >= LONGEST:
                 heard = repr(told[:80].decode(errors="replace")) if told else "nothing"
                 raise TableError(
@@ -301,10 +318,22 @@ class TextTable:
     def _open(self) -> serial.SerialBase:
         if self._line is None:
             url = self._port.replace("tcp://", "socket://", 1)
-            self._line = serial.serial_for_url(url, baudrate=self._said.baud, timeout=0.1)
+            self._line = serial.serial_for_url(
+                url, baudrate=self._said.baud, timeout=0.1, write_timeout=self._said.timeout_s
+            )
         return self._line
 
     def _close(self) -> None:
         if self._line is not None:
             self._line.close()
             self._line = None
+
+
+def _drain(line: serial.SerialBase) -> None:
+    """Forget what was said before, but not for ever where somebody pours."""
+    if isinstance(line, serial.Serial):
+        line.reset_input_buffer()
+        return
+    until = time.monotonic() + DRAIN_S
+    while line.in_waiting and time.monotonic() < until:
+        line.read(LONGEST)
