@@ -7,11 +7,12 @@ import logging
 import time
 from collections.abc import Callable
 
-from sessions.procedure.drive import Drive
+from sessions.procedure.driven.description import TableError
+from sessions.procedure.driven.drive import Drive
+from sessions.procedure.driven.table import RateTable
 from sessions.procedure.model import Step
 from sessions.procedure.run import ABORTED, DONE, HELD, RUNNING, STOPPED, Journal
 from sessions.procedure.seen import Line, Samples, Seen, TableSays
-from sessions.procedure.table import RateTable, TableError
 from sessions.procedure.watch import State, Watch
 
 log = logging.getLogger(__name__)

@@ -17,10 +17,11 @@ from messages.contract.topics import ACCEL, AXES, IMU, LINK, NOTE, PROCEDURE, RA
 from sessions.procedure import library, seen
 from sessions.procedure.conductor import Conductor
 from sessions.procedure.desk import ProcedureDesk
+from sessions.procedure.driven.description import TableError, described
+from sessions.procedure.driven.table import RateTable, TextTable
 from sessions.procedure.run import Journal, unfinished
 from sessions.procedure.settings import ProcedureSettings
 from sessions.procedure.status import status_of
-from sessions.procedure.table import RateTable, TableError, TextTable, described
 
 log = logging.getLogger(__name__)
 

@@ -15,12 +15,13 @@ from support.procedures import STILL, Answers, start
 
 from sessions.procedure import library
 from sessions.procedure.batch import COLUMNS, Cell, Unit, marked, remarks
-from sessions.procedure.left_alone import watch
+from sessions.procedure.driven.description import TableError, described
+from sessions.procedure.driven.left_alone import watch
+from sessions.procedure.driven.table import TextTable
 from sessions.procedure.library import ProcedureError, find, names, of_text
 from sessions.procedure.model import DEG
 from sessions.procedure.profile_file import profile_of
 from sessions.procedure.run import Journal, unfinished
-from sessions.procedure.table import TableError, TextTable, described
 
 
 @pytest.mark.parametrize("name", names())
@@ -106,7 +107,8 @@ def test_a_table_is_spoken_to_in_its_own_words():
 
 DRIVER = """
 import sys, time
-from sessions.procedure.table import TextTable, described
+from sessions.procedure.driven.description import described
+from sessions.procedure.driven.table import TextTable
 table = TextTable(described("simulated"), sys.argv[1])
 table.take()
 table.set_rate(1.0)

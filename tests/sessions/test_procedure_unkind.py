@@ -16,12 +16,13 @@ from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import check
 from sessions.procedure import library
 from sessions.procedure.conductor import Conductor
+from sessions.procedure.driven.description import TableError, described
+from sessions.procedure.driven.table import TextTable
 from sessions.procedure.library import of_text
 from sessions.procedure.model import DEG
 from sessions.procedure.run import HELD, STOPPED, Journal, unfinished
 from sessions.procedure.service import late
 from sessions.procedure.status import status_of
-from sessions.procedure.table import TableError, TextTable, described
 
 TURN = """
 title = "Turn"
@@ -134,7 +135,7 @@ def test_a_table_is_told_to_stand_until_it_takes_it(tmp_path):
 
 
 def test_a_table_that_is_lost_at_the_end_is_left_to_its_guard(tmp_path, monkeypatch):
-    monkeypatch.setattr("sessions.procedure.drive.CLOSING_S", 2.0)
+    monkeypatch.setattr("sessions.procedure.driven.drive.CLOSING_S", 2.0)
     slow = SlowTable()
     one = conductor(tmp_path, slow.table)
     one.begin()

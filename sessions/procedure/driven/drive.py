@@ -6,8 +6,9 @@ import logging
 import math
 import threading
 
+from sessions.procedure.driven.description import TableError
+from sessions.procedure.driven.table import RateTable
 from sessions.procedure.model import DEG
-from sessions.procedure.table import RateTable, TableError
 
 log = logging.getLogger(__name__)
 

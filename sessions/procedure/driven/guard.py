@@ -10,7 +10,7 @@ import sys
 
 log = logging.getLogger(__name__)
 
-CHILD = "sessions.procedure.left_alone"
+CHILD = "sessions.procedure.driven.left_alone"
 ALIVE, LET_GO = b".", b"q"
 HANGS_S = 20.0  # without a word; a recording that is closed and another begun may take as long
 
