@@ -87,7 +87,7 @@ base_image() {
 
 build() {
     say "building"
-    timeout 900 podman build --quiet --format docker --network host --isolation chroot --pull=never \
+    timeout 2400 podman build --quiet --format docker --network host --isolation chroot --pull=never \
         "${BUILD_MOUNTS[@]}" --tag localhost/gyrofree:local .
     podman image inspect --format 'image: {{.Size}} bytes' localhost/gyrofree:local
 }

@@ -106,6 +106,10 @@ class Conductor:
         self.journal.add("emergency")
         return problem
 
+    def abandon(self) -> None:
+        """Another process runs this now: command nothing any more, not even to stand."""
+        self.drive.abandon()
+
     def stopped(self, by: str) -> None:
         """After `emergency`: the run has ended."""
         if not self.run.over:

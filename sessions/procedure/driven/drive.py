@@ -81,6 +81,13 @@ class Drive:
         with self._driving:  # what was on its way to the table has gone: once more
             return self._halt()
 
+    def abandon(self) -> None:
+        """Another process commands it now: nothing more is said to it."""
+        self._stopped.set()
+        with self._driving:
+            if self.table is not None:
+                self.table.abandon()
+
     def _halt(self) -> str:
         try:
             self.table.stop()
@@ -131,5 +138,5 @@ class Drive:
         except TableError as error:
             self._refused(error)
         if late and self.alarm:
-            self.table.abandon()
+            self.table.give_up()
         return late and bool(self.alarm)

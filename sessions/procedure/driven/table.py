@@ -52,6 +52,10 @@ class RateTable(Protocol):
         ...
 
     def abandon(self) -> None:
+        """Another process commands it: close the line without a word."""
+        ...
+
+    def give_up(self) -> None:
         """Leave one that does not stand, or does not answer, to its guard; raises nothing."""
         ...
 
@@ -160,6 +164,12 @@ class TextTable:
             self.close()
 
     def abandon(self) -> None:
+        """See RateTable."""
+        self._let_go.set()
+        self._guard.end()
+        self.close()
+
+    def give_up(self) -> None:
         """See RateTable."""
         self._let_go.set()
         self.close()  # the guard opens it
