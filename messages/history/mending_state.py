@@ -89,6 +89,20 @@ class KeyState:
         self.filled = (self.filled[0] if follows else sequence, sequence)
         self.run, self.last = run, sequence
 
+    def overtaken(self, item: pb.HistoryItem) -> Refusal:
+        """A filled-in message that comes behind what was given on already."""
+        wanted = f"what comes behind {self.run}, {self.last}"
+        return Refusal("late", "message", f"{item.run}, {item.sequence}", wanted)
+
+    def give_up(self) -> int:
+        """What is missing will not come; how many messages that are."""
+        lost = sum(max(0, last - first + 1) * count for _, first, last, count in self.missing)
+        known = ((run, last) for run, _, last, _ in self.missing if last < 1 << 62)
+        self.run, self.last = max((self.run, self.last), *known, (0, 0))
+        self.lost += lost
+        self.missing.clear()
+        return lost
+
 
 @dataclass
 class Stream:

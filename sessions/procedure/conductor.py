@@ -119,6 +119,13 @@ class Conductor:
                 return f"THE TABLE DID NOT TAKE THE STOP, switch it off: {error}"
         return ""
 
+    def abandon(self) -> None:
+        """Another process runs this now: command nothing any more, not even to stand."""
+        self._stopped.set()
+        with self._driving:
+            if self.table is not None:
+                self.table.abandon()
+
     def stopped(self, by: str) -> None:
         """After `emergency`: the run has ended."""
         if not self.run.over:

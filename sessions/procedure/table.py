@@ -67,6 +67,10 @@ class RateTable(Protocol):
         """Leave it to others, and close the line."""
         ...
 
+    def abandon(self) -> None:
+        """Another process commands it: close the line without a word."""
+        ...
+
 
 class _Part(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -251,6 +255,12 @@ class TextTable:
         finally:
             self._guard.end()
             self.close()
+
+    def abandon(self) -> None:
+        """See RateTable."""
+        self._let_go.set()
+        self._guard.end()
+        self.close()
 
     def close(self) -> None:
         """Close the line; it is opened again when it is needed."""

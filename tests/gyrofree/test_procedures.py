@@ -161,7 +161,8 @@ def test_a_killed_service_goes_on_where_it_was(bench):
     os.kill(bench.demo.children()["procedures"].pid, signal.SIGKILL)
     end = bench.ended()
     assert (end.run, end.session, end.state) == (m.run, m.session, M.STATE_DONE), end.message
-    assert [s.attempts for s in end.steps] == [1, 2, 1]
+    spoilt = [s.spoilt for s in end.steps]  # by a machine that had no time for the samples
+    assert [s.attempts for s in end.steps] == [1 + spoilt[0], 2 + spoilt[1], 1 + spoilt[2]]
     assert end.steps[1].until_us - end.steps[1].from_us == 6_000_000
     # The table was driven all the while; the first step's window is still the one before the kill.
     assert end.steps[0].until_us == m.steps[0].until_us < end.steps[1].from_us
