@@ -3,6 +3,7 @@ over the bus; what happens is kept in [procedures] root, so that a killed servic
 """
 
 import logging
+import math
 import threading
 import time
 from collections import deque
@@ -30,10 +31,11 @@ from messages.contract.topics import (
 from sessions.procedure import library, seen
 from sessions.procedure.conductor import Conductor
 from sessions.procedure.desk import ProcedureDesk
+from sessions.procedure.driven.description import TableError, described
+from sessions.procedure.driven.table import RateTable, TextTable
 from sessions.procedure.run import Journal, unfinished
 from sessions.procedure.settings import ProcedureSettings
 from sessions.procedure.status import status_of
-from sessions.procedure.table import RateTable, TableError, TextTable, described
 
 log = logging.getLogger(__name__)
 
@@ -158,7 +160,7 @@ class Service:
         self._links.undeclare()
         for device, conductor in self._conductors.items():
             self._silence(device)
-            conductor.emergency()
+            conductor.drive.stop()
 
     def abandon(self) -> None:
         """Another process has taken over: say nothing more, least of all to its tables."""
@@ -185,11 +187,15 @@ class Service:
         if command.action == COMMAND.ACTION_START:
             if conductor is not None:
                 return f"{conductor.run.plan.name} runs on {device}: end or abort it first"
-            journal = self._desk(device).begin(command, self._since)
+            limit = self._tables[device].limit if device in self._tables else math.inf
+            journal = self._desk(device).begin(command, limit)
             self._start(journal)
             return ""
         if conductor is None:
             return f"no procedure runs on {device}"
+        if command.action in (COMMAND.ACTION_NEXT, COMMAND.ACTION_REPEAT):
+            if problem := late(conductor, command):
+                return problem
         match command.action:
             case COMMAND.ACTION_NEXT:
                 return conductor.next(command.user, command.text)
@@ -255,6 +261,16 @@ class Service:
         message.header.device, message.header.run = device, self._since
         message.header.utc_ns = message.header.utc_ns or time.time_ns()
         self._publishers.put(PROCEDURE, device, message)
+
+
+def late(conductor: Conductor, command: COMMAND) -> str:
+    """Why an order comes too late: it was meant for what another has answered already."""
+    run = conductor.run
+    if command.run and command.run != run.id:
+        return "another test runs now: look at it first"
+    if command.step and command.step != run.at + 1:
+        return f"step {command.step} has been answered already; this is step {run.at + 1}"
+    return ""
 
 
 def run(settings: ProcedureSettings, bus: BusSettings, stop: threading.Event) -> None:

@@ -205,7 +205,8 @@ def test_open_steps_are_confirmed_and_poses_are_followed(bench):
     bench.start("open")
     bench.until(lambda m: m.state == M.STATE_RUNNING and m.instruction.startswith("Read"))
     assert "temperature" in bench.order("NEXT").message  # what was read is wanted
-    assert bench.order("NEXT", text="23.5").ok
+    assert bench.order("NEXT", text="23.5", step=1).ok
+    assert "answered already" in bench.order("NEXT", text="24", step=1).message
     m = bench.ended()
     assert m.state == M.STATE_DONE, m.message
     assert m.steps[0].reason == "temperature in deg C: 23.5" and m.steps[0].confirmed_by == "anna"
