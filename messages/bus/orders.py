@@ -125,7 +125,9 @@ def give(
     patience_s = kind.patience_s if timeout_s is None else timeout_s
     who = {"device": device} if kind.source == tp.GATEWAY else {}
     try:
-        serves = newest(session, tp.claim_key(prefix, kind.source, **who))
+        base = tp.claim_key(prefix, kind.source, **who)
+        # twice: a session that watches claims may know of a new one and not yet say so
+        serves = newest(session, base) or newest(session, base)
         replies = session.get(
             key,
             payload=command.SerializeToString(),

@@ -57,7 +57,7 @@ class Bench:
         self.honest, self.liar, self.consumer = (
             stack.enter_context(open_client(bus)) for _ in range(3)
         )
-        self._onlooker = stack.enter_context(open_client(bus))
+        self._onlooker = self.asker = stack.enter_context(open_client(bus))
         self.refused: list[tuple[str, Refusal]] = []
         self.fence = Fence(lambda key, why, device: self.refused.append((key, why)))
         self.fence.declare(self.consumer, "t")
@@ -184,17 +184,17 @@ def test_an_order_is_answered_by_the_one_who_serves(bench, caplog):
         query.reply(key, pb.RecorderStatus(session="a-lie", recording=True).SerializeToString())
 
     bench.liar.declare_queryable(key, lies)
-    claimed = Claim(Claimant(bench.honest, bench.consumer), [base], time.time_ns())
+    claimed = Claim(Claimant(bench.honest, bench.asker), [base], time.time_ns())
     orders.take(
         bench.honest, "t", orders.RECORDER, lambda order: (time.sleep(0.3), order.answer(quiet))
     )
     quiet = pb.RecorderStatus(session="true")
-    while newest(bench.consumer, base) != str(bench.honest.zid()):
+    while newest(bench.asker, base) != str(bench.honest.zid()):
         time.sleep(0.005)
     command = pb.RecorderCommand(action=pb.RecorderCommand.ACTION_STATUS)
-    told = orders.give(bench.consumer, "t", orders.RECORDER, command)
+    told = orders.give(bench.asker, "t", orders.RECORDER, command)
     while "is refused" not in caplog.text:  # the liar may not have been known yet
         assert (told.session, told.recording) == ("true", False)
-        told = orders.give(bench.consumer, "t", orders.RECORDER, command)
+        told = orders.give(bench.asker, "t", orders.RECORDER, command)
     assert told.session == "true" and str(bench.liar.zid()) in caplog.text
     claimed.release()
