@@ -6,7 +6,7 @@
 Encodings: UTF-8 with or without a byte-order mark, UTF-16, else Windows-1252. Separators: comma,
 semicolon, tab, bar, or what a spreadsheet's line `sep=;` says. Decimal comma where the separator is
 another. Times may be dates of ISO 8601. Units may stand in brackets or in a row below the header
-(sheet_names.py). Lines that begin with #, % or // are comments, before the header and below it;
+(tables/heading.py). Lines that begin with #, % or // are comments, before the header and below it;
 empty lines are left out; the header may be quoted. The file is read in blocks, so memory grows with
 the numbers that are kept, not with the text.
 """
@@ -40,7 +40,7 @@ from logs.sheet_form import (
     printable,
     separator_of,
 )
-from logs.sheet_names import Heading, heading
+from logs.tables.heading import Heading, heading
 
 Array = NDArray[np.float64]
 

@@ -288,7 +288,7 @@ class Navigator:
     def _waiting_solution(self, t: float) -> Solution:
         c, fix, align = self.config, self._last_fix, self._startup.align
         age = t - self._last_used
-        v, where = np.zeros(3), (0.0, 0.0, 0.0)
+        v, where = np.zeros(3), (math.nan, math.nan, math.nan)
         sigma_p, sigma_v = np.full(3, 1e7), np.full(3, 100.0)
         if fix is not None:
             fix = fix.filled()
