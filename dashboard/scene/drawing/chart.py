@@ -29,6 +29,8 @@ LATE_HEIGHT = 0.035  # of the strip that marks filled-in data, of the chart's he
 MOST_RANGES = 24  # named in one chart
 SINGLE = np.float32  # of a browser's points: seven digits are more than a screen shows
 REPAIRED = "#e69f00"
+# uPlot's own ticks are as long and as strong as the numbers beside them
+AXIS = {"font": "11px sans-serif", "ticks": {"size": 4, "width": 1, "stroke": "#8c8c8c80"}, "gap": 3}
 
 
 @dataclass
@@ -215,8 +217,8 @@ class Chart:
                     "strip": {"range": (0, 1 / LATE_HEIGHT)},
                 },
                 axes=(
-                    {"size": 42, "font": "11px sans-serif"},  # with the origin below the numbers
-                    {"size": 46, "font": "11px sans-serif"},
+                    AXIS | {"size": 42},  # with the origin below the numbers
+                    AXIS | {"size": 46},
                 ),
                 legend={"show": False},
                 height=self._height,

@@ -18,7 +18,8 @@ export function ask(fields) {
 // Ask, and hold to it when the connection is made anew.
 export function choose(fields) {
   Object.assign(wish, fields);
-  if ("w" in fields && !("p" in fields)) delete wish.p;
+  if ("p" in fields) delete wish.w; // a page is in one workspace: two wishes would turn it to and fro
+  else if ("w" in fields) delete wish.p;
   ask(fields);
 }
 

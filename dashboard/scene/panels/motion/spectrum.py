@@ -13,6 +13,7 @@ from scipy.signal import welch
 
 from dashboard.data.channels import Channel, channels, derived
 from dashboard.data.device import Device
+from dashboard.scene.drawing.chart import AXIS
 from dashboard.scene.drawing.page import Markup, alert, note, tag
 from dashboard.scene.panels.base import Panel, Snapshot
 from logs.figures.expression import read
@@ -182,7 +183,7 @@ class Spectrum(Panel):
             data,
             series=({"label": "x"}, line),
             scales=_scales(data[0]),
-            axes=({"size": 26}, {"size": 62, "scale": "level"}),
+            axes=(AXIS | {"size": 26}, AXIS | {"size": 62, "scale": "level"}),
             legend={"show": False},
             height=230,
             padding=(6, 10, 0, 0),
