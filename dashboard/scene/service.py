@@ -14,6 +14,7 @@ import viser
 
 from dashboard.data.store import Store
 from dashboard.desk import Desk
+from dashboard.scene.shared import Shared
 from dashboard.scene.style import LEFT_WIDTH, css
 from dashboard.scene.view import OWN_INPUTS, View
 
@@ -56,6 +57,7 @@ class SceneHandle:
         self.port = server.get_port()
         self._server, self._store, self._desk = server, store, desk
         self._views: dict[int, View] = {}
+        self._shared = Shared()
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._watched = watched
@@ -70,7 +72,7 @@ class SceneHandle:
             ),
             threading.Thread(
                 target=self._loop,
-                args=(PANEL_S, View.tick_panels),
+                args=(PANEL_S, View.tick_panels, self._shared.begin),
                 name="dashboard-panels",
                 daemon=True,
             ),
@@ -93,7 +95,7 @@ class SceneHandle:
         self._server.stop()
 
     def _connected(self, client: viser.ClientHandle) -> None:
-        view = View(client, self._store, self._desk)
+        view = View(client, self._store, self._desk, self._shared)
         with self._lock:
             self._views[client.client_id] = view
             self._watched.set()
@@ -106,14 +108,17 @@ class SceneHandle:
                 self._watched.clear()
         log.info("browser %d is gone", client.client_id)
 
-    def _loop(self, period_s: float, tick: Callable[[View], None]) -> None:
-        """Call tick for each view; nothing at all is done while nobody looks."""
+    def _loop(
+        self, period_s: float, tick: Callable[[View], None], begin: Callable[[], None] = int
+    ) -> None:
+        """Call begin once and tick for each view; nothing at all is done while nobody looks."""
         complained: set[int] = set()
         while not self._stop.is_set():
             self._watched.wait()
             began = time.monotonic()
             with self._lock:
                 views = list(self._views.items())
+            begin()
             for number, view in views:
                 try:
                     tick(view)

@@ -62,7 +62,7 @@ export class Overlay {
       }));
       figure.hidden = !mine.length;
       if (kind === "error" && mine.length) figure.querySelector("small").textContent = `against ${[...new Set(mine.map((l) => REFERENCES[l.against] ?? l.against))].join(", ")}, °/s`;
-      plot.set(mine, marks);
+      plot.set(mine, marks, kind === "rate" && answer.sessions.length === 1 ? answer.sessions[0].shades[part] : []);
     }
     this.showOwn(answer.own, marks);
     this.trackFigure.hidden = !answer.tracks.length;

@@ -36,7 +36,8 @@ class Devices(Panel):
     _table = None
 
     def update(self, s: Snapshot) -> None:
-        self._table = self.html(self._content(s), self._table)
+        content = s.once(("summary", self.short), lambda: self._content(s))
+        self._table = self.html(content, self._table)
 
     def waiting(self, text: str) -> None:
         """There is no device yet."""

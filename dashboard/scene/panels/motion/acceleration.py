@@ -1,7 +1,7 @@
 """Specific force of the body's centre in body axes, from the field of all sensors."""
 
 from dashboard.data.device import Device
-from dashboard.scene.drawing.chart import Curve
+from dashboard.scene.drawing.drawn import Curve
 from dashboard.scene.drawing.page import joined, sub
 from dashboard.scene.drawing.palette import AXES, truth_colour
 from dashboard.scene.panels.base import NO_RATE, Panel, Snapshot, estimator_curve
