@@ -5,6 +5,7 @@ import socket
 from pathlib import Path
 
 import pytest
+from support.browser import chromium  # noqa: F401  a fixture
 
 ROOT = Path(__file__).resolve().parent.parent
 # Files that take the longest, begun first: else one worker ends them while the others have nothing.

@@ -17,12 +17,14 @@ from dashboard.desk import Desk
 from dashboard.scene.shared import Shared
 from dashboard.scene.style import LEFT_WIDTH, css
 from dashboard.scene.view import OWN_INPUTS, View
+from dashboard.scene.waking import Waking
 
 log = logging.getLogger(__name__)
 
 __all__ = ["OWN_INPUTS", "SceneError", "SceneHandle", "start"]
 
-POSE_S = 1 / 20  # period of poses
+POSE_S = 1 / 20  # period of poses ...
+POSES_PER_S = 240  # ... of as many browsers as can have it; more of them share these
 PANEL_S = 0.4  # period of charts and tables
 
 
@@ -57,7 +59,7 @@ class SceneHandle:
         self.port = server.get_port()
         self._server, self._store, self._desk = server, store, desk
         self._views: dict[int, View] = {}
-        self._shared = Shared()
+        self._shared, self._waking = Shared(), Waking()
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._watched = watched
@@ -95,6 +97,7 @@ class SceneHandle:
         self._server.stop()
 
     def _connected(self, client: viser.ClientHandle) -> None:
+        self._waking.take(client)
         view = View(client, self._store, self._desk, self._shared)
         with self._lock:
             self._views[client.client_id] = view
@@ -119,14 +122,17 @@ class SceneHandle:
             with self._lock:
                 views = list(self._views.items())
             begin()
-            for number, view in views:
-                try:
-                    tick(view)
-                except Exception:  # one browser's trouble must not stop the others' picture
-                    if number not in complained:
-                        log.exception("browser %d: update failed", number)
-                    complained.add(number)
-            self._stop.wait(max(period_s - (time.monotonic() - began), period_s / 4))
+            with self._waking.once():
+                for number, view in views:
+                    try:
+                        tick(view)
+                    except Exception:  # one browser's trouble must not stop the others' picture
+                        if number not in complained:
+                            log.exception("browser %d: update failed", number)
+                        complained.add(number)
+            each_s = period_s if tick is not View.tick_scene else len(views) / POSES_PER_S
+            wanted_s = max(period_s, each_s) - (time.monotonic() - began)
+            self._stop.wait(max(wanted_s, period_s / 4))
 
 
 def start(

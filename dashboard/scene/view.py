@@ -58,6 +58,7 @@ class View:
         self._page_chosen = False
         self._last: dict[str, int] = {}  # page that was open in each workspace
         self._rooms: list[dict] = []
+        self._said: dict = {}  # of the view's state
         self._cursors: tuple[float, float] | tuple[()] = ()
         self._theme()
         self.scene = SceneView(client, self._choice)
@@ -155,7 +156,7 @@ class View:
             made = partial(offered, PAGES, device)
             self._rooms = self._shared.once((device.name, "rooms"), made)
         page = PAGES[self._page]
-        text = stated(
+        fields = dict(
             devices=self._store.names(),
             device=device.name if device is not None else "",
             workspace=page.workspace,
@@ -172,9 +173,9 @@ class View:
             size=self._size,
             layers=[layer for layer in LAYERS if self._choice.layers[layer]],
         )
-        content = str(tag("span", class_="gf-state", data_state=text))
-        if self._state.content != content:
-            self._state.content = content
+        if fields != self._said:
+            self._said = fields
+            self._state.content = str(tag("span", class_="gf-state", data_state=stated(**fields)))
 
     # --- what the person asks
 

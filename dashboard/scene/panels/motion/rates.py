@@ -20,6 +20,8 @@ from dashboard.scene.drawing.palette import (
 from dashboard.scene.panels.base import DEG, NO_RATE, Panel, Snapshot, estimator_curve
 from messages.contract import gyrofree_pb2 as pb
 
+TITLES = {axis: joined([sub("ω", axis), " with 3σ"]) for axis in "xyz"}
+
 
 class Rates(Panel):
     """omega_z with the tachometer first, because it is what the table turns about; then omega_x and
@@ -49,7 +51,7 @@ class Rates(Panel):
         for k, axis in ((2, "z"), (0, "x"), (1, "y")):
             self.show(
                 f"omega{axis}",
-                joined([sub("ω", axis), " with 3σ"]),
+                TITLES[axis],
                 "°/s",
                 partial(self._curves, s, k),
                 s,
