@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 __all__ = ["OWN_INPUTS", "SceneError", "SceneHandle", "start"]
 
 POSE_S = 1 / 20  # period of poses ...
-POSES_PER_S = 240  # ... of as many browsers as can have it; more of them share these
+POSES_PER_S = 200  # ... of as many browsers as can have it; more of them share these
 PANEL_S = 0.4  # period of charts and tables
 
 
