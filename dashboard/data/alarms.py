@@ -105,9 +105,11 @@ def bench_alarms(store: Store, now: float | None = None) -> list[Alarm]:
 
 
 def drives(m: pb.ProcedureStatus) -> bool:
-    """Whether a procedure has a table in its hands: from its start until the table is let go."""
+    """Whether a procedure has a table in its hands: from its start until the table is let go; and
+    after that where it did not take its stop.
+    """
     active = m.state in (pb.ProcedureStatus.STATE_RUNNING, pb.ProcedureStatus.STATE_HELD)
-    return bool(m.table) and (active or m.instruction.endswith("being closed"))
+    return bool(m.table) and (active or bool(m.alarm) or m.instruction.endswith("being closed"))
 
 
 def _table(device: Device, now: float) -> Iterator[Alarm]:
@@ -118,6 +120,8 @@ def _table(device: Device, now: float) -> Iterator[Alarm]:
             f" {plain(heard.message.table, 60)} may still turn: stop it at the table"
         )
         yield Alarm("table", "the table is left alone", text, "procedure")
+    if heard is not None and heard.message.alarm:
+        yield Alarm("table", "the table may turn", plain(heard.message.alarm), "procedure")
 
 
 def _link(device: Device, now: float) -> Iterator[Alarm]:

@@ -126,7 +126,8 @@ def _receiver(device: Device) -> Told:
         return {"quality": "none", "why": "no receiver speaks of this device", "stale": True}
     m = latest.message
     stale = device.stale("gnss")
-    told = {"quality": QUALITIES.get(m.quality, "none"), "satellites": m.satellites, "stale": stale}
+    told: Told = {"quality": QUALITIES.get(m.quality, "none"), "stale": stale}
+    told["satellites"] = m.satellites or None  # a position by no satellite: it does not say
     if m.quality == pb.GnssFix.QUALITY_NONE:
         return told | {"why": "the receiver has no satellite fix"}
     known = len(m.position_sigma_ned_m) == 3

@@ -74,7 +74,7 @@ def replay(
         run_service(lambda stop: player.run(settings, path, options, stop), verbose)
     except UnknownEstimator as error:
         raise fail(error, CONFIG) from None
-    except ValueError as error:
+    except (ValueError, player.ReplayError) as error:
         raise fail(error) from None
 
 

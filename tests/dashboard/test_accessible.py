@@ -260,6 +260,7 @@ def test_a_zoom_stays_while_data_come_in_until_one_follows_again(chromium, door)
     with visit(chromium, door, path=path) as (page, said):
         scene = scene_of(page)
         scene.wait_for_function(f"() => ({CHARTS})().some(([a, b]) => b - a > 1)")
+        scene.wait_for_selector(".uplot .gf-tools")  # until then it is uPlot that is dragged
         chart = scene.locator(".uplot .u-over").first
         box = chart.bounding_box()
         y = box["y"] + box["height"] / 2

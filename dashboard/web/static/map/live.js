@@ -41,7 +41,7 @@ function inWords({ now }) {
 
 function receiverInWords({ quality, satellites, accuracy_m, why }) {
   if (quality === "none") return `no position: ${why}`;
-  return [`${quality}, ${satellites} satellites`, accuracy_m ? `± ${metre(accuracy_m)} (2σ)` : "", why].filter(Boolean).join(" · ");
+  return [satellites ? `${quality}, ${satellites} satellites` : quality, accuracy_m ? `± ${metre(accuracy_m)} (2σ)` : "", why].filter(Boolean).join(" · ");
 }
 
 // The leading filter in a few words, which stand there also while the rest is folded.
