@@ -4,7 +4,7 @@
 const FAR = 4; // widths of the bulk that a point is away from it before it counts as an outlier
 const FEW = 4; // of them at one side; more are a signal
 const FRESH = 0.04; // newest share of the window, in which a jump may be the beginning of something
-const SHADES = { blind: "#d55e00", ambiguous: "#c9b400" }; // what a filter does not vouch for: no lines, few names
+export const SHADES = { blind: "#d55e00", ambiguous: "#c9b400" }; // what a filter does not vouch for: no lines, few names
 const TINT = { ...SHADES, mark: "#c564a0", step: "#3296d8", late: "#b08000" };
 const FACE = "system-ui, 'DejaVu Sans', sans-serif";
 
