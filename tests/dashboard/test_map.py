@@ -341,6 +341,7 @@ def test_the_map_in_a_browser_with_vector_tiles_raster_tiles_and_none(tmp_path, 
         expect(page.locator("#plain")).to_contain_text("This browser has no WebGL")
         expect(page.locator("#plain dl")).to_contain_text("speed, km/h")
         expect(page.locator("#pages [aria-selected=true]")).to_have_text("Map")
+        page.locator(".map-canvas").wait_for()
         wait_for(lambda: "50,150,216" in page.evaluate(DRAWN), "a way without WebGL")
         assert not serious(page, "#stage")
         assert not others and not said

@@ -22,11 +22,13 @@ function answer(fields) {
 }
 
 // What a device's leading estimators say, as [name, value]; what is not known has no number.
-async function values({ name, axes }) {
+async function values(name) {
   const path = `devices/${encodeURIComponent(name)}`, rows = [];
   const { ways } = await call(`${path}/map?since=1e12`);
-  const [rate, nav] = await Promise.all([axes && call(`${path}/rate`).catch(() => null), ways.length && call(`${path}/nav`).catch(() => null)]);
-  if (rate) rate.omega_radps.forEach((v, k) => {
+  // what navigates says its place, what does not its rate
+  const nav = ways.length ? await call(`${path}/nav`).catch(() => null) : null;
+  const rate = nav ? null : await call(`${path}/rate`).catch(() => null);
+  rate?.omega_radps.forEach((v, k) => {
     const seen = rate.sight[k] ?? "valid";
     rows.push([`ω${"xyz"[k]}, °/s`, seen === "blind" ? "blind" : `${seen === "ambiguous" ? "± " : ""}${number(v === null ? v : v * DEG, 1)}`]);
   });
@@ -47,8 +49,7 @@ async function poll(list) {
     now.devices = devices.map((one) => one.name);
     if (!now.devices.includes(now.device)) now.device = now.devices[0] ?? "";
     stateIs({ ...now });
-    const one = devices.find(({ name }) => name === now.device);
-    const rows = one ? await values(one) : [["", "no device has spoken yet"]];
+    const rows = now.device ? await values(now.device) : [["", "no device has spoken yet"]];
     list.replaceChildren(...rows.flatMap(([name, value]) => {
       const term = document.createElement("dt"), told = document.createElement("dd");
       term.textContent = name;

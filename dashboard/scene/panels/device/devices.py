@@ -9,6 +9,7 @@ import numpy as np
 
 from dashboard.data.alarms import TURNS_RADPS, alarms, bench_alarms, counts, waits
 from dashboard.data.pose import roll_pitch
+from dashboard.data.whereabouts import QUALITIES
 from dashboard.scene.drawing.geometry import MODES
 from dashboard.scene.drawing.page import EMPTY, Markup, alert, bad, joined, note, rows, tag, term
 from dashboard.scene.drawing.palette import (
@@ -119,12 +120,7 @@ class Devices(Panel):
             tiles.append(_tile(s, name, "nav", number(speed, 1), "km/h", sub))
         fix = s.device.get("gnss")
         if fix is not None:
-            quality = (
-                pb.GnssFix.Quality.Name(fix.message.quality)
-                .removeprefix("QUALITY_")
-                .replace("_", " ")
-                .lower()
-            )
+            quality = QUALITIES.get(fix.message.quality, "none")
             if fix.message.quality and math.isnan(fix.message.height_m):
                 quality += " · no height"
             if fix.message.quality and not fix.message.v_n_mps:
