@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating[Any]]
 
 FILE = "curves.npz"
-FORMAT = 3
+FORMAT = 4
 BINS = 100_000  # at most, per line
 STEPS = (1, 2, 5)  # bins are 1, 2 or 5 times a power of ten, s
 
