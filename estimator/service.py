@@ -33,6 +33,7 @@ log = logging.getLogger(__name__)
 
 LOOK_S = 0.2  # between two looks at what may end it
 GONE_S = 600.0  # a device silent for so long makes room where there is none left
+WAITING_S = 300.0  # for a gateway that is there and does not answer; its samples wait meanwhile
 END_S = 3.0  # for what is queued when the service is to end
 
 
@@ -67,7 +68,14 @@ def _serve(
         spool.journal.outrun(claimed.number - 1)
         claimed.raise_to(spool.journal.run)
     publishers.number = claimed.number
-    asker = Asker(session, bus.prefix, lambda question, reply: worker.answered(question, reply))
+    fence = Fence(lambda *refusal: worker.door.refuse(*refusal))
+    asker = Asker(
+        session,
+        bus.prefix,
+        lambda question, reply: worker.answered(question, reply),
+        fence,
+        patience_s=WAITING_S,
+    )
     saved = SavedState(settings.journal, settings, version()) if spool is not None else None
     trouble = _trouble(saved, spool)
     worker = _worker(Pipeline(settings), publishers, asker, saved, settings, trouble)
@@ -75,7 +83,6 @@ def _serve(
     thread = threading.Thread(target=worker.work, args=(failed,), name="estimator", daemon=True)
     thread.start()
     answering = [declare(session, bus.prefix, "*", ESTIMATES, spool)] if spool is not None else []
-    fence = Fence(worker.door.refuse)
     # One subscriber for all topics: each has a thread of its own, and a fix must not overtake
     # its samples.
     subscriber = session.declare_subscriber(f"{bus.prefix}/*/*", _on(worker, fence))

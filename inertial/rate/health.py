@@ -150,7 +150,9 @@ class HealthMonitor:
 
     def _block(self, block: Array, dt: float) -> None:
         self.counts.blocks += 1
-        self.belief.hear(axis_samples.measured_noise(self._near, self._marks, self.belief.free))
+        coarse = axis_samples.resolution(self._near, self.belief.noise)
+        ratio = axis_samples.measured_noise(self._near, self._marks, self.belief.free)
+        self.belief.hear(ratio, coarse)
         self._single_axes()
         if self._sees and np.count_nonzero(self.used) > 6:
             self._check(block, dt)
@@ -178,7 +180,8 @@ class HealthMonitor:
             max(3, round(c.limit_s / self.period_s)),
             c.spikes,
         )
-        if not axis_samples.flags(count, *fewest, self._whose) and not self._stale:
+        coarse = self.belief.rounded > 0.0
+        if not axis_samples.flags(count, *fewest, coarse, self._whose) and not self._stale:
             return
         stuck, limit, spiking = self._whose
         for i in range(len(self.faults)):

@@ -31,6 +31,7 @@ QUERY_S = 1.0  # how long to wait for other tokens; a router answers in millisec
 LOOK_S = 0.01  # between two questions, until the own token is known to the router
 RETRY_S = 2.0
 FAR_NS = 100 * 365 * 86400 * 10**9  # a number is about a time; further ahead it is none
+OVERDUE = b"Timeout"  # what Zenoh answers, here or in the router, when the time is over
 WAITING = "waiting"  # first part of the name of a token of who waits
 
 Rank = tuple[int, str]  # number, and the session's id where two are equal
@@ -211,6 +212,20 @@ def rank_of(key: str) -> Rank | None:
     if not number.isdecimal() or int(number) > time.time_ns() + FAR_NS:
         return None
     return int(number), name
+
+
+def id_of(reply: zenoh.Reply) -> str:
+    """Of the session that answered; empty where nobody did."""
+    return str(reply.replier_id.zid) if reply.replier_id is not None else ""
+
+
+def newest(session: zenoh.Session, base: str) -> str:
+    """Id of the session that serves what the base names, by the tokens that this one can learn of;
+    empty where there is none.
+    """
+    replies = session.liveliness().get(f"{base}/*", timeout=QUERY_S)
+    ranks = [rank_of(str(reply.ok.key_expr)) for reply in replies if reply.ok is not None]
+    return max((rank for rank in ranks if rank is not None), default=(0, ""))[1]
 
 
 def name_of(rank: Rank) -> str:

@@ -68,6 +68,13 @@ class Claims:
             if not ranks:
                 del self._live[about]
 
+    def publisher(self, device: str, source: str) -> str:
+        """Id of the session that serves: of those that have claimed it the one with the greatest
+        number; empty where nobody has.
+        """
+        with self._lock:
+            return max(self._live.get(_claimed(device, source), ()), default=(0, ""))[1]
+
     def numbers(self, key: str) -> set[int]:
         """Under which numbers messages of this key are claimed; empty when nobody has, and when
         there are more claims than can be remembered.
@@ -100,7 +107,7 @@ class Fence:
 
     def __init__(self, refuse: Callable[[str, Refusal, str], None]) -> None:
         """refuse(key, why, device): count and say a message that is not taken."""
-        self._refuse = refuse
+        self.refuse = refuse
         self._numbers: dict[str, int] = {}
         self.claims = Claims()
 
@@ -117,11 +124,11 @@ class Fence:
         claimed = self.claims.numbers(key)
         if number < known and (number not in claimed or known in claimed):
             wanted = f"{known}, of the process that took its place"
-            self._refuse(key, Refusal("stale", "publisher", str(number), wanted), device_of(key))
+            self.refuse(key, Refusal("stale", "publisher", str(number), wanted), device_of(key))
             return False
         if number > time.time_ns() + FAR_NS or (claimed and number not in claimed):
             wanted = f"a number that its publisher has claimed: {max(claimed, default=known)}"
-            self._refuse(key, Refusal("claim", "publisher", str(number), wanted), device_of(key))
+            self.refuse(key, Refusal("claim", "publisher", str(number), wanted), device_of(key))
             return False
         if len(self._numbers) < KEYS or key in self._numbers:
             self._numbers[key] = number

@@ -38,7 +38,7 @@ KINDS = (  # what a refusal can be counted as
     "time",  # far from that of all others
     "answer",  # of a publisher: not what was asked for
     "stale",  # of a publisher whose place another has taken
-    "claim",  # of a publisher that has claimed no such number
+    "claim",  # of a publisher that has claimed no such number, or nothing
     "repeated",  # it has come before, byte for byte
     "failure",  # we could not take it: a fault of ours
 )

@@ -631,7 +631,7 @@ class Truth(_message.Message):
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., for_index: _Optional[int] = ..., q_nb: _Optional[_Iterable[float]] = ..., omega_ib_b_radps: _Optional[_Iterable[float]] = ..., alpha_b_radps2: _Optional[_Iterable[float]] = ..., f_b_mps2: _Optional[_Iterable[float]] = ..., angle_z_rad: _Optional[float] = ..., profile_time_s: _Optional[float] = ...) -> None: ...
 
 class EstimatorStatus(_message.Message):
-    __slots__ = ("header", "estimator", "samples", "gaps", "missing_samples", "us_per_sample", "state", "message", "bias_f_b_mps2", "bias_alpha_radps2", "layout", "version", "restart", "refused", "behind_s", "waiting", "trouble", "skipped_s", "limit_hz")
+    __slots__ = ("header", "estimator", "samples", "gaps", "missing_samples", "us_per_sample", "state", "message", "bias_f_b_mps2", "bias_alpha_radps2", "layout", "version", "restart", "refused", "behind_s", "waiting", "trouble", "skipped_s", "limit_hz", "began_utc_ns")
     class RefusedEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -658,6 +658,7 @@ class EstimatorStatus(_message.Message):
     TROUBLE_FIELD_NUMBER: _ClassVar[int]
     SKIPPED_S_FIELD_NUMBER: _ClassVar[int]
     LIMIT_HZ_FIELD_NUMBER: _ClassVar[int]
+    BEGAN_UTC_NS_FIELD_NUMBER: _ClassVar[int]
     header: Header
     estimator: str
     samples: int
@@ -677,7 +678,8 @@ class EstimatorStatus(_message.Message):
     trouble: str
     skipped_s: float
     limit_hz: float
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., samples: _Optional[int] = ..., gaps: _Optional[int] = ..., missing_samples: _Optional[int] = ..., us_per_sample: _Optional[float] = ..., state: _Optional[str] = ..., message: _Optional[str] = ..., bias_f_b_mps2: _Optional[_Iterable[float]] = ..., bias_alpha_radps2: _Optional[_Iterable[float]] = ..., layout: _Optional[str] = ..., version: _Optional[str] = ..., restart: _Optional[bytes] = ..., refused: _Optional[_Mapping[str, int]] = ..., behind_s: _Optional[float] = ..., waiting: _Optional[int] = ..., trouble: _Optional[str] = ..., skipped_s: _Optional[float] = ..., limit_hz: _Optional[float] = ...) -> None: ...
+    began_utc_ns: int
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., samples: _Optional[int] = ..., gaps: _Optional[int] = ..., missing_samples: _Optional[int] = ..., us_per_sample: _Optional[float] = ..., state: _Optional[str] = ..., message: _Optional[str] = ..., bias_f_b_mps2: _Optional[_Iterable[float]] = ..., bias_alpha_radps2: _Optional[_Iterable[float]] = ..., layout: _Optional[str] = ..., version: _Optional[str] = ..., restart: _Optional[bytes] = ..., refused: _Optional[_Mapping[str, int]] = ..., behind_s: _Optional[float] = ..., waiting: _Optional[int] = ..., trouble: _Optional[str] = ..., skipped_s: _Optional[float] = ..., limit_hz: _Optional[float] = ..., began_utc_ns: _Optional[int] = ...) -> None: ...
 
 class Horizon(_message.Message):
     __slots__ = ("n", "inputs", "membership_name", "membership", "crisp")

@@ -137,7 +137,7 @@ class Mender:
         if reply is not None and reply.next:
             refusal = question.goes_on(reply)
             if refusal is None:
-                self._ask(question.more(reply.next))
+                self._ask(question.more(reply.next, bool(out)))
                 return out
             self._refuse(question.about, refusal, question.stream[0])
         if stream.waiting:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating[Any]]
 
 FILE = "curves.npz"
-FORMAT = 2
+FORMAT = 3
 BINS = 100_000  # at most, per line
 STEPS = (1, 2, 5)  # bins are 1, 2 or 5 times a power of ten, s
 

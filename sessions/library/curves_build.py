@@ -35,13 +35,14 @@ WANTED: dict[Topic, tuple[str, ...]] = {  # and which of their fields
     ACCEL: ("f_mps2",),
     TACHO: ("omega_radps",),
     TRUTH: TURN,
-    NAV: ("p_ned_m", *(f"origin_{name}" for name in PLACE)),
+    NAV: ("p_ned_m", "sigma", *(f"origin_{name}" for name in PLACE)),
     GNSS: ("quality", *PLACE),
     NOTE: ("text", "author", "seconds", "at_utc_ns"),
 }
 STRAY_S = (
     5.0  # a sample whose own time lies further outside the recording is put where it was received
 )
+NO_PLACE_M = 1e4  # one sigma, from which a place is none
 COARSE_CHUNKS = 250  # read for the first look at a recording ...
 COARSE_THIN = 4  # ... and of those one message in so many
 LONG_CHUNKS = 4 * COARSE_CHUNKS  # a recording of more gets one
@@ -202,6 +203,7 @@ class _Reading:
     def _nav(self, key: str, read: Samples, t: Array) -> None:
         latitude, longitude, height = (read.fields[f"origin_{name}"] for name in PLACE)
         known = (read.lengths["p_ned_m"] == 3) & ((latitude != 0) | (longitude != 0))
+        known &= _placed(read)
         for k in np.flatnonzero(known):
             origin = _origin(np.radians(latitude[k]), np.radians(longitude[k]), float(height[k]))
             self._track(key, origin).add(float(t[k]), *read.fields["p_ned_m"][k].tolist())
@@ -233,6 +235,16 @@ def _means(binner: Binner, names: tuple[str, ...], n: int) -> Line:
 def _origin(latitude: float, longitude: float, height: float) -> tuple[float, float, float]:
     """Where a track counts from, at height 0 where its first point has none."""
     return latitude, longitude, height if np.isfinite(height) else 0.0
+
+
+def _placed(read: Samples) -> NDArray[np.bool_]:
+    """Where a navigation filter has a place (n,): before its first fix old ones say 0 with a sigma
+    of 10,000 km.
+    """
+    sigma = read.fields["sigma"]
+    if sigma.shape[1] < 8:
+        return np.ones(len(sigma), dtype=bool)
+    return ~(np.hypot(sigma[:, 6], sigma[:, 7]) > NO_PLACE_M)
 
 
 def _dark(key: str, lines: dict[str, Line]) -> NDArray[np.bool_] | None:

@@ -82,8 +82,8 @@ def _serve(
     """
     publishers = Publishers(session, bus.prefix)
     publishers.number = claimed.number
-    asker = Asker(session, bus.prefix, lambda question, reply: recorder.on_answer(question, reply))
     recorder = Recorder(settings, bus, configuration, lambda q: asker.ask(q, *q.stream, q.query))
+    asker = Asker(session, bus.prefix, recorder.on_answer, recorder.fence)
     samples = session.declare_subscriber(f"{bus.prefix}/**", recorder.on_sample)
     control = orders.take(session, bus.prefix, orders.RECORDER, recorder.on_order)
     fence = recorder.fence.declare(session, bus.prefix)

@@ -277,6 +277,26 @@ def test_tracks_are_compared_from_one_origin_and_drawn(tmp_path):
     assert draw(found, tmp_path / "tracks.png").stat().st_size > 10_000
 
 
+@pytest.mark.parametrize("place", [(0.0, -1.2e6, 0.0), ()])
+def test_a_filter_that_waits_for_its_first_fix_is_nowhere(tmp_path, place):
+    """Old ones said 0, 0 with a sigma of 10,000 km, those of today no place."""
+
+    def drive():
+        for n in range(60):
+            nav = pb.NavSolution(
+                header=pb.Header(device="car", sequence=n + 1, run=9, utc_ns=10**18 + n * 10**8),
+                origin_latitude_deg=48.0,
+                origin_longitude_deg=11.0,
+                sigma=[1.0] * 6 + [1e7 if n < 28 else 2.0] * 3 + [1.0] * 6,
+            )
+            nav.p_ned_m.extend(place if n < 28 else (n * 0.5, 3.0, 0.0))
+            yield nav.header.utc_ns, NAV.key("gyrofree", "car", "kf"), nav.SerializeToString()
+
+    folder = write_session(tmp_path, "20010909-014640-a", drive(), "", {})
+    (track,) = build(folder / "recording.mcap").tracks.values()
+    assert len(track.points) == 32 and np.abs(track.points[:, 1:]).max() < 40.0
+
+
 def test_the_picture_and_the_facts_of_a_comparison(pair, tmp_path):
     found = compare(pair)
     assert draw(found, tmp_path / "two.png").read_bytes().startswith(b"\x89PNG")

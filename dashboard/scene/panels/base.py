@@ -179,6 +179,13 @@ def when(utc_ns: int) -> str:
     return "?" if moment is None else f"{moment:%Y-%m-%d %H:%M:%S}"
 
 
+def from_zero(device: Device, name: str) -> str:
+    """What the angle of a rate estimator counts from, in words; empty where nobody says."""
+    status = device.get("estimator", name)
+    began_ns = 0 if status is None else status.message.began_utc_ns
+    return f"from 0 at {when(began_ns)[11:]} UTC" if began_ns else ""
+
+
 def ranges(device: Device) -> list[Range]:
     """Notes, what was filled in, and the steps of a procedure that runs, on the device's axis."""
     found = [Range(at, at, text[:60]) for at, text in device.marks]

@@ -11,7 +11,6 @@ from logs.figures.names import line_colour, line_title
 from sessions.library.curves import Curves
 from sessions.library.sky import sky_near
 
-NOWHERE_RAD = 1e-5  # from 0, 0: where a filter counts from that waits for its first fix
 POINTS = 4000  # of each way
 SVG = '<svg xmlns="http://www.w3.org/2000/svg"'
 Way = dict[str, Any]
@@ -28,10 +27,6 @@ def ways_of(curves: Curves) -> list[Way]:
         device, name = key.split("/", 1)
         name = name.removeprefix("nav/")
         latitude, longitude, _ = place_from_ned(track.origin, points[:, 1], points[:, 2], 0.0)
-        there = np.hypot(latitude, longitude) > NOWHERE_RAD
-        points, latitude, longitude = points[there], latitude[there], longitude[there]
-        if not len(points):
-            continue
         ways.append(
             {
                 "key": key,

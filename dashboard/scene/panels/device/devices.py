@@ -20,7 +20,7 @@ from dashboard.scene.drawing.palette import (
     estimator_title,
     number,
 )
-from dashboard.scene.panels.base import DEG, Panel, Snapshot
+from dashboard.scene.panels.base import DEG, Panel, Snapshot, from_zero
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
 
@@ -243,7 +243,8 @@ def _said_rate(s: Snapshot, name: str, m: pb.RateEstimate) -> tuple[str, Markup 
         return f"± {number(abs(omega) * DEG, 1)}", joined([term("ambiguous"), ": sign not known"])
     if m.still and abs(omega) > TURNS_RADPS:
         return shown, tag("span", "drifted: the body stands still", class_="gf-bad")
-    return shown, "still" if m.still else f"angle {number(m.angle_z_rad * DEG, 0, '°')}"
+    angle = f"angle {number(m.angle_z_rad * DEG, 0, '°')} {from_zero(s.device, name)}"
+    return shown, "still" if m.still else angle.strip()
 
 
 def _tile(s: Snapshot, name: str, topic: str, value: str, unit: str, sub: str) -> Markup:
