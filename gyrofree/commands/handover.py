@@ -118,6 +118,10 @@ def import_log(
     gnss: Annotated[
         Path | None, typer.Option(help="CSV of GNSS epochs beside a single CSV of samples.")
     ] = None,
+    tacho: Annotated[
+        Path | None,
+        typer.Option(help="CSV of t_s and tacho_rad_s beside a cube's; default NAME.tacho.csv."),
+    ] = None,
     device: Annotated[str, typer.Option(help="Device name for the samples.")] = "log",
     name: Annotated[
         str, typer.Option(help="Added to the session's id.", callback=session_name)
@@ -141,7 +145,7 @@ def import_log(
     try:
         check_name(device)
         start_s = importer.start_of(start)
-        source = read_board_log(log, gnss, units_as_named)
+        source = read_board_log(log, gnss, units_as_named, tacho=tacho)
         for note in source.notes:
             say(f"note: {note}", file=sys.stderr)
         rows = importer.rows_of(source, settings.bus.prefix, device, start_s)
@@ -218,6 +222,8 @@ def rerun(
     from estimator.choice import UnknownEstimator
     from estimator.pipeline import Pipeline
     from gyrofree.running.rerun_settings import from_library, with_changes
+    from sessions.library.annotations import SessionNote, add_note
+    from sessions.recording.mcap_damage import Damage
     from sessions.replay.rerun import estimates_again, rerun_id, write_session
 
     settings = settings_of(config)
@@ -232,7 +238,8 @@ def rerun(
         settings = settings.model_copy(update={"estimator": estimator})
         pipeline = Pipeline(estimator)
         with progress_bar() as progress:
-            rows = estimates_again(path, pipeline, short if beside else "", progress)
+            damage = Damage()
+            rows = estimates_again(path, pipeline, short if beside else "", progress, damage)
             what = ", ".join([*sum(changes.values(), []), *(changed or [])]) or "this configuration"
             note = f"{path.parent.name} again: {what}"
             folder = write_session(
@@ -243,6 +250,8 @@ def rerun(
                 settings.model_dump(mode="json"),
             )
         give_title(folder, name)
+        for text in damage.said():
+            add_note(folder, SessionNote(text=f"of a recording that is {text}"))
     except (UnknownEstimator, SessionError, ValueError, OSError) as error:
         raise fail(error, EXIT_CONFIG) from None
     say(json.dumps({"session": folder.name}) if as_json else folder.name)
