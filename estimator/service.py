@@ -33,6 +33,7 @@ log = logging.getLogger(__name__)
 
 LOOK_S = 0.2  # between two looks at what may end it
 GONE_S = 600.0  # a device silent for so long makes room where there is none left
+WAITING_S = 300.0  # for a gateway that is there and does not answer; its samples wait meanwhile
 END_S = 3.0  # for what is queued when the service is to end
 
 
@@ -69,7 +70,11 @@ def _serve(
     publishers.number = claimed.number
     fence = Fence(lambda *refusal: worker.door.refuse(*refusal))
     asker = Asker(
-        session, bus.prefix, lambda question, reply: worker.answered(question, reply), fence
+        session,
+        bus.prefix,
+        lambda question, reply: worker.answered(question, reply),
+        fence,
+        patience_s=WAITING_S,
     )
     saved = SavedState(settings.journal, settings, version()) if spool is not None else None
     trouble = _trouble(saved, spool)

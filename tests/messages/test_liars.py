@@ -11,7 +11,14 @@ from support.stack import free_port
 from messages.bus import orders
 from messages.bus.claiming import Claim, Claimant, newest
 from messages.bus.fencing import Fence
-from messages.bus.session import BusSettings, Publishers, open_client, open_router
+from messages.bus.session import (
+    LARGEST,
+    BusSettings,
+    Publishers,
+    connected,
+    open_client,
+    open_router,
+)
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import Refusal
 from messages.contract.topics import (
@@ -198,3 +205,22 @@ def test_an_order_is_answered_by_the_one_who_serves(bench, caplog):
         told = orders.give(bench.asker, "t", orders.RECORDER, command)
     assert told.session == "true" and str(bench.liar.zid()) in caplog.text
     claimed.release()
+
+
+def test_a_huge_message_is_put_together_nowhere(bench):
+    """Zenoh would take a gigabyte for one, in every process that listens. Others go on."""
+    heard: list[int] = []
+    bench.consumer.declare_subscriber("t/**", lambda sample: heard.append(len(sample.payload)))
+    end = time.monotonic() + 60.0
+    while 1 not in heard:  # until the router knows who listens
+        assert time.monotonic() < end
+        bench.honest.put("t/cube/accel", b"x")
+        time.sleep(0.01)
+    wait = zenoh.CongestionControl.BLOCK
+    bench.liar.put("t/cube/accel", bytes(LARGEST + 1), congestion_control=wait)
+    bench.liar.put("t/cube/accel", b"xx", congestion_control=wait)
+    bench.honest.put("t/cube/accel", bytes(LARGEST // 2), congestion_control=wait)
+    while LARGEST // 2 not in heard:
+        assert time.monotonic() < end, heard
+        time.sleep(0.01)
+    assert max(heard) == LARGEST // 2 and connected(bench.consumer) and connected(bench.honest)

@@ -125,6 +125,10 @@ def test_curves_are_the_recordings_and_kept_until_it_changes(root, tmp_path):
     again = kept.load(mine)
     for key, one in made.lines.items():
         assert np.array_equal(again.lines[key].mean, one.mean, equal_nan=True)
+    said = np.array([m.sight[2] if m.sight else 0 for m in sent], dtype=np.uint8)
+    # some bins hold two samples
+    assert said.any() and np.mean(line.sight[:, 2] != said[: len(line.sight)]) < 0.02
+    assert np.array_equal(again.lines[line.key].sight, line.sight)
     with mine.open("ab") as stream:
         stream.write(b"x")
     assert kept.state(mine) == "stale" and kept.load(mine) is None
@@ -259,12 +263,16 @@ def test_tracks_are_compared_from_one_origin_and_drawn(tmp_path):
             )
             north = n * 0.5 - np.radians(shift_deg) * 6_366_000.0
             nav.p_ned_m.extend((north, 3.0 + east_m, 0.0))
+            if n >= 50:
+                nav.position_covariance.extend((4.0, 0.5, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0, 9.0))
             yield nav.header.utc_ns, NAV.key("gyrofree", "car", "kf"), nav.SerializeToString()
 
     one = write_session(tmp_path, "20010909-014640-a", drive(0.0, 0.0), "", {}) / "recording.mcap"
     two = (
         write_session(tmp_path, "20010909-014640-b", drive(0.001, 0.25), "", {}) / "recording.mcap"
     )
+    told = build(one).tracks["car/nav/kf"].told
+    assert np.isnan(told[:50, :3]).all() and np.array_equal(told[50], (4.0, 0.5, 1.0, 0.0))
     found = compare([build(one), build(two)])
     (track,) = found.tracks
     north, east, down = track.rms_ned_m

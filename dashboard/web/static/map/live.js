@@ -117,7 +117,7 @@ function room() {
 function place() {
   if (host.hidden) return;
   const { left, top, right, bottom } = room();
-  Object.assign(host.style, { left: `${left}px`, top: `${top}px`, width: `${right - left}px`, height: `${bottom - top}px` });
+  Object.assign(host.style, { left: `${frame.offsetLeft + left}px`, top: `${frame.offsetTop + top}px`, width: `${right - left}px`, height: `${bottom - top}px` });
 }
 
 whenStated((now) => {
