@@ -129,10 +129,7 @@ def import_log(
     gnss: Annotated[
         Path | None, typer.Option(help="CSV of GNSS epochs beside a single CSV of samples.")
     ] = None,
-    tacho: Annotated[
-        Path | None,
-        typer.Option(help="CSV of t_s and tacho_rad_s beside a cube's; default NAME.tacho.csv."),
-    ] = None,
+    tacho: Annotated[Path | None, typer.Option(help="CSV of a cube's t_s, tacho_rad_s.")] = None,
     device: Annotated[str, typer.Option(help="Device name for the samples.")] = "log",
     name: Annotated[
         str, typer.Option(help="Added to the session's id.", callback=session_name)
@@ -233,9 +230,7 @@ def rerun(
     from estimator.choice import UnknownEstimator
     from estimator.pipeline import Pipeline
     from gyrofree.running.rerun_settings import from_library, with_changes
-    from sessions.library.annotations import SessionNote, add_note
-    from sessions.recording.mcap_damage import Damage
-    from sessions.replay.rerun import estimates_again, rerun_id, write_session
+    from sessions.replay.rerun import Damage, estimates_again, note_damage, rerun_id, write_session
 
     settings = settings_of(config)
     path, short = file_of(settings, session), slug(name, 24) or "new"
@@ -261,8 +256,7 @@ def rerun(
                 settings.model_dump(mode="json"),
             )
         give_title(folder, name)
-        for text in damage.said():
-            add_note(folder, SessionNote(text=f"of a recording that is {text}"))
+        note_damage(folder, damage)
     except (UnknownEstimator, SessionError, ValueError, OSError) as error:
         raise fail(error, EXIT_CONFIG) from None
     say(json.dumps({"session": folder.name}) if as_json else folder.name)

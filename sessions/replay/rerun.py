@@ -11,6 +11,7 @@ from pathlib import Path
 
 from messages.contract.topics import ATTITUDE, AXES, ESTIMATOR, PIPELINE_INPUTS, POSE, parse
 from sessions.export.table import Progress, Selection, messages, silent
+from sessions.library.annotations import SessionNote, add_note
 from sessions.recording.manifest import (
     SESSION_ID,
     Manifest,
@@ -69,6 +70,12 @@ def estimates_again(
     if not seen:
         raise SessionError(f"{path}: {'; '.join(damage.said()) or 'it has no message'}")
     progress(1.0, "estimated")
+
+
+def note_damage(folder: Path, damage: Damage) -> None:
+    """Say in a session what was wrong with the recording that it is of. Raises as add_note."""
+    for text in damage.said():
+        add_note(folder, SessionNote(text=f"of a recording that is {text}"))
 
 
 def write_session(
