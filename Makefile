@@ -52,7 +52,7 @@ setup: .make/tools
 BUILDS := $(if $(filter test dev cases,$(MAKECMDGOALS)),both,here)
 CORE := $(wildcard inertial/core/*.c* inertial/core/CMakeLists.txt inertial/core/*/*.?pp)
 .make/core: pyproject.toml $(CORE) .make/tools
-	@echo "Compiling the core ..."
+	@echo "Compiling the core, a minute or two ..."
 	@CXX="$$(cat .make/compiler)" $(PIP) install --quiet --no-deps --no-build-isolation \
 		--config-settings=cmake.define.Python_INCLUDE_DIR="$$(cat .make/headers)" --config-settings=cmake.define.BUILDS=$(BUILDS) --editable .
 	@echo $(BUILDS) > $@

@@ -29,6 +29,9 @@ from sessions.library.catalogue import Catalogue
 log = logging.getLogger(__name__)
 
 STOP_LOOK_S = 0.1  # s between two looks at the stop event
+# Bytes of a connection that wait in the kernel, which would take 4 MB: one that takes nothing is
+# noticed by what waits here.
+SEND_BYTES = 1 << 19
 BACKLOG = 512  # connections that wait to be taken; a flood must not fill it
 HEAD_LIMIT = 32_768  # bytes of the head of one request
 GRACE_S = 1  # s, for answers under way when the process ends
@@ -59,6 +62,7 @@ def listen(host: str, port: int) -> socket.socket:
     except OSError as error:
         raise OSError(error.errno, f"[dashboard] host {host!r}: {error.strerror}") from None
     bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    bound.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BYTES)
     try:
         bound.bind(address)
         bound.listen(BACKLOG)
@@ -77,7 +81,7 @@ def listen(host: str, port: int) -> socket.socket:
 def serve(front: Front, bound: socket.socket, stop: threading.Event) -> None:
     """Serve the web application on a bound socket until `stop` is set."""
     settings = front.settings
-    connections = Connections(settings)
+    connections = Connections(settings, front.ended)
     config = uvicorn.Config(
         create_app(front),
         log_config=None,

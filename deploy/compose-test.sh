@@ -87,7 +87,7 @@ base_image() {
 
 build() {
     say "building"
-    timeout 900 podman build --quiet --format docker --network host --isolation chroot --pull=never \
+    timeout 2400 podman build --quiet --format docker --network host --isolation chroot --pull=never \
         "${BUILD_MOUNTS[@]}" --tag localhost/gyrofree:local .
     podman image inspect --format 'image: {{.Size}} bytes' localhost/gyrofree:local
 }
@@ -112,11 +112,20 @@ healthy() { timeout 30 podman healthcheck run "$(container "$1")"; }
 reaches() { inside "$1" python3 -c "import socket; socket.create_connection(('$ADDRESS', 9999), 3)"; }
 session_state() { inside recorder gyrofree replay --list --json | grep -q "\"state\": \"$1\""; }
 
+# The published test from start to report: the procedures drive the table of another container, the recorder records it.
+signed_report() {
+    local begun=$SECONDS
+    timeout 300 podman exec "$(container dashboard)" gyrofree procedure run published-30s --unit SN-1 --operator ann \
+        --out /tmp/report >"$STATE/procedure.log" 2>&1 || { cat "$STATE/procedure.log"; die "the published test"; }
+    inside dashboard grep -q "SN-1" /tmp/report/report.html || die "the report does not name the unit"
+    say "ok: the published test was run to its report in $((SECONDS - begun)) s: $(tail -1 "$STATE/procedure.log")"
+}
+
 finish() {
     local code=$?
     trap - EXIT
     if [ $code != 0 ]; then
-        for service in router gateway board estimator recorder dashboard; do
+        for service in router gateway board estimator recorder procedures dashboard; do
             printf -- '-- %s\n' "$service"
             podman logs --tail 15 "$(container "$service")" 2>&1 || true
         done
@@ -142,11 +151,11 @@ prove() {
     local begun=$SECONDS service
     compose up --detach --no-build >"$STATE/up.log" 2>&1 || { cat "$STATE/up.log"; die "podman-compose up"; }
     eventually 120 "the dashboard answers on its published port" page
-    for service in router gateway estimator recorder dashboard; do
+    for service in router gateway estimator recorder procedures dashboard; do
         eventually 90 "$service is healthy" healthy "$service"
     done
     say "all healthy after $((SECONDS - begun)) s"
-    for service in router gateway board estimator recorder dashboard; do
+    for service in router gateway board estimator recorder procedures dashboard; do
         [ "$(inside "$service" id -u)" = 10001 ] || die "$service runs as another user"
         refused inside "$service" touch /etc/gyrofree/x /opt/gyrofree/x || die "$service can write its root"
         inside "$service" grep -q '^CapEff:[[:space:]]*0*$' /proc/1/status || die "$service has capabilities"
@@ -155,11 +164,11 @@ prove() {
     [ "$(podman port --all | wc -l)" = 1 ] || die "published: $(podman port --all)"
     say "ok: one published port: $(podman port --all)"
     reaches dashboard || die "the dashboard's network has no way out: the next check would prove nothing"
-    for service in router gateway estimator recorder; do
+    for service in router gateway estimator recorder procedures; do
         refused reaches "$service" || die "$service can reach the outside"
     done
-    say "ok: router, gateway, estimator and recorder cannot reach the outside, which the dashboard's network can"
-    sleep 3
+    say "ok: router, gateway, estimator, recorder and procedures cannot reach the outside, which the dashboard's network can"
+    signed_report
     kill -KILL "$(podman inspect --format '{{.State.Pid}}' "$(container recorder)")"
     eventually 60 "a killed recorder is started again and recovers the session" session_state recovered
     eventually 60 "it records again" session_state open

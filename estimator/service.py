@@ -6,7 +6,6 @@ is kept and the state is saved (saved_state.py), so that it goes on after a cras
 
 import logging
 import threading
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -18,8 +17,10 @@ from estimator.saved_state import SavedState, version
 from estimator.settings import EstimatorSettings
 from estimator.worker import Worker
 from messages.bus import orders
-from messages.bus.fencing import CLAIMED_ESTIMATES, Claim, Fence, claim, heard_of
-from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client
+from messages.bus.claiming import Claim
+from messages.bus.fencing import Fence
+from messages.bus.session import BusSettings, Publishers
+from messages.bus.turns import in_turn, sessions
 from messages.clock import elapsed_ns
 from messages.contract.door import Door
 from messages.contract.topics import ESTIMATES, PIPELINE_INPUTS, REPLAY_SUFFIX
@@ -32,50 +33,25 @@ log = logging.getLogger(__name__)
 
 LOOK_S = 0.2  # between two looks at what may end it
 GONE_S = 600.0  # a device silent for so long makes room where there is none left
+WAITING_S = 300.0  # for a gateway that is there and does not answer; its samples wait meanwhile
 END_S = 3.0  # for what is queued when the service is to end
 
 
 def run(settings: EstimatorSettings, bus: BusSettings, stop: threading.Event) -> None:
     """Estimate until `stop` is set; sets it itself and raises when the worker fails. A second
-    estimator of the same name waits, and one that was stopped while another took its place does.
+    estimator waits, whichever filters it has: what it would say of a board's axes, and do with an
+    order, would be said and done twice. One that was stopped while another took its place does too.
     """
     Pipeline(settings)  # raises at once for settings that name what does not exist
-    try:
-        session = open_client(bus, stop)
-    except BusUnavailable:
-        if stop.is_set():
-            return
-        raise
-    bases = [f"{bus.prefix}/{name}/{CLAIMED_ESTIMATES}" for name in _leader(settings)]
-
-    def refused(other: str) -> None:
-        log.error(
-            "another estimator runs %s (%s): refused; this one waits until it has ended",
-            ", ".join(_leader(settings)),
-            other,
-        )
-
-    with session:
-        while not stop.is_set():
-            claimed = claim(
-                session,
-                bases,
-                time.time_ns(),
+    with sessions(bus, stop) as mine:
+        if mine is not None:
+            in_turn(
+                mine,
+                bus.prefix,
+                ESTIMATES,
                 stop,
-                refused,
-                lambda: heard_of(session, bus.prefix, "*", ESTIMATES),
+                lambda claimed: _serve(settings, bus, mine.session, claimed, stop),
             )
-            if claimed is None:
-                return
-            try:
-                _serve(settings, bus, session, claimed, stop)
-            finally:
-                claimed.release()
-
-
-def _leader(settings: EstimatorSettings) -> list[str]:
-    """The first estimator of the settings: two processes with one are the same twice."""
-    return [*settings.rate, *settings.navigators, *settings.attitudes][:1]
 
 
 def _serve(
@@ -92,7 +68,14 @@ def _serve(
         spool.journal.outrun(claimed.number - 1)
         claimed.raise_to(spool.journal.run)
     publishers.number = claimed.number
-    asker = Asker(session, bus.prefix, lambda question, reply: worker.answered(question, reply))
+    fence = Fence(lambda *refusal: worker.door.refuse(*refusal))
+    asker = Asker(
+        session,
+        bus.prefix,
+        lambda question, reply: worker.answered(question, reply),
+        fence,
+        patience_s=WAITING_S,
+    )
     saved = SavedState(settings.journal, settings, version()) if spool is not None else None
     trouble = _trouble(saved, spool)
     worker = _worker(Pipeline(settings), publishers, asker, saved, settings, trouble)
@@ -100,7 +83,6 @@ def _serve(
     thread = threading.Thread(target=worker.work, args=(failed,), name="estimator", daemon=True)
     thread.start()
     answering = [declare(session, bus.prefix, "*", ESTIMATES, spool)] if spool is not None else []
-    fence = Fence(worker.door.refuse)
     # One subscriber for all topics: each has a thread of its own, and a fix must not overtake
     # its samples.
     subscriber = session.declare_subscriber(f"{bus.prefix}/*/*", _on(worker, fence))
@@ -116,7 +98,6 @@ def _serve(
     while not (stop.is_set() or failed.is_set() or claimed.lost.is_set()):
         stop.wait(LOOK_S)
     if claimed.lost.is_set():
-        log.error("another estimator took over while this process was stopped: stepping back")
         publishers.hold()
     subscriber.undeclare()
     worker.finish()

@@ -2,7 +2,7 @@
 that decodes.
 
 Journal first: boards are read and journalled from the start, also with no router there. Publishing
-begins when the router comes and the name on the bus is ours (messages/bus/fencing.py).
+begins when the router comes and the name on the bus is ours (messages/bus/claiming.py).
 """
 
 import json
@@ -18,16 +18,12 @@ from gateway.board.device import DeviceLink
 from gateway.ports.keeper import Keeper
 from gateway.settings import DeviceSettings, GatewaySettings
 from messages.bus import orders
-from messages.bus.fencing import Claim, claim, heard_of
-from messages.bus.session import (
-    BusSettings,
-    BusUnavailable,
-    Publishers,
-    connected,
-    open_client,
-)
+from messages.bus.claiming import Claim, Claimant, claim
+from messages.bus.fencing import heard_of
+from messages.bus.session import BusSettings, Publishers, connected
+from messages.bus.turns import sessions
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import GATEWAY, check_name, history_key
+from messages.contract.topics import GATEWAY, claim_key, history_key
 from messages.history.answers import declare
 from messages.history.journal import Journal
 from messages.history.journal_folder import JournalBusy
@@ -59,7 +55,7 @@ def run(
         log.warning(
             "[gateway] has no [[gateway.devices]]: nothing to read; name a board and its port"
         )
-    opened: Future[zenoh.Session | None] = Future()
+    opened: Future[Claimant | None] = Future()
     keeper = keeper or Keeper()
     threads = [
         threading.Thread(
@@ -71,21 +67,21 @@ def run(
     ]
     for thread in threads:
         thread.start()
-    session = None
     try:
-        session = open_client(bus, stop)  # for ever, while the other threads read
-        opened.set_result(session)
-        stop.wait()
-    except BusUnavailable:
-        pass  # stopped before a router came
+        with sessions(bus, stop) as mine:  # waits for ever, while the other threads read
+            opened.set_result(mine)
+            try:
+                stop.wait()
+            finally:
+                stop.set()
+                for thread in threads:
+                    thread.join()
     finally:
         stop.set()
-        if session is None:
+        if not opened.done():
             opened.set_result(None)
         for thread in threads:
             thread.join()
-        if session is not None:
-            session.close()
 
 
 class _Line:
@@ -152,7 +148,7 @@ def _serve(
     device: DeviceSettings,
     settings: GatewaySettings,
     prefix: str,
-    opened: "Future[zenoh.Session | None]",
+    opened: "Future[Claimant | None]",
     stop: threading.Event,
     keeper: Keeper,
 ) -> None:
@@ -166,9 +162,9 @@ def _serve(
             line = _open_line(device, settings, prefix, stop, keeper)
             while line is not None and not opened.done() and not line.failed.wait(LOOK_S):
                 pass
-            session = opened.result() if opened.done() else None
-            if line is not None and session is not None:
-                _publish(line, device, settings, prefix, session, stop, keeper)
+            mine = opened.result() if opened.done() else None
+            if line is not None and mine is not None:
+                _publish(line, device, settings, prefix, mine, stop, keeper)
         except Exception:
             log.exception(
                 "%s: this board's part of the gateway failed, and begins anew", device.name
@@ -210,14 +206,14 @@ def _publish(
     device: DeviceSettings,
     settings: GatewaySettings,
     prefix: str,
-    session: zenoh.Session,
+    claimant: Claimant,
     stop: threading.Event,
     keeper: Keeper,
 ) -> None:
     """Serve the name on the bus until `stop`, or until another gateway has it. Refused, the line is
     closed, and opened again when the name is free.
     """
-    refused = threading.Event()
+    refused, session = threading.Event(), claimant.session
 
     def give_up(other: str) -> None:
         log.error(REFUSED, device.name, other)
@@ -225,8 +221,8 @@ def _publish(
         line.close()
 
     claimed = claim(
-        session,
-        [f"{check_name(prefix)}/{check_name(device.name)}/{GATEWAY}"],
+        claimant,
+        [claim_key(prefix, GATEWAY, device.name)],
         line.link.journal.run,
         stop,
         give_up,

@@ -25,7 +25,7 @@ def beside(sheet: Sheet, t_s: Array) -> Array | None:
     Each report holds until the next; where none follows, as long as the one before did, and then
     the table stands, as it does before the first. Raises LogError for reports that cannot be read.
     """
-    if not (sheet.own and sheet.path.name.endswith(SAMPLES)):
+    if not (sheet.head.own and sheet.path.name.endswith(SAMPLES)):
         return None
     path = sheet.path.with_name(sheet.path.name.removesuffix(SAMPLES) + REPORTS)
     if not path.is_file():

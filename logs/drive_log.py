@@ -126,13 +126,13 @@ def read_fixes(path: Path) -> tuple[list[Fix], list[str]]:
     """
     sheet = open_sheet(path)
     c = read_si(sheet, ("t", *PLACE), EPOCH, (*PLACE, *EPOCH))
-    if sheet.own:  # an export of ours has when a fix came, and when it was of
+    if sheet.head.own:  # an export of ours has when a fix came, and when it was of
         of_s = sheet.read(["fix_utc_ns"])["fix_utc_ns"] * 1e-9
         c.columns["arrival"] = c["t"]
         c.columns["t"] = np.where(of_s > 0.0, of_s, c["t"])
     rising(sheet, c)
     quality = c["quality"] if "quality" in c else np.full(len(c), 5.0)
-    numbered = OWN_QUALITY if sheet.own else QUALITY
+    numbered = OWN_QUALITY if sheet.head.own else QUALITY
     kinds = [
         numbered.get(int(q), UNKNOWN_QUALITY) if math.isfinite(q) else UNKNOWN_QUALITY
         for q in quality.tolist()

@@ -4,9 +4,11 @@
     table = sheet.read(["t_s", "fx_mps2"])        numbers, or an error that names line and column
 
 Encodings: UTF-8 with or without a byte-order mark, UTF-16, else Windows-1252. Separators: comma,
-semicolon, tab, bar. Decimal comma where the separator is another. Lines that begin with #, % or //
-are comments, before the header and below it; empty lines are left out; the header may be quoted.
-The file is read in blocks, so memory grows with the numbers that are kept, not with the text.
+semicolon, tab, bar, or what a spreadsheet's line `sep=;` says. Decimal comma where the separator is
+another. Times may be dates of ISO 8601. Units may stand in brackets or in a row below the header
+(tables/heading.py). Lines that begin with #, % or // are comments, before the header and below it;
+empty lines are left out; the header may be quoted. The file is read in blocks, so memory grows with
+the numbers that are kept, not with the text.
 """
 
 import csv
@@ -25,23 +27,25 @@ from logs.sheet_form import (
     FIRST_LOOK,
     LINE,
     MISSING,
-    OWN,
-    OWN_NAMES,
     SEPARATORS,
+    THOUSANDS,
     Lines,
     LogError,
-    count,
     decimal_of,
     decoded,
     first_bytes,
     header_line,
     is_number,
+    iso_time,
     printable,
+    separator_of,
 )
+from logs.tables.heading import Heading, heading
 
 Array = NDArray[np.float64]
 
 MOST_COLUMNS = 4096
+SEPARATED = " or ".join(SEPARATORS.values())
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,7 @@ class _Rows:
     skipped: array = field(default_factory=lambda: array("q"))  # comments and empty lines
     wrong: list[tuple[int, int, str]] = field(default_factory=list)  # row, cells, text: two at most
     count: int = 0  # rows that the parser left out
+    cut_off: bool = False
 
     def judge(self, number: int, cells: int, text: str) -> None:
         """Note a row of a wrong number of cells."""
@@ -117,23 +122,29 @@ class Sheet:
     encoding: str
     separator: str
     decimal: str
-    header: tuple[str, ...]
     header_line: int  # of the file, from 1
-    own: bool = False  # an export of ours: its columns are named as those of logs
+    head: Heading
+
+    @property
+    def header(self) -> tuple[str, ...]:
+        """Names of the columns as logs have them."""
+        return self.head.names
 
     def want(self, names: Sequence[str], purpose: str = "") -> None:
         """Raises LogError for a column that is not there."""
+        twice = [name for name in names if self.header.count(name) > 1]
+        if twice:
+            raise LogError(
+                f"{self.path}:{self.header_line}: column {printable(twice[0])!r} stands there"
+                " twice; rename or remove one"
+            )
         missing = [name for name in names if name not in self.header]
         if not missing:
             return
-        found = ", ".join(map(printable, self.header[:20])) + (
-            " ..." if len(self.header) > 20 else ""
-        )
-        separated = ""
-        if len(self.header) == 1:
-            separated = (
-                f"; the line has one column only: separate columns by {_or(SEPARATORS.values())}"
-            )
+        more = " ..." if len(self.header) > 20 else ""
+        found = ", ".join(map(printable, self.head.written[:20])) + more
+        separated = f"; the line has one column only: separate columns by {SEPARATED}"
+        separated = separated if len(self.header) == 1 else ""
         share = f" ({len(missing)} of {len(names)} are)" if 1 < len(missing) < len(names) else ""
         raise LogError(
             f"{self.path}:{self.header_line}: column {missing[0]!r} is missing{share}, found"
@@ -147,7 +158,7 @@ class Sheet:
         too few cells or a line that is too long; OSError for a file that cannot be read.
         """
         self.want(names)
-        rows, done = _Rows(self.header_line + 1), 0
+        rows, done = _Rows(self.head.above + 1), 0
         blanks = Lines(self.path, self.size, self.encoding)
         kept: dict[str, _Growing] = {name: _Growing(self.size) for name in names}
         for batch in self._batches(list(kept), rows):
@@ -172,7 +183,10 @@ class Sheet:
         chosen = [unique[self.header.index(name)] for name in names]
         # numbers are ASCII; bytes that Windows-1252 does not know must not end the reading
         encoding = "latin-1" if self.encoding == "cp1252" else self.encoding
-        done, above = self.header_line, self.header_line
+        done, above = self.head.above, self.head.above
+        times = {
+            unique[self.header.index(n)]: self.head.times[n] for n in names if n in self.head.times
+        }
         try:
             for block in blocks(self.path, self.size, encoding):
                 if above:
@@ -184,7 +198,15 @@ class Sheet:
                 def judge(row: int, cells: int, text: str, before: int = done) -> None:
                     rows.judge(before + row, cells, text)
 
-                table = parsed(block, unique, chosen, self.separator, self.decimal, judge)
+                try:
+                    table = parsed(
+                        block, unique, chosen, self.separator, self.decimal, judge, times
+                    )
+                except pa.ArrowInvalid:
+                    if block.endswith((b"\n", b"\r")):
+                        raise
+                    rows.cut_off = True  # in the middle of a number
+                    return
                 done += len(table) + rows.count - left_out
                 yield table
         except UnicodeDecodeError as error:
@@ -227,7 +249,7 @@ class Sheet:
                 f"{self.path}:{number}: {cells} cells, the header names {len(self.header)}:"
                 f" {text!r}; complete the row, or leave it out"
             )
-        return False
+        return rows.cut_off
 
     def _ends_with_newline(self) -> bool:
         with self.path.open("rb") as file:
@@ -247,11 +269,15 @@ class Sheet:
         places = [(name, self.header.index(name)) for name in names]
         for number, line in enumerate(Lines(self.path, self.size, self.encoding), 1):
             cells = self._cells(line)
-            if number <= self.header_line or not cells or cells[0].startswith(COMMENTS):
+            if number <= self.head.above or not cells or cells[0].startswith(COMMENTS):
                 continue
             for name, place in places:
                 cell = cells[place].strip() if place < len(cells) else ""
-                if cell and cell not in MISSING and not is_number(cell, self.decimal):
+                if name in self.head.times:
+                    wrong = iso_time(cell) != self.head.times[name]
+                else:
+                    wrong = not is_number(cell, self.decimal)
+                if cell and cell not in MISSING and wrong:
                     return (
                         f"{self.path}:{number}: column {name!r}: {printable(cell)!r} is no finite"
                         f" number{self._comma_hint(cell)}; correct it, or leave the row out"
@@ -259,6 +285,8 @@ class Sheet:
         return ""
 
     def _comma_hint(self, cell: str) -> str:
+        if THOUSANDS.fullmatch(cell):
+            return " (write numbers without a separator of thousands)"
         if self.decimal == "." and is_number(cell, ","):
             return " (a decimal comma wants another separator of columns: semicolon or tab)"
         return ""
@@ -278,32 +306,22 @@ def open_sheet(path: Path) -> Sheet:
         )
     if number == 0:
         raise LogError(f"{path}: empty; want a header line with the columns' names, and samples")
-    line = lines[number - 1]
-    separator = max(SEPARATORS, key=lambda s: count(line, s))
-    names = next(csv.reader([line], delimiter=separator))
-    header = tuple(name.strip().strip('"') for name in names)
-    own = set(OWN) <= set(header)
-    if own:
-        header = tuple(OWN_NAMES.get(name, name) for name in header)
-    if len(header) > MOST_COLUMNS:
+    separator = separator_of(lines[: number - 1], lines[number - 1])
+    head = heading(lines, number, separator)
+    if len(head.names) > MOST_COLUMNS:
         raise LogError(
-            f"{path}:{number}: {len(header)} columns; this program reads up to {MOST_COLUMNS}"
+            f"{path}:{number}: {len(head.names)} columns; this program reads up to {MOST_COLUMNS}"
         )
-    if all(is_number(name, ".") for name in header):
+    if all(is_number(name, ".") for name in head.names):
         raise LogError(
             f"{path}:{number}: numbers where the columns' names were expected"
-            f" ({printable(line)!r}); want a header line above the samples"
+            f" ({printable(lines[number - 1])!r}); want a header line above the samples"
         )
-    twice = [name for name in header if name and header.count(name) > 1]
-    if twice:
+    if head.contradicted:
+        name, unit = head.contradicted
         raise LogError(
-            f"{path}:{number}: column {printable(twice[0])!r} stands there twice; rename or"
-            " remove one"
+            f"{path}:{head.above}: column {name!r} is in {printable(unit)!r} by this row of units;"
+            " let name and unit agree"
         )
-    decimal = decimal_of(lines[number:], separator)
-    return Sheet(path, size, encoding, separator, decimal, header, number, own)
-
-
-def _or(names) -> str:
-    *most, last = names
-    return f"{', '.join(most)} or {last}"
+    decimal = decimal_of(lines[head.above :], separator)
+    return Sheet(path, size, encoding, separator, decimal, number, head)

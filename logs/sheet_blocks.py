@@ -5,10 +5,12 @@ still hold the stream when the interpreter ends, and that stops a process in the
 """
 
 import codecs
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import pyarrow as pa
+import pyarrow.compute
 import pyarrow.csv
 
 from logs.sheet_form import LINE, MISSING, LogError, long_line, opened
@@ -64,9 +66,11 @@ def parsed(
     separator: str,
     decimal: str,
     judge: Judge,
+    times: Mapping[str, str] = MappingProxyType({}),
 ) -> pa.Table:
-    """The wanted ones of the columns `names` of some lines, as numbers. `judge` hears of rows of a
-    wrong number of cells, which are left out. Raises pa.ArrowInvalid for a cell that is no number.
+    """The wanted ones of the columns `names` of some lines, as numbers; those of `times` (name ->
+    iso_time's) are times of day and date and come in s since 1970. `judge` hears of rows of a wrong
+    number of cells, which are left out. Raises pa.ArrowInvalid for a cell that is no number.
     """
 
     def invalid(row: pa.csv.InvalidRow) -> str:
@@ -75,7 +79,11 @@ def parsed(
 
     memory = pa.allocate_buffer(len(block))
     memoryview(memory).cast("B")[:] = block
-    return pa.csv.read_csv(
+    kinds = {name: pa.float64() for name in wanted}
+    kinds |= {
+        name: pa.timestamp("ns", "UTC" if kind == "Z" else None) for name, kind in times.items()
+    }
+    table = pa.csv.read_csv(
         pa.BufferReader(memory),
         # as one block: a line is at most as long as all of them
         pa.csv.ReadOptions(use_threads=False, block_size=len(block) + 1, column_names=list(names)),
@@ -83,9 +91,16 @@ def parsed(
             delimiter=separator, ignore_empty_lines=False, invalid_row_handler=invalid
         ),
         pa.csv.ConvertOptions(
-            column_types=dict.fromkeys(wanted, pa.float64()),
+            column_types=kinds,
             include_columns=list(wanted),
             null_values=MISSING,
             decimal_point=decimal,
         ),
     )
+    for name in times:
+        place = table.column_names.index(name)
+        seconds = pa.compute.divide(
+            table[name].cast(pa.int64()).cast(pa.float64(), safe=False), 1e9
+        )
+        table = table.set_column(place, name, seconds)
+    return table

@@ -5,6 +5,7 @@ what is no file of text is named, one that grows is read as it was found.
 import codecs
 import csv
 import io
+import re
 import stat
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -36,6 +37,11 @@ FORMS = (  # how other files begin, and what to do about them
 )
 
 
+TOLD_SEPARATOR = re.compile(r'"?sep=(.)"?[,;\t|]*', re.IGNORECASE)
+ISO_TIME = re.compile(
+    r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}(?::\d{2}(?:\.\d{1,9})?)?(Z|[+-]\d{2}(?::?\d{2})?)?"
+)
+THOUSANDS = re.compile(r"[+-]?\d{1,3}([.,' \u00a0\u202f])\d{3}(\1\d{3})*([.,]\d*)?")
 OWN = ("utc_s", "sequence", "device_us")  # columns that tell an export of ours
 OWN_NAMES = {  # of our exports, as logs name them
     "utc_s": "t_s",
@@ -60,9 +66,34 @@ def printable(text: str, most: int = 60) -> str:
 
 
 def header_line(lines: Sequence[str]) -> int:
-    """Number of the first line that is neither empty nor a comment; 0 without one."""
-    texts = (line.strip() for line in lines)
-    return next((k for k, s in enumerate(texts, 1) if s and not s.startswith(COMMENTS)), 0)
+    """Number of the first line that is neither empty nor a comment nor a spreadsheet's word on the
+    separator; 0 without one.
+    """
+    for number, line in enumerate(lines, 1):
+        text = line.strip()
+        if text and not text.startswith(COMMENTS) and not _told(line):
+            return number
+    return 0
+
+
+def _told(line: str) -> str:
+    """The separator of a line `sep=;`; "" for any other line."""
+    found = TOLD_SEPARATOR.fullmatch(line.strip(" \r\n"))
+    return found[1] if found else ""
+
+
+def separator_of(lines: Sequence[str], header: str) -> str:
+    """The separator of columns: the one that a line `sep=;` above the header tells, else the most
+    frequent of the header's.
+    """
+    told = next((sign for line in lines if (sign := _told(line)) in SEPARATORS), "")
+    return told or max(SEPARATORS, key=lambda s: count(header, s))
+
+
+def iso_time(cell: str) -> str:
+    """How a time is written: "Z" for ISO 8601 with its zone, "T" without, "" for another way."""
+    found = ISO_TIME.fullmatch(cell.strip().strip('"'))
+    return "" if found is None else "Z" if found[1] else "T"
 
 
 def decoded(path: Path, data: bytes, more: bool) -> tuple[str, str]:

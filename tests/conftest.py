@@ -5,6 +5,11 @@ import socket
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+from support.browser import chromium  # noqa: F401  a fixture
+
+settings.register_profile("untimed", deadline=None)  # a busy machine is no fault
+settings.load_profile("untimed")
 
 ROOT = Path(__file__).resolve().parent.parent
 # Files that take the longest, begun first: else one worker ends them while the others have nothing.

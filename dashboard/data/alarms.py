@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from dashboard.data.device import BEHIND_STALE_S, Device
 from dashboard.data.store import Store
+from logs.figures.words import words_of
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
 from messages.text import plain
@@ -23,6 +24,15 @@ AXIS_WORDS = {
     pb.AxisHealth.STATE_BIASED: "biased",
     pb.AxisHealth.STATE_STALE: "not fresh",
     pb.AxisHealth.STATE_SUSPECT: "suspect",
+}
+AXIS_MEANINGS = {  # of what is wrong with an axis, for people
+    "stuck": "It gives the same value again and again.",
+    "saturated": "It is at the end of its range: the true value is larger.",
+    "swapped": "It measures along the axis of another one: wires or layout are exchanged.",
+    "sign flipped": "It measures along its axis, but the other way round.",
+    "spiking": "Single values of it are far off.",
+    "biased": "It is off by a constant that the others do not share.",
+    "not fresh": "Its values are repeated: no new reading comes.",
 }
 MOST = 12  # of one device
 TURNS_RADPS = 0.035  # 2 deg/s: beyond it a rate is no standstill
@@ -39,6 +49,13 @@ class Alarm:
     title: str  # in a few words
     text: str  # what was found and what to do
     page: str  # key of the page that shows it; "" for none
+
+
+def words(alarm: Alarm) -> dict[str, str]:
+    """Words of the trade that stand in an alarm, with their meanings."""
+    of_axes = AXIS_MEANINGS if alarm.kind == "axis" else {}
+    shown = {word: means for word, means in of_axes.items() if word in alarm.title}
+    return shown | words_of([alarm.title, alarm.text])
 
 
 def counts(message: str) -> dict[str, int] | None:
@@ -88,9 +105,11 @@ def bench_alarms(store: Store, now: float | None = None) -> list[Alarm]:
 
 
 def drives(m: pb.ProcedureStatus) -> bool:
-    """Whether a procedure has a table in its hands: from its start until the table is let go."""
+    """Whether a procedure has a table in its hands: from its start until the table is let go; and
+    after that where it did not take its stop.
+    """
     active = m.state in (pb.ProcedureStatus.STATE_RUNNING, pb.ProcedureStatus.STATE_HELD)
-    return bool(m.table) and (active or m.instruction.endswith("being closed"))
+    return bool(m.table) and (active or bool(m.alarm) or m.instruction.endswith("being closed"))
 
 
 def _table(device: Device, now: float) -> Iterator[Alarm]:
@@ -101,6 +120,8 @@ def _table(device: Device, now: float) -> Iterator[Alarm]:
             f" {plain(heard.message.table, 60)} may still turn: stop it at the table"
         )
         yield Alarm("table", "the table is left alone", text, "procedure")
+    if heard is not None and heard.message.alarm:
+        yield Alarm("table", "the table may turn", plain(heard.message.alarm), "procedure")
 
 
 def _link(device: Device, now: float) -> Iterator[Alarm]:

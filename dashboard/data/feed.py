@@ -65,7 +65,9 @@ class Feed:
         self._fence = Fence(self._door.refuse)
         self._answers: deque = deque()
         self._known: set[str] = set()  # devices whose past was asked for
-        self._asker = Asker(session, prefix, lambda *answer: self._answers.append(answer))
+        self._asker = Asker(
+            session, prefix, lambda *answer: self._answers.append(answer), self._fence
+        )
         self._thread = threading.Thread(target=self._run, name="dashboard-feed", daemon=True)
         self._thread.start()
 
@@ -186,7 +188,7 @@ class Feed:
         if reply.next:
             refusal = past.question.goes_on(reply)
             if refusal is None:
-                self._ask_on(Past(past.question.more(reply.next)))
+                self._ask_on(Past(past.question.more(reply.next, bool(found))))
             else:
                 self._door.refuse(f"answer about {device}", refusal, device)
         return found

@@ -68,14 +68,20 @@ def ellipse(covariance_ne: np.ndarray) -> tuple[float, float, float] | None:
     """Half axes, m, of SIGMAS sigma, the longer first, and the bearing of the longer, rad from
     north over east, of a covariance (2, 2), m^2; None for one that is none.
     """
-    if not np.isfinite(covariance_ne).all():
-        return None
-    values, vectors = np.linalg.eigh(0.5 * (covariance_ne + covariance_ne.T))
-    if values[0] < -1e-9 * max(abs(values[1]), 1e-12) or values[1] <= 0.0:
-        return None
-    shorter, longer = SIGMAS * np.sqrt(np.maximum(values, 0.0))
-    north, east = vectors[:, 1]
-    return float(longer), float(shorter), float(math.atan2(east, north) % math.pi)
+    return ellipses(covariance_ne[None])[0]
+
+
+def ellipses(covariance_ne: np.ndarray) -> list[tuple[float, float, float] | None]:
+    """Likewise of each of many covariances (n, 2, 2), m^2."""
+    known = np.isfinite(covariance_ne).all(axis=(1, 2))
+    whole = np.where(known[:, None, None], covariance_ne, 0.0)
+    values, vectors = np.linalg.eigh(0.5 * (whole + whole.swapaxes(1, 2)))
+    least, greatest = values.T
+    known &= (greatest > 0.0) & (least >= -1e-9 * np.maximum(np.abs(greatest), 1e-12))
+    axes = SIGMAS * np.sqrt(np.maximum(values, 0.0))
+    bearing = np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1]) % math.pi
+    rows = np.column_stack([axes[:, 1], axes[:, 0], bearing]).tolist()
+    return [tuple(row) if is_one else None for row, is_one in zip(rows, known, strict=True)]
 
 
 def _now(device: Device, name: str) -> Told:
@@ -120,7 +126,8 @@ def _receiver(device: Device) -> Told:
         return {"quality": "none", "why": "no receiver speaks of this device", "stale": True}
     m = latest.message
     stale = device.stale("gnss")
-    told = {"quality": QUALITIES.get(m.quality, "none"), "satellites": m.satellites, "stale": stale}
+    told: Told = {"quality": QUALITIES.get(m.quality, "none"), "stale": stale}
+    told["satellites"] = m.satellites or None  # a position by no satellite: it does not say
     if m.quality == pb.GnssFix.QUALITY_NONE:
         return told | {"why": "the receiver has no satellite fix"}
     known = len(m.position_sigma_ned_m) == 3

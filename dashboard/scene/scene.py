@@ -27,10 +27,12 @@ those all have the heading of the truth or of the first.
 """
 
 import math
+import time
 from dataclasses import dataclass, field
 
 import numpy as np
 import viser
+from viser._messages import SetOrientationMessage, SetPositionMessage
 
 from dashboard.data.device import Device
 from dashboard.scene.drawing import bodies, camera
@@ -44,6 +46,7 @@ from inertial.rotation import rotate
 
 ARROW_PER_RADPS = 0.55  # half sides per rad/s; 180 deg/s gives 1.7
 ARROW_LONGEST = 2.2
+SELDOM_S = 0.2  # between two arrows of the rate, and two looks at which labels lie on others
 MOST = 12  # estimators drawn of one device; the tables have them all
 
 
@@ -69,6 +72,7 @@ class SceneView:
         self._arrows: AxisArrows | None = None
         self._shown = True  # False while a page has a scene of its own
         self._turning = False  # fast enough for an arrow
+        self._seldom_at = 0.0
         self._scene.set_up_direction("+z")
         self._lights()
 
@@ -104,24 +108,39 @@ class SceneView:
         estimators = device.estimators(body)[:MOST]
         truth = device.get("truth") is not None
         built = (device.name, device.generation, body, tuple(estimators), truth, self._choice.dark)
-        if built != self._built:
+        built_now = built != self._built
+        if built_now:
             first = not self._built or self._built[2] != body
             self.forget()
             self._built = built
             self._build(body, estimators, truth)
             if first:
                 self.reset_camera(body == "nav")
+        now = time.monotonic()
+        seldom = built_now or now >= self._seldom_at
         if body == "nav":
             self._update_vehicle(device, estimators)
         elif body == "attitude":
             self._update_board(device, estimators)
         else:
             self._update_cube(device, estimators)
+            if seldom and estimators:
+                path = f"/world/estimate/{estimators[0]}/body/rate"
+                self._update_rate_arrow(path, device, estimators[0])
+        nodes = tuple(map(id, self._nodes.values()))
+        shown = (*self._choice.layers.values(), self._turning, *nodes)
+        if shown != self._sent.get("#layers"):
+            self._sent["#layers"] = shown
+            self._show_layers()
+        if seldom:
+            self._seldom_at = now + SELDOM_S
+            declutter(self._client.camera, self._labels(estimators))
+
+    def _show_layers(self) -> None:
         for node, layer in self._layers():
             visible = self._choice.layers[layer] and (layer != "rate" or self._turning)
             if node.visible != visible:
                 node.visible = visible
-        declutter(self._client.camera, self._labels(estimators))
 
     # --- building
 
@@ -174,14 +193,16 @@ class SceneView:
     # --- updating
 
     def _set(self, path: str, *, q=None, p=None) -> None:
-        """Send a pose when it changed."""
+        """Send a pose when it changed, past viser's comparison: that costs more than sending."""
         node = self._nodes.get(path)
         if node is None:
             return
         if q is not None and self._sent.get(f"{path}#q") != q:
-            node.wxyz = self._sent[f"{path}#q"] = q
+            self._sent[f"{path}#q"] = node._impl.wxyz[:] = q
+            node._impl.api._queue_scene_message(SetOrientationMessage(path, q))
         if p is not None and self._sent.get(f"{path}#p") != p:
-            node.position = self._sent[f"{path}#p"] = p
+            self._sent[f"{path}#p"] = node._impl.position[:] = p
+            node._impl.api._queue_scene_message(SetPositionMessage(path, p))
 
     def _update_cube(self, device: Device, estimators: list[str]) -> None:
         reference = None
@@ -196,10 +217,6 @@ class SceneView:
         health = device.get("axes")
         if self._arrows is not None and health is not None:
             self._arrows.update(health.message)
-        if estimators:
-            self._update_rate_arrow(
-                f"/world/estimate/{estimators[0]}/body/rate", device, estimators[0]
-            )
 
     def _update_board(self, device: Device, estimators: list[str]) -> None:
         """Filters that know no north start at any heading: all are turned to the truth's, or to the

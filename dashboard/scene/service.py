@@ -14,14 +14,17 @@ import viser
 
 from dashboard.data.store import Store
 from dashboard.desk import Desk
+from dashboard.scene.shared import Shared
 from dashboard.scene.style import LEFT_WIDTH, css
 from dashboard.scene.view import OWN_INPUTS, View
+from dashboard.scene.waking import Waking
 
 log = logging.getLogger(__name__)
 
 __all__ = ["OWN_INPUTS", "SceneError", "SceneHandle", "start"]
 
-POSE_S = 1 / 20  # period of poses
+POSE_S = 1 / 20  # period of poses ...
+POSES_PER_S = 200  # ... of as many browsers as can have it; more of them share these
 PANEL_S = 0.4  # period of charts and tables
 
 
@@ -56,6 +59,7 @@ class SceneHandle:
         self.port = server.get_port()
         self._server, self._store, self._desk = server, store, desk
         self._views: dict[int, View] = {}
+        self._shared, self._waking = Shared(), Waking()
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._watched = watched
@@ -70,7 +74,7 @@ class SceneHandle:
             ),
             threading.Thread(
                 target=self._loop,
-                args=(PANEL_S, View.tick_panels),
+                args=(PANEL_S, View.tick_panels, self._shared.begin),
                 name="dashboard-panels",
                 daemon=True,
             ),
@@ -93,7 +97,8 @@ class SceneHandle:
         self._server.stop()
 
     def _connected(self, client: viser.ClientHandle) -> None:
-        view = View(client, self._store, self._desk)
+        self._waking.take(client)
+        view = View(client, self._store, self._desk, self._shared)
         with self._lock:
             self._views[client.client_id] = view
             self._watched.set()
@@ -106,22 +111,28 @@ class SceneHandle:
                 self._watched.clear()
         log.info("browser %d is gone", client.client_id)
 
-    def _loop(self, period_s: float, tick: Callable[[View], None]) -> None:
-        """Call tick for each view; nothing at all is done while nobody looks."""
+    def _loop(
+        self, period_s: float, tick: Callable[[View], None], begin: Callable[[], None] = int
+    ) -> None:
+        """Call begin once and tick for each view; nothing at all is done while nobody looks."""
         complained: set[int] = set()
         while not self._stop.is_set():
             self._watched.wait()
             began = time.monotonic()
             with self._lock:
                 views = list(self._views.items())
-            for number, view in views:
-                try:
-                    tick(view)
-                except Exception:  # one browser's trouble must not stop the others' picture
-                    if number not in complained:
-                        log.exception("browser %d: update failed", number)
-                    complained.add(number)
-            self._stop.wait(max(period_s - (time.monotonic() - began), period_s / 4))
+            begin()
+            with self._waking.once():
+                for number, view in views:
+                    try:
+                        tick(view)
+                    except Exception:  # one browser's trouble must not stop the others' picture
+                        if number not in complained:
+                            log.exception("browser %d: update failed", number)
+                        complained.add(number)
+            each_s = period_s if tick is not View.tick_scene else len(views) / POSES_PER_S
+            wanted_s = max(period_s, each_s) - (time.monotonic() - began)
+            self._stop.wait(max(wanted_s, period_s / 4))
 
 
 def start(

@@ -5,6 +5,7 @@ or a zoom that stays where it is while data come in.
 from dataclasses import dataclass
 
 from dashboard.data.device import Device
+from dashboard.scene.shared import Shared
 
 WINDOWS = {"10": 10.0, "30": 30.0, "60": 60.0, "300": 300.0, "600": 600.0}  # s
 LEAST_S = 0.01  # of a zoom
@@ -26,6 +27,11 @@ class Span:
         t1 = device.t_newest if self.paused_at is None else self.paused_at
         t0 = max(t1 - WINDOWS[self.window], device.t_first)
         return t0, max(t1, t0 + 1.0)
+
+    def in_round(self, device: Device, shared: Shared) -> tuple[float, float]:
+        """Likewise, for all browsers of one round: data that come meanwhile wait for the next."""
+        key = (device.name, device.generation, self.window, self.paused_at, self.zoom)
+        return shared.once(key, lambda: self.limits(device))
 
     def stated(self, device: Device | None) -> dict[str, object]:
         """For the page around the scene; `kept`: data of the zoom are still held here."""

@@ -4,6 +4,7 @@ and page; the page around the scene asks for them (workspaces.py).
 
 import threading
 import time
+from functools import partial
 
 import viser
 
@@ -15,6 +16,7 @@ from dashboard.scene.drawing.page import alert, tag
 from dashboard.scene.panels import PAGES, Devices, Record, Snapshot, Timeline
 from dashboard.scene.panels.base import Input
 from dashboard.scene.scene import Choice, SceneView
+from dashboard.scene.shared import Shared
 from dashboard.scene.span import Span
 from dashboard.scene.style import LEFT_WIDTH
 from dashboard.scene.workspaces import LAYERS, WORKSPACES, Wish, offered, stated
@@ -37,13 +39,10 @@ WIDTHS = {"s": (300.0, 470.0), "m": (270.0, 380.0), "l": (LEFT_WIDTH, 470.0)}  #
 class View:
     """What one browser shows; the two tick methods are called by the service's loops."""
 
-    def __init__(
-        self,
-        client: viser.ClientHandle,
-        store: Store,
-        desk: Desk,
-    ) -> None:
+    def __init__(self, client: viser.ClientHandle, store: Store, desk: Desk, shared=None) -> None:
+        """`shared`: a Shared with other browsers; whoever gives it begins its rounds."""
         self._client, self._store, self._desk = client, store, desk
+        self._shared, self._alone = shared or Shared(), shared is None
         self._choice = Choice()
         self._device_name = ""
         self._wanted = ""  # asked for, and perhaps not heard yet
@@ -59,6 +58,7 @@ class View:
         self._page_chosen = False
         self._last: dict[str, int] = {}  # page that was open in each workspace
         self._rooms: list[dict] = []
+        self._said: dict = {}  # of the view's state
         self._cursors: tuple[float, float] | tuple[()] = ()
         self._theme()
         self.scene = SceneView(client, self._choice)
@@ -89,6 +89,8 @@ class View:
     def tick_panels(self) -> None:
         """Summary, recorder and the page that is seen."""
         with self._lock, self._store.lock, self._client.atomic():
+            if self._alone:
+                self._shared.begin()
             now = time.monotonic()
             self._record.update(self._store.recorder, now)
             self._timeline.update(now)
@@ -114,10 +116,9 @@ class View:
 
     def _snapshot(self, device: Device, now: float) -> Snapshot:
         clock = self._store.replay.clock(device.name, now)
-        limits, dark = self._span.limits(device), self._choice.dark
-        return Snapshot(
-            self._store, device, *limits, clock, dark, self._cursors, tuple(self._derived)
-        )
+        limits = self._span.in_round(device, self._shared)
+        own = self._choice.dark, self._cursors, tuple(self._derived)
+        return Snapshot(self._store, device, *limits, clock, *own, self._shared)
 
     # --- building
 
@@ -152,9 +153,10 @@ class View:
 
     def _say_state(self, device: Device | None) -> None:
         if device is not None:
-            self._rooms = offered(PAGES, device)
+            made = partial(offered, PAGES, device)
+            self._rooms = self._shared.once((device.name, "rooms"), made)
         page = PAGES[self._page]
-        text = stated(
+        fields = dict(
             devices=self._store.names(),
             device=device.name if device is not None else "",
             workspace=page.workspace,
@@ -171,9 +173,9 @@ class View:
             size=self._size,
             layers=[layer for layer in LAYERS if self._choice.layers[layer]],
         )
-        content = str(tag("span", class_="gf-state", data_state=text))
-        if self._state.content != content:
-            self._state.content = content
+        if fields != self._said:
+            self._said = fields
+            self._state.content = str(tag("span", class_="gf-state", data_state=stated(**fields)))
 
     # --- what the person asks
 

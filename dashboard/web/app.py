@@ -20,6 +20,7 @@ from dashboard.web import (
     pages,
     session_api,
     session_pages,
+    spectrum_api,
 )
 from dashboard.web.first import pages as first_pages
 from dashboard.web.frame import proxy
@@ -49,6 +50,7 @@ def create_app(front: Front) -> ASGIApp:
     app.include_router(map_routes.routes, responses={401: {"description": "not signed in"}})
     app.include_router(intake_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(session_api.routes, responses={401: {"description": "not signed in"}})
+    app.include_router(spectrum_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(compare_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(pages.routes)
     app.include_router(session_pages.routes)

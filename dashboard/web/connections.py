@@ -11,6 +11,9 @@ import asyncio
 import ipaddress
 import logging
 import resource
+import socket
+import struct
+import sys
 import time
 from collections import Counter
 from collections.abc import Collection
@@ -26,6 +29,8 @@ from dashboard.web.auth import Backoff
 log = logging.getLogger(__name__)
 
 LOOK_S = 0.5  # s between two looks at all connections
+LEAST_TAKEN = 16_384  # bytes within take_s, of a client that is still there
+ACKED = 120  # where struct tcp_info of Linux has tcpi_bytes_acked, 64 bits
 LINGER_S = 5.0  # s, for the rest of an answer after a connection was closed
 SPARED = 200  # open files of the process that are not connections
 
@@ -38,12 +43,27 @@ class Connection:
     protocol: H11Protocol
     address: str
     idle_since: float | None  # s, monotonic; since its last answer, None while one is made
-    stuck_since: float | None = None  # s, while its client does not take what is sent
+    stuck_since: float | None = None  # s, while its client hardly takes what is sent
+    taken_then: int = 0  # bytes that it had taken at that time
 
     @property
     def gone(self) -> bool:
         """Its socket is closed."""
         return self.transport.get_extra_info("socket").fileno() < 0
+
+    @property
+    def taken(self) -> int:
+        """Bytes that have reached its client's machine."""
+        line = self.transport.get_extra_info("socket")
+        info = line.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, ACKED + 8)
+        return int.from_bytes(info[ACKED:], sys.byteorder)
+
+    def look(self, now: float) -> None:
+        """Is it stuck? What waits for it has to become less, by more than a trickle."""
+        if not self.transport.get_write_buffer_size():
+            self.stuck_since = None
+        elif self.stuck_since is None or self.taken - self.taken_then >= LEAST_TAKEN:
+            self.stuck_since, self.taken_then = now, self.taken
 
     @property
     def asked(self) -> bool:
@@ -56,13 +76,14 @@ class Connection:
 class Connections:
     """All of one server. Everything runs in its event loop."""
 
-    def __init__(self, settings: DashboardSettings) -> None:
+    def __init__(self, settings: DashboardSettings, ended: Counter[str]) -> None:
+        """ended: why, and how many connections were ended here; counted for the page."""
         files = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
         self._most = max(16, min(settings.connections, files - SPARED))
         self._settings = settings
         self._open: dict[Connection, None] = {}  # in the order of their beginning
         self._looking: asyncio.TimerHandle | None = None
-        self.ended: Counter[str] = Counter()  # why -> connections that were ended here
+        self.ended = ended
 
     def protocol(self) -> type[H11Protocol]:
         """What uvicorn makes of every connection."""
@@ -145,7 +166,10 @@ class Connections:
 
     def _end(self, one: Connection, why: str) -> None:
         self._open.pop(one, None)
-        if one.transport.get_write_buffer_size():
+        if one.transport.get_write_buffer_size() and not one.gone:
+            line = one.transport.get_extra_info("socket")
+            # what waits in the kernel goes, too, and not only when the client is given up there
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
             one.transport.abort()
         else:
             one.transport.close()
@@ -167,8 +191,7 @@ class Connections:
             if one.gone:
                 self._open.pop(one)
                 continue
-            full = one.transport.get_write_buffer_size() > 0
-            one.stuck_since = (one.stuck_since or now) if full else None
+            one.look(now)
             if one.asked:
                 one.idle_since = None
             elif one.idle_since is None:

@@ -2,6 +2,7 @@
 
 import logging
 import math
+from collections import Counter
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 
@@ -40,6 +41,7 @@ class Front:
     readings: Readings = field(default_factory=Readings)
     uploads: Uploads = field(default_factory=Uploads)
     open_labels: Collection[str] = ()  # of the scene's inputs that concern nobody else
+    ended: Counter[str] = field(default_factory=Counter)  # why -> connections that were ended
     views: Views = field(init=False)
 
     def __post_init__(self) -> None:

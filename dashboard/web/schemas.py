@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from dashboard.data.alarms import Alarm
+from dashboard.data.alarms import Alarm, words
 from dashboard.data.device import Device
 from messages import text
 from messages.contract import gyrofree_pb2 as pb
@@ -65,6 +65,7 @@ class AlarmOut(BaseModel):
     title: str
     text: str = Field(description="what was found and what to do")
     page: str = Field(description="of the live page (?p=), that shows it; empty for none")
+    words: dict[str, str] = Field(description="words of the trade in it, with their meanings")
 
 
 class DeviceOut(BaseModel):
@@ -138,7 +139,7 @@ class SessionOut(BaseModel):
 
 def alarms_out(found: Iterable[Alarm]) -> list[AlarmOut]:
     """Alarms as JSON."""
-    return [AlarmOut(**asdict(alarm)) for alarm in found]
+    return [AlarmOut(**asdict(alarm), words=words(alarm)) for alarm in found]
 
 
 def device_out(device: Device, stale_s: float, found: Iterable[Alarm] = ()) -> DeviceOut:

@@ -26,9 +26,8 @@ def pose_message(
     )
     message.timestamp.seconds, message.timestamp.nanos = divmod(header.utc_ns, 10**9)
     t, q = message.translation, message.rotation
-    north, east, down = map(float, p_n_m)
-    # a viewer cannot draw a height that nobody knows: it gets the origin's
-    t.x, t.y, t.z = north, east, down if math.isfinite(down) else 0.0
+    # a viewer cannot draw what nobody knows: it gets the origin's
+    t.x, t.y, t.z = (float(p) if math.isfinite(p) else 0.0 for p in p_n_m)
     q.w, q.x, q.y, q.z = map(float, q_nb)
     return message
 
@@ -51,7 +50,7 @@ def nav_message(
         latitude_deg=math.degrees(s.latitude),
         longitude_deg=math.degrees(s.longitude),
         height_m=s.height,
-        p_ned_m=as_list(s.p_ned),
+        p_ned_m=as_list(s.p_ned) if math.isfinite(s.latitude) else [],
         v_n_mps=as_list(s.v_n),
         q_nb=as_list(s.q_nb),
         bias_f_b_mps2=as_list(s.bias_f_b),

@@ -86,12 +86,14 @@ class RateBoard:
         self._left_out = 0  # axes that the estimators were told to leave out
         self._watch = SettingsWatch(self.layout)
         self._doubts, self._doubted_s = "", 0.0
+        self.began_utc_ns = 0  # the caller's, of the batch that the estimators began with
 
     def _start(self, reason: str) -> None:
         from inertial.rate.health import HealthMonitor  # here: loads only where it is needed
 
         if reason:
             log.warning("%s: %s: rate estimators start anew", self.device, reason)
+        self.began_utc_ns = 0
         self._estimators = {
             name: make(kind, self.layout, self.card, self._beliefs)
             for name, kind in self._make.items()

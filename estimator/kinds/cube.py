@@ -134,6 +134,7 @@ class Cube:
             )
         except WrongAxes as error:
             raise BadMessage(str(error)) from None
+        board.began_utc_ns = board.began_utc_ns or max(0, batch.header.utc_ns)
         common.cost.add(self._device, common.clock() - started, len(samples.t_s))
         return states
 
@@ -185,5 +186,6 @@ class Cube:
     def _status(self, header: pb.Header, board: RateBoard, name: str) -> pb.EstimatorStatus:
         status: Any = self._common.status(header, board.stream, name)
         status = rate_state(status, board.newest(name))
+        status.began_utc_ns = board.began_utc_ns
         status.layout, status.us_per_sample = board.layout.name, board.cost_us(name)
         return status

@@ -6,12 +6,15 @@ of 77 and heights of 1e300 come with right checksums too.
 """
 
 import calendar
+import math
 import re
+from collections.abc import Sequence
 from datetime import date
 
 MOST_FIELD = 20  # characters of a field of numbers; receivers give up to 14
 HEIGHTS_M = (-12e3, 100e3)  # from the deepest sea to where no receiver may work
 MOST_SPEED_MPS = 2000.0  # receivers that may be sold stop at 515 m/s
+MOST_SATELLITES = 200.0
 DAY_S = 86400
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)", re.ASCII)
 TIME_OF_DAY = re.compile(r"(\d{2})(\d{2})(\d{2})(?:\.(\d*))?", re.ASCII)
@@ -141,3 +144,11 @@ def within(message: str, what: str, value: float, low: float, high: float) -> fl
 def height_or_none(value: float) -> float | None:
     """A height that a receiver can have; others stand for one that it does not know."""
     return value if HEIGHTS_M[0] <= value <= HEIGHTS_M[1] else None
+
+
+def said_sigma(values: Sequence[float | None]) -> tuple[float, float, float] | None:
+    """1-sigma north, east and vertical (NaN: not said); None where the receiver does not say. No
+    receiver is exact: a 0 stands for what it has not worked out.
+    """
+    north, east, vertical = values
+    return (north, east, vertical or math.nan) if north and east else None

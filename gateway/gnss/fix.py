@@ -86,8 +86,7 @@ def _with_height(fix: Fix, known: list[Sentence], dimensions: int | None) -> Fix
 def _with_sigma(fix: Fix, gst: Sentence | None, gsa: Sentence | None) -> Fix:
     """By GST; else by the dilution of precision, where that is known; else none."""
     if gst is not None and gst.sigma_m is not None:
-        north, east, up = gst.sigma_m
-        return replace(fix, sigma_ned_m=(north, east, NAN if up is None else up))
+        return replace(fix, sigma_ned_m=gst.sigma_m)
     hdop = fix.hdop or (gsa.hdop if gsa is not None else 0.0)
     vdop = gsa.vdop if gsa is not None else 0.0
     if not hdop or fix.quality not in USUAL_SIGMA_M:

@@ -7,7 +7,14 @@ from dataclasses import dataclass
 from datetime import date
 from typing import Any
 
-from gateway.gnss.fields import HEIGHTS_M, MOST_SPEED_MPS, Fields, Refused
+from gateway.gnss.fields import (
+    HEIGHTS_M,
+    MOST_SATELLITES,
+    MOST_SPEED_MPS,
+    Fields,
+    Refused,
+    said_sigma,
+)
 
 KNOT = 1852.0 / 3600.0  # m/s
 NONE, AUTONOMOUS, DIFFERENTIAL, RTK_FLOAT, RTK_FIXED, DEAD_RECKONING = range(
@@ -49,7 +56,7 @@ class Sentence:
     separation_m: float | None = None  # geoid above the ellipsoid
     speed_mps: float | None = None
     course_deg: float | None = None
-    sigma_m: tuple[float, float, float | None] | None = None  # north, east, up
+    sigma_m: tuple[float, float, float] | None = None  # north, east, up
     dimensions: int | None = None  # of the fix: 0, 2 or 3
     vdop: float = 0.0
     satellites: int = 0
@@ -70,7 +77,7 @@ def sentence_of(line: bytes) -> Sentence | None:
 
 def _position_of(f: Fields, height_at: int) -> dict[str, Any]:
     """Satellites, HDOP and the heights that stand two places on, as in GGA and GNS."""
-    satellites = f.number(height_at - 2, "satellites", 0.0, 200.0)
+    satellites = f.number(height_at - 2, "satellites", 0.0, MOST_SATELLITES)
     return {
         "satellites": int(satellites or 0),
         "hdop": f.number(height_at - 1, "HDOP", 0.0, 1e4) or 0.0,
@@ -141,8 +148,7 @@ def _vtg(f: Fields) -> dict[str, Any]:
 
 
 def _gst(f: Fields) -> dict[str, Any]:
-    north, east, up = (f.number(k, "sigma", 0.0, MOST_SIGMA_M) for k in (6, 7, 8))
-    sigma = (north, east, up) if north is not None and east is not None else None
+    sigma = said_sigma([f.number(k, "sigma", 0.0, MOST_SIGMA_M) for k in (6, 7, 8)])
     return {"tod_ns": f.time_of_day(1), "sigma_m": sigma}
 
 

@@ -15,10 +15,12 @@ from datetime import date
 from gateway.gnss.ecef import geodetic, turned_to_ned
 from gateway.gnss.fields import (
     DAY_S,
+    MOST_SATELLITES,
     MOST_SPEED_MPS,
     Refused,
     day_of,
     height_or_none,
+    said_sigma,
     utc_ns_of,
     within,
 )
@@ -89,9 +91,9 @@ def _place(name: str, lat: float, lon: float, accuracy_m: float) -> tuple[float,
     return (lat, lon) if accuracy_m < MOST_ACCURACY_M else None
 
 
-def _sigma(horizontal_m: float, vertical_m: float) -> Three:
+def _sigma(horizontal_m: float, vertical_m: float) -> Three | None:
     one_axis = horizontal_m / math.sqrt(2.0)  # hAcc is the root of both variances' sum
-    return one_axis, one_axis, vertical_m
+    return said_sigma((one_axis, one_axis, vertical_m))
 
 
 def _utc(name: str, date_: tuple[int, ...], time_: tuple[int, ...], nano: int) -> int:
@@ -107,11 +109,11 @@ def _utc(name: str, date_: tuple[int, ...], time_: tuple[int, ...], nano: int) -
 
 def _velocity(
     name: str, v_mps: tuple[float, ...], accuracy_mps: float
-) -> tuple[Three, Three] | tuple[None, None]:
+) -> tuple[Three, Three | None] | tuple[None, None]:
     n, e, d = (within(name, "velocity", v, -MOST_SPEED_MPS, MOST_SPEED_MPS) for v in v_mps)
     if accuracy_mps >= MOST_SPEED_ACCURACY_MPS:
         return None, None
-    return (n, e, d), (accuracy_mps / math.sqrt(3.0),) * 3
+    return (n, e, d), said_sigma((accuracy_mps / math.sqrt(3.0),) * 3)
 
 
 def _pvt(name: str, p: tuple) -> Nav:
@@ -119,6 +121,7 @@ def _pvt(name: str, p: tuple) -> Nav:
     lon, lat, height, altitude, h_acc, v_acc, v_north, v_east, v_down = p[14:23]
     ground_speed, course, speed_acc, flags3 = p[23], p[24], p[25], p[28]
     timed = valid & DATED and valid & TIMED and valid & RESOLVED
+    within(name, "satellites", sats, 0.0, MOST_SATELLITES)
     place = _place(name, lat / 1e7, lon / 1e7, h_acc / 1e3)
     v_n, v_sigma = _velocity(name, (v_north / 1e3, v_east / 1e3, v_down / 1e3), speed_acc / 1e3)
     known = height_or_none(height / 1e3) if v_acc / 1e3 < MOST_ACCURACY_M else None
@@ -216,7 +219,7 @@ def _sol(name: str, p: tuple) -> Nav:
         (math.degrees(latitude), math.degrees(longitude)),
         height_or_none(height),
         None,
-        (one_axis,) * 3,
+        said_sigma((one_axis,) * 3),
         v_n,
         v_sigma,
         fix_type == FIX_2D,
@@ -246,9 +249,8 @@ def _cov(name: str, p: tuple) -> Nav:
     )
 
 
-def _roots(name: str, variances: Three) -> Three:
-    n, e, d = (math.sqrt(within(name, "variance", v, 0.0, 1e10)) for v in variances)
-    return n, e, d
+def _roots(name: str, variances: Three) -> Three | None:
+    return said_sigma([math.sqrt(within(name, "variance", v, 0.0, 1e10)) for v in variances])
 
 
 READERS: dict[bytes, tuple[str, struct.Struct, Callable[[str, tuple], Nav]]] = {

@@ -24,7 +24,10 @@ def note(
     session: SessionId,
     text: Annotated[str, typer.Argument(help="The remark.")],
     at: Annotated[
-        float | None, typer.Option(help="s from the session's start; default: about all of it.")
+        float | None,
+        typer.Option(
+            min=-1e9, max=1e9, help="s from the session's start; default: about all of it."
+        ),
     ] = None,
     author: Annotated[str, typer.Option(help="Who says so.")] = "",
     as_json: AsJson = False,

@@ -27,12 +27,18 @@ def axes(
     ],
     out: Annotated[Path | None, typer.Option(help="Write the axis map to this TOML file.")] = None,
     device: Annotated[str, typer.Option(help="Name of the device the map is for.")] = "board",
-    volt_per_count: Annotated[float, typer.Option(help="Converter: V per count.")] = 3.3 / 4095,
+    volt_per_count: Annotated[
+        float, typer.Option(min=1e-12, max=1e3, help="Converter: V per count.")
+    ] = 3.3 / 4095,
     zero_g_v: Annotated[
-        float, typer.Option(help="Converter: V of an accelerometer at 0 g.")
+        float, typer.Option(min=-1e3, max=1e3, help="Converter: V of an accelerometer at 0 g.")
     ] = 1.65,
-    accel_v_per_g: Annotated[float, typer.Option(help="Converter: V per g.")] = 0.4785,
-    gyro_v_per_dps: Annotated[float, typer.Option(help="Converter: V per deg/s.")] = 0.002,
+    accel_v_per_g: Annotated[
+        float, typer.Option(min=-1e3, max=1e3, help="Converter: V per g.")
+    ] = 0.4785,
+    gyro_v_per_dps: Annotated[
+        float, typer.Option(min=-1e3, max=1e3, help="Converter: V per deg/s.")
+    ] = 0.002,
     as_json: AsJson = False,
 ) -> None:
     """Find axes and signs of an accelerometer and gyroscope board from a log of movements by hand.

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gyrofree.commands.options import AsJson, Config, Verbose, say, settings_of
+from gyrofree.commands.options import LARGEST_SEED, AsJson, Config, Verbose, say, settings_of
 from gyrofree.running.process import EXIT_CONFIG, fail, run_service
 
 FAULT_HELP = (
@@ -32,13 +32,21 @@ def board(
         ),
     ] = None,
     tcp: Annotated[
-        int | None, typer.Option(help="Listen on this TCP port of the loopback instead of a pty.")
+        int | None,
+        typer.Option(
+            min=1, max=65535, help="Listen on this TCP port of the loopback instead of a pty."
+        ),
     ] = None,
     profile: Annotated[
         str, typer.Option(help="Motion of the table: published, wobble, fast or still.")
     ] = "published",
     seed: Annotated[
-        int, typer.Option(help="Seed of biases, scale errors, noise and the sensors' clocks.")
+        int,
+        typer.Option(
+            min=0,
+            max=LARGEST_SEED,
+            help="Seed of biases, scale errors, noise and the sensors' clocks.",
+        ),
     ] = 1,
     speed: Annotated[
         float, typer.Option(min=0.1, max=20.0, help="Emulated seconds per second.")

@@ -13,7 +13,7 @@ import typer
 from rich.table import Table
 
 from gyrofree.commands.axes import axes
-from gyrofree.commands.options import AsJson, say, show_table
+from gyrofree.commands.options import LARGEST_SEED, AsJson, say, show_table
 from gyrofree.commands.run import progress_bar
 from gyrofree.running.process import EXIT_CONFIG, fail
 from inertial.constants import MILLI_G
@@ -31,8 +31,12 @@ app = typer.Typer(
 app.command()(axes)
 
 LayoutName = Annotated[str, typer.Option("--layout", help="Name of a layout, or its TOML file.")]
-HalfSide = Annotated[float, typer.Option(help="Built-in layouts: centre to face, m.")]
-Lsb = Annotated[float | None, typer.Option(help="Logs in counts: mg per count; default 3.9.")]
+HalfSide = Annotated[
+    float, typer.Option(min=0.001, max=10.0, help="Built-in layouts: centre to face, m.")
+]
+Lsb = Annotated[
+    float | None, typer.Option(min=1e-6, max=1e6, help="Logs in counts: mg per count; default 3.9.")
+]
 DEG = 180.0 / np.pi
 
 
@@ -47,8 +51,10 @@ def plan(
     poses: Annotated[int, typer.Option(min=6, max=24, help="How many poses.")] = 14,
     layout: LayoutName = "cube",
     half_side: HalfSide = 0.05,
-    seconds: Annotated[float, typer.Option(min=0.5, help="How long each stands still, s.")] = 4.0,
-    rate: Annotated[float, typer.Option(min=1.0, help="Samples per second.")] = 100.0,
+    seconds: Annotated[
+        float, typer.Option(min=0.5, max=3600.0, help="How long each stands still, s.")
+    ] = 4.0,
+    rate: Annotated[float, typer.Option(min=1.0, max=10000.0, help="Samples per second.")] = 100.0,
     as_json: AsJson = False,
 ) -> None:
     """Say which poses to take, in order, and how well they would determine each axis."""
@@ -247,7 +253,7 @@ def simulate(
     out: Annotated[
         Path, typer.Option(help="Folder for poses.csv, steps-1.csv ..., run.csv and truth.json.")
     ],
-    seed: Annotated[int, typer.Option(help="Which imperfect device.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Which imperfect device.")] = 1,
     poses: Annotated[int, typer.Option(min=6, max=24, help="Poses of the tumble.")] = 14,
     layout: LayoutName = "cube",
     half_side: HalfSide = 0.05,

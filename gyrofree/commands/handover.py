@@ -4,6 +4,7 @@ again.
 
 import functools
 import json
+import math
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -40,11 +41,12 @@ def export(
         str, typer.Option(help="Only these topics, separated by commas, as accel,rate.")
     ] = "",
     start: Annotated[
-        float, typer.Option("--from", min=0, help="s from the session's start.")
+        float, typer.Option("--from", min=0, max=1e9, help="s from the session's start.")
     ] = 0.0,
-    end: Annotated[float, typer.Option("--to", min=0, help="s from the session's start.")] = float(
-        "inf"
-    ),
+    end: Annotated[
+        float | None,
+        typer.Option("--to", min=0, max=1e9, help="s from the session's start; default its end."),
+    ] = None,
     as_json: AsJson = False,
     config: Config = None,
 ) -> None:
@@ -59,7 +61,13 @@ def export(
     wanted = frozenset(name.strip() for name in topics.split(",") if name.strip())
     try:
         with progress_bar() as progress:
-            files = write(path, form, out, Selection(wanted, start, end), progress)
+            files = write(
+                path,
+                form,
+                out,
+                Selection(wanted, start, math.inf if end is None else end),
+                progress,
+            )
     except ExportError as error:
         raise fail(error, EXIT_CONFIG) from None
     except OSError as error:
@@ -81,7 +89,10 @@ def report(
     ] = None,
     device: Annotated[str, typer.Option(help="Device; default the one with most samples.")] = "",
     boot: Annotated[
-        int | None, typer.Option(help="Boot counter of the board; default the longest run.")
+        int | None,
+        typer.Option(
+            min=0, max=2**32 - 1, help="Boot counter of the board; default the longest run."
+        ),
     ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the report as JSON, write no files.")
@@ -258,7 +269,7 @@ def reprocess(
     estimators: Annotated[
         str, typer.Option(help="Rate estimators, separated by commas; default as configured.")
     ] = "",
-    jobs: Annotated[int, typer.Option(min=0, help="Processes; 0: one per core.")] = 0,
+    jobs: Annotated[int, typer.Option(min=0, max=1024, help="Processes; 0: one per core.")] = 0,
     scheduler: Annotated[
         str, typer.Option(help="Address of a Dask scheduler, as tcp://10.0.0.1:8786.")
     ] = "",

@@ -18,7 +18,7 @@ from gyrofree.commands.layout_tables import (
     price,
     unknowns_table,
 )
-from gyrofree.commands.options import AsJson, console_of, say, show_table
+from gyrofree.commands.options import LARGEST_SEED, AsJson, console_of, say, show_table
 from gyrofree.running.process import EXIT_CONFIG, fail
 
 WIDTH = 150  # characters of tables where nobody looks at a terminal
@@ -152,7 +152,10 @@ def optimise(
     ] = False,
     starts: Annotated[int, typer.Option(min=1, max=1000, help="Random starts.")] = 16,
     seed: Annotated[
-        int, typer.Option(help="Seed of the starts: the same seed finds the same layout.")
+        int,
+        typer.Option(
+            min=0, max=LARGEST_SEED, help="Seed of the starts: the same seed finds the same layout."
+        ),
     ] = 1,
     sensor: Annotated[str, typer.Option(help="Sensor model, for the predicted noise.")] = "adxl345",
     out: Annotated[

@@ -28,6 +28,7 @@ SessionId = Annotated[
     str, typer.Argument(help="Id of a session; `gyrofree sessions list` shows them.")
 ]
 SessionOrFile = Annotated[str, typer.Argument(help="Id of a session, or path of an MCAP file.")]
+LARGEST_SEED = 2**32 - 1
 Speed = Annotated[float, typer.Option(min=0.1, max=100.0, help="Seconds of the log per second.")]
 
 

@@ -35,7 +35,7 @@ def replay(
         bool, typer.Option(help="Do not publish: run the estimators on it and compare bit for bit.")
     ] = False,
     at: Annotated[
-        float, typer.Option(min=0.0, help="Begin at this second of the recording.")
+        float, typer.Option(min=0.0, max=1e9, help="Begin at this second of the recording.")
     ] = 0.0,
     paused: Annotated[
         bool, typer.Option(help="Begin with a pause; the dashboard's timeline goes on.")
@@ -74,7 +74,7 @@ def replay(
         run_service(lambda stop: player.run(settings, path, options, stop), verbose)
     except UnknownEstimator as error:
         raise fail(error, CONFIG) from None
-    except ValueError as error:
+    except (ValueError, player.ReplayError) as error:
         raise fail(error) from None
 
 

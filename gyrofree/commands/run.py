@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from gyrofree.commands.options import AsJson, UnitsAsNamed, say
+from gyrofree.commands.options import LARGEST_SEED, AsJson, UnitsAsNamed, say
 from gyrofree.commands.run_tables import kind_of, known, show
 from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
 
@@ -49,8 +49,12 @@ def run(
     layout: Annotated[
         str, typer.Option(help="Cube logs: name of a layout, or its TOML file.")
     ] = "cube",
-    half_side: Annotated[float, typer.Option(help="Cube logs: centre to face, m.")] = 0.05,
-    lsb_mg: Annotated[float | None, typer.Option(help="Cube logs in counts: mg per count.")] = None,
+    half_side: Annotated[
+        float, typer.Option(min=0.001, max=10.0, help="Cube logs: centre to face, m.")
+    ] = 0.05,
+    lsb_mg: Annotated[
+        float | None, typer.Option(min=1e-6, max=1e6, help="Cube logs in counts: mg per count.")
+    ] = None,
     card: Annotated[Path | None, typer.Option(help="Cube logs: calibration file to apply.")] = None,
     tacho_aid: Annotated[
         bool,
@@ -72,7 +76,10 @@ def run(
     ] = "imu.csv",
     gnss: Annotated[str, typer.Option(help="Drives: file of GNSS epochs.")] = "gnss.csv",
     every: Annotated[
-        int, typer.Option(min=1, help="Drives: give 1 of so many fixes, score on the others.")
+        int,
+        typer.Option(
+            min=1, max=1_000_000, help="Drives: give 1 of so many fixes, score on the others."
+        ),
     ] = 1,
     outages: Annotated[
         str,
@@ -192,7 +199,9 @@ def gyro_free(
     session: Annotated[
         Path | None, typer.Option(help="CSV of a recorded run; default: a simulated one.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the simulated run.")] = 1,
+    seed: Annotated[
+        int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the simulated run.")
+    ] = 1,
     as_json: AsJson = False,
 ) -> None:
     """Every figure and table of the gyro-free cube's published table test, each beside ours."""
@@ -209,7 +218,9 @@ def in_motion(
     data: Annotated[
         Path | None, typer.Option(help="Folder with imu.csv and gnss.csv of a real drive.")
     ] = None,
-    seeds: Annotated[int, typer.Option(min=1, help="Simulated drives per condition.")] = 3,
+    seeds: Annotated[
+        int, typer.Option(min=1, max=1000, help="Simulated drives per condition.")
+    ] = 3,
     as_json: AsJson = False,
 ) -> None:
     """Tables and horizon figures of the in-motion alignment, from simulated drives and a real

@@ -86,7 +86,7 @@ def procedures(config: Config = None, verbose: Verbose = False) -> None:
 
     def body(stop: threading.Event) -> None:
         from sessions.procedure import service
-        from sessions.procedure.table import TableError
+        from sessions.procedure.driven.description import TableError
 
         try:
             service.run(settings.procedures, settings.bus, stop)

@@ -226,13 +226,16 @@ def retain(
     days: Annotated[
         float | None,
         typer.Option(
-            min=0, help="Sessions older than this go; 0: no limit; default [recorder] keep_days."
+            min=0,
+            max=36500,
+            help="Sessions older than this go; 0: no limit; default [recorder] keep_days.",
         ),
     ] = None,
     max_gb: Annotated[
         float | None,
         typer.Option(
             min=0,
+            max=1e9,
             help="Oldest go until all are below this; 0: no limit; default [recorder] keep_bytes.",
         ),
     ] = None,

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from gyrofree.commands.options import (
+    LARGEST_SEED,
     Config,
     Fault,
     Verbose,
@@ -23,7 +24,10 @@ def simulate(
         Path | None, typer.Option(help="Make the pseudo-terminal reachable under this path.")
     ] = None,
     tcp: Annotated[
-        int | None, typer.Option(help="Listen on this TCP port of the loopback instead of a pty.")
+        int | None,
+        typer.Option(
+            min=1, max=65535, help="Listen on this TCP port of the loopback instead of a pty."
+        ),
     ] = None,
     profile: Annotated[
         str,
@@ -34,7 +38,9 @@ def simulate(
             )
         ),
     ] = "published",
-    seed: Annotated[int, typer.Option(help="Seed of biases, scale errors and noise.")] = 1,
+    seed: Annotated[
+        int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of biases, scale errors and noise.")
+    ] = 1,
     device: Annotated[
         str, typer.Option(help="Device name under which the truth is published.")
     ] = "cube",
@@ -63,11 +69,13 @@ def simulate(
         typer.Option(help="Offer the table's text protocol on a pseudo-terminal under this path."),
     ] = None,
     table_tcp: Annotated[
-        int | None, typer.Option(help="The same on a TCP port of the loopback.")
+        int | None, typer.Option(min=1, max=65535, help="The same on a TCP port of the loopback.")
     ] = None,
     slips: Annotated[
         int,
-        typer.Option(min=0, help="How often the person lets go who turns a table without a drive."),
+        typer.Option(
+            min=0, max=100, help="How often the person lets go who turns a table without a drive."
+        ),
     ] = 0,
     csv: Annotated[
         Path | None,
@@ -78,7 +86,9 @@ def simulate(
     layout: Annotated[
         str, typer.Option(help="With --csv: name of a layout, or its TOML file.")
     ] = "cube",
-    half_side: Annotated[float, typer.Option(help="With --csv: centre to face, m.")] = 0.05,
+    half_side: Annotated[
+        float, typer.Option(min=0.001, max=10.0, help="With --csv: centre to face, m.")
+    ] = 0.05,
     config: Config = None,
     verbose: Verbose = False,
 ) -> None:

@@ -54,7 +54,7 @@ def token_create(
     user: Annotated[str, typer.Argument(help="User whose token it is.")],
     name: Annotated[str, typer.Option(help="What it is for.")],
     role: Annotated[str, typer.Option(help="At most what the user may do.")] = "viewer",
-    days: Annotated[float, typer.Option(help="Until it ends.")] = 90.0,
+    days: Annotated[float, typer.Option(min=0.001, max=36500.0, help="Until it ends.")] = 90.0,
     config: Config = None,
 ) -> None:
     """Make a token and print it on standard output, once: only its hash is kept."""

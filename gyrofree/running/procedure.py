@@ -53,12 +53,19 @@ def user() -> str:
 def order(bus: BusSettings, action: str, device: str, text: str = "") -> str:
     """Give one order; the answer. Raises RunError."""
     number = pb.ProcedureCommand.Action.Value(f"ACTION_{action}")
-    command = pb.ProcedureCommand(action=number, device=device, user=user(), text=text)
+    command = _command(action=number, device=device, user=user(), text=text)
     try:
         with open_client(bus, timeout_s=ROUTER_S) as session:
             return _give(session, bus, command)
     except BusUnavailable as error:
         raise RunError(str(error)) from None
+
+
+def _command(**fields) -> pb.ProcedureCommand:
+    try:
+        return pb.ProcedureCommand(**fields)
+    except ValueError:  # a terminal of another encoding
+        raise RunError("the order holds what is no text in UTF-8") from None
 
 
 def _give(session, bus: BusSettings, command: pb.ProcedureCommand) -> str:
@@ -73,7 +80,7 @@ def _give(session, bus: BusSettings, command: pb.ProcedureCommand) -> str:
 
 def run(bus: BusSettings, wanted: Wanted) -> pb.ProcedureStatus:
     """Start it and follow it to its end; Ctrl-C is an emergency stop. Raises RunError."""
-    command = pb.ProcedureCommand(
+    command = _command(
         action=pb.ProcedureCommand.ACTION_START,
         device=wanted.device,
         procedure=wanted.procedure,

@@ -1,6 +1,7 @@
 """A recording found, and sent through the bus again."""
 
 import threading
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,6 +26,10 @@ def find(settings: Settings, session: str) -> Path:
         ) from None
 
 
+class ReplayError(RuntimeError):
+    """A replay that cannot begin; the text says why."""
+
+
 @dataclass(frozen=True)
 class Options:
     """How a recording is played."""
@@ -38,11 +43,15 @@ class Options:
 
 
 def run(settings: Settings, path: Path, options: Options, stop: threading.Event) -> None:
-    """Play a recording on the bus and obey the orders on <prefix>/replay/control."""
+    """Play a recording on the bus and obey the orders on <prefix>/replay/control. Raises
+    ReplayError while another replay does.
+    """
     from estimator.pipeline import Pipeline
     from messages.bus import orders
-    from messages.bus.session import Publishers, open_client
-    from messages.contract.topics import REPLAY
+    from messages.bus.claiming import claim
+    from messages.bus.session import Publishers
+    from messages.bus.turns import sessions
+    from messages.contract.topics import REPLAY, claim_key
     from sessions.replay.playback import Playback
     from sessions.replay.replay import DRAIN_S, Outlet
 
@@ -50,11 +59,22 @@ def run(settings: Settings, path: Path, options: Options, stop: threading.Event)
     if options.rate:
         estimator = estimator.model_copy(update={"rate": list(options.rate)})
     Pipeline(estimator)  # names that do not exist are refused now
-    with open_client(settings.bus, stop) as session:
-        outlet, publishers = (
-            Outlet(session, settings.bus.prefix),
-            Publishers(session, settings.bus.prefix),
-        )
+    prefix, others = settings.bus.prefix, []
+    with sessions(settings.bus, stop) as mine:
+        if mine is None:
+            return
+        bases = [claim_key(prefix, REPLAY.source)]
+        claimed = claim(mine, bases, time.time_ns(), stop, others.append, wait=False)
+        if others:
+            raise ReplayError(
+                f"another replay runs on this bus ({others[0]}): end it first, or give this one"
+                " another [bus] prefix"
+            )
+        if claimed is None:
+            return
+        session = mine.session
+        outlet, publishers = Outlet(session, prefix), Publishers(session, prefix)
+        publishers.number = claimed.number
         playback = Playback(
             path,
             outlet.put,
@@ -66,7 +86,7 @@ def run(settings: Settings, path: Path, options: Options, stop: threading.Event)
         )
         control = orders.take(
             session,
-            settings.bus.prefix,
+            prefix,
             orders.REPLAY,
             lambda order: playback.order(order.command, order.answer),
         )
@@ -77,3 +97,4 @@ def run(settings: Settings, path: Path, options: Options, stop: threading.Event)
             stop.wait(DRAIN_S)
         finally:
             control.undeclare()
+            claimed.release()

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from rich.console import Console
-from rich.prompt import Confirm, FloatPrompt, IntPrompt, Prompt
+from rich.prompt import Confirm, Prompt
 from rich.table import Table
 from rich.text import Text
 
@@ -17,6 +17,12 @@ from gyrofree.setup.ports import Found
 
 T = TypeVar("T", int, float)
 COLOURS = {"board": "bold green", "receiver": "green", "text": "yellow", "other": "yellow"}
+
+
+class YesOrNo(Confirm):
+    """Without markup, which the terminal of texts from outside does not obey."""
+
+    validate_error_message = "want y or n"
 
 
 class Asker:
@@ -57,15 +63,15 @@ class Asker:
 
     def whole(self, what: str, proposal: int, least: int, most: int) -> int:
         """A whole number."""
-        return self._number(IntPrompt, what, proposal, least, most)
+        return self._number(int, what, proposal, least, most)
 
     def number(self, what: str, proposal: float, least: float, most: float) -> float:
         """A number."""
-        return self._number(FloatPrompt, what, proposal, least, most)
+        return self._number(float, what, proposal, least, most)
 
     def yes(self, what: str, proposal: bool) -> bool:
         """Yes or no."""
-        return proposal if self.quiet else self._ask(Confirm, what, proposal)
+        return proposal if self.quiet else self._ask(YesOrNo, what, proposal)
 
     def password(self, user: str) -> str:
         """A new password, twice."""
@@ -80,17 +86,23 @@ class Asker:
             else:
                 self.say("the two differ", "red")
 
-    def _number(self, form: type, what: str, proposal: T, least: T, most: T) -> T:
+    def _number(self, form: type[T], what: str, proposal: T, least: T, most: T) -> T:
         while not self.quiet:
-            answer = self._ask(form, what, proposal)
-            if least <= answer <= most:
-                return answer
-            self.say(f"{answer}: want {least} to {most}", "red")
+            answer = self._ask(Prompt, what, str(proposal)).strip()
+            try:
+                number = form(answer.replace(",", "."))
+            except ValueError:
+                number = None
+            if number is not None and least <= number <= most:
+                return number
+            kind = "a whole number" if form is int else "a number"
+            self.say(f"{answer!r}: want {kind} from {least} to {most}", "red")
         return proposal
 
     def _ask(self, form: type, what: str, proposal: object):  # noqa: ANN202
+        shown = proposal != ""
         try:
-            return form.ask(Text(what), console=self.console, default=proposal)
+            return form.ask(Text(what), console=self.console, default=proposal, show_default=shown)
         except (EOFError, KeyboardInterrupt):
             raise self._ended() from None
 

@@ -1,6 +1,5 @@
 """`gyrofree setup` from listening to the written file: what is heard proposes, a person decides."""
 
-import getpass
 import os
 import sys
 from dataclasses import dataclass
@@ -172,16 +171,26 @@ def _board(wishes: Wishes, found: list[Found], asker: Asker) -> Found:
         return by_name.get(wishes.port) or Found(wishes.port, wishes.baud or BAUDS[0], None)
     if asker.quiet and len([one for one in found if one.kind == BOARD]) != 1:
         heard = "; ".join(f"{one.port}: {one.said}" for one in found) or "no serial port is there"
-        raise fail(f"which port is the board's? {heard}. Name it with --port", EXIT_CONFIG)
+        raise fail(f"which port is the board's? Name it with --port. {heard}", EXIT_CONFIG)
     proposal = str(found.index(likely[0]) + 1) if likely else ""
+
     answer = asker.text(
         "Port of the board: its number above, or a path",
         proposal,
-        lambda text: "" if text else "want a path such as /dev/ttyUSB0, or tcp://host:port",
+        lambda text: (
+            _listed(text, found) if text else "want a path such as /dev/ttyUSB0, or tcp://host:port"
+        ),
     )
     if answer.isdecimal() and 0 < int(answer) <= len(found):
         return found[int(answer) - 1]
     return by_name.get(answer) or Found(answer, wishes.baud or BAUDS[0], None)
+
+
+def _listed(text: str, found: list[Found]) -> str:
+    """Why a number is none of the ports that were listed; "" for a path too."""
+    if text.isdecimal() and not 0 < int(text) <= len(found):
+        return f"no port {text} in the list above"
+    return ""
 
 
 def _name_of(port: str, before: Settings) -> str:
@@ -224,7 +233,11 @@ def _receiver(
     proposal = "" if heard.messages else next(iter(others), "")
     port = wishes.gnss_port
     if port is None:
-        port = asker.text("Port of a GNSS receiver of its own (empty: none)", proposal)
+        port = asker.text(
+            "Port of a GNSS receiver of its own (empty: none)",
+            proposal,
+            lambda text: _listed(text, found),
+        )
     if port.isdecimal() and 0 < int(port) <= len(found):
         port = found[int(port) - 1].port
     if not port:
@@ -244,8 +257,8 @@ def _user(wishes: Wishes, settings: Settings, asker: Asker) -> tuple[str, str] |
         if known or asker.quiet:
             return None
         name = asker.text(
-            "First user, an administrator (empty: `gyrofree up` prints a link that signs in once)",
-            getpass.getuser(),
+            "First user, an administrator (empty: none; `gyrofree up` prints a link instead)",
+            "",
             lambda text: "" if not text or USER_NAME.fullmatch(text) else "want letters, digits",
         )
     if not name:

@@ -155,7 +155,7 @@ class Alignment:
         if self.levelled:
             by_course = self._start_by_course(C_then, v_n, felt)
             return by_course if by_course is not None else self._start_by_feeling(felt, v_n)
-        return self._start_in_motion() or self._start_by_feeling(felt, v_n)
+        return self._start_in_motion(felt) or self._start_by_feeling(felt, v_n)
 
     def _feel(self, turned_back: Callable[[float], Array] | None) -> MotionStart | None:
         """The heading without the course: what the accelerometers felt against the velocities'
@@ -182,6 +182,7 @@ class Alignment:
         self._felt_yaw = found.sigma_yaw
         return (
             found.chi2_per_dof <= m.worst_chi2
+            and found.strain <= m.worst_bias
             and found.sigma_tilt <= m.good_tilt
             and found.sigma_yaw <= m.good_yaw
         )
@@ -237,7 +238,7 @@ class Alignment:
         how = f"heading from what was felt in motion, to {yaw:.1f} deg, tilt to {tilt:.1f} deg"
         return Start(felt.C_nb, felt.bias_gyro, felt.bias_accel, felt.P, how + more)
 
-    def _start_in_motion(self) -> Start | None:
+    def _start_in_motion(self, felt: MotionStart | None) -> Start | None:
         m = self.settings.motion
         found = self._window.solve()
         if found is None:
@@ -254,7 +255,13 @@ class Alignment:
                 f"moving: samples and fixes disagree (chi2 {found.chi2_per_dof:.1f} per degree of"
                 " freedom)"
             )
-            return None
+            return self._no_car(felt)
+        if found.strain > m.worst_bias:
+            self._way = (
+                f"moving: with the course as heading the sensors' biases would be"
+                f" {found.strain:.0f} sigmas off: not a car's course?"
+            )
+            return self._no_car(felt)
         if found.sigma_tilt > m.good_tilt or found.sigma_yaw > m.good_yaw:
             self._way = (
                 f"moving: tilt known to {tilt:.1f} deg, heading to {yaw:.1f} deg, not enough yet"
@@ -265,6 +272,10 @@ class Alignment:
             f" {yaw:.1f} deg"
         )
         return Start(found.C_nb, found.bias_gyro, found.bias_accel, found.P, how)
+
+    def _no_car(self, felt: MotionStart | None) -> Start | None:
+        """What was felt, where the course as heading contradicts the samples."""
+        return None if felt is None else self._from_feeling(felt, "; the course is no car's")
 
     def _forget(self) -> None:
         self._window.clear()

@@ -48,6 +48,7 @@ class MotionSettings:
     good_tilt: float = math.radians(3.0)  # rad, largest sigma of a start
     good_yaw: float = math.radians(15.0)
     worst_chi2: float = 3.0  # per degree of freedom; more: samples and fixes do not belong together
+    worst_bias: float = 4.0  # sigmas of what is known before; more: the answer is a wrong one
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,7 @@ class MotionStart:
     bias_gyro: Array  # (3,) rad/s
     P: Array  # (9, 9): psi_n, accelerometer bias, gyro bias, in the error state's sense
     chi2_per_dof: float
+    strain: float = 0.0  # sigmas, of the worst bias, where no standstill told of it
 
     @property
     def sigma_tilt(self) -> float:
@@ -157,6 +159,16 @@ class MotionWindow:
             return None
         problem = _Problem(s, self._down, self._samples, self._fixes, level)
         C0, theta = problem.first_guess()
+        if level is not None or math.isfinite(s.sigma_slip):
+            return self._from_guess(problem, C0, theta)
+        # nothing says which way the nose points: a wrong quarter has a minimum of its own
+        quarters = [product(euler_matrix(0.0, 0.0, k * math.pi / 2), C0) for k in range(4)]
+        answers = [self._from_guess(problem, quarter, theta) for quarter in quarters]
+        found = [a for a in answers if a is not None]
+        return min(found, key=lambda a: a.chi2_per_dof) if found else None
+
+    def _from_guess(self, problem: "_Problem", C0: Array, theta: Array) -> MotionStart | None:
+        """Gauss-Newton from a guess; None where it does not come to an end."""
         for _ in range(6):
             r, J = problem.residuals(C0, theta), problem.jacobian(C0, theta)
             step = _normal(J, product(J.T, -r[:, None]))
@@ -188,8 +200,14 @@ class MotionWindow:
             phi = rotation_vector(product(problem.motion(d)[0][-1], C_0k[-1].T))
             carry[0:3, 9 + j] = applied(C0, phi) / STEP[9]
         P9 = product(product(carry, P), carry.T) * max(1.0, chi2)
-        P9[2, 2] += self.settings.sigma_mount**2 if math.isfinite(self.settings.sigma_slip) else 0.0
-        return MotionStart(product(C0, C_0k[-1]), theta[BA].copy(), theta[BG].copy(), P9, chi2)
+        s = self.settings
+        P9[2, 2] += s.sigma_mount**2 if math.isfinite(s.sigma_slip) else 0.0
+        strain = 0.0
+        if problem.level is None:
+            strain = float(np.abs(np.concatenate(problem.prior(C0, theta))).max())
+        return MotionStart(
+            product(C0, C_0k[-1]), theta[BA].copy(), theta[BG].copy(), P9, chi2, strain
+        )
 
 
 def _normal(J: Array, right: Array) -> Array | None:
@@ -213,7 +231,7 @@ class _Problem:
         fixes: list[MotionFix],
         level: Level | None,
     ) -> None:
-        self._s, self._down, self._level = s, down, level
+        self._s, self._down, self.level = s, down, level
         keep = [x for x in samples if x[0] > fixes[0].t]
         self._t = np.array([x[0] for x in keep])
         self._f, self._w = np.array([x[1] for x in keep]), np.array([x[2] for x in keep])
@@ -236,11 +254,11 @@ class _Problem:
         """C_n0 with heading along the mean course and tilt from the mean force; no biases."""
         theta = np.zeros(UNKNOWNS)
         theta[V0] = self._v[0]
-        if self._level is not None:
-            theta[BG] = self._level.bias_gyro
+        if self.level is not None:
+            theta[BG] = self.level.bias_gyro
         C, u = self.motion(theta)
-        if self._level is not None:
-            return self._turned_to_fit(self._level.C_l0, u), theta
+        if self.level is not None:
+            return self._turned_to_fit(self.level.C_l0, u), theta
         felt = (self._v[-1] - self._v[0]) - self._down * self._passed[-1]  # what u must be in n
         level = euler_matrix(0.0, 0.0, float(atan2(self._v[0, 1], self._v[0, 0])))
         a, b = _unit(applied(level.T, felt)), _unit(u[-1])
@@ -259,9 +277,9 @@ class _Problem:
         cosine = float((a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1]).sum())
         return product(euler_matrix(0.0, 0.0, float(atan2(sine, cosine))), C_l0)
 
-    def _prior(self, C0: Array, theta: Array) -> list[Array]:
+    def prior(self, C0: Array, theta: Array) -> list[Array]:
         """What is known before the window (E-83): the biases, and gravity across the vertical."""
-        s, known = self._s, self._level
+        s, known = self._s, self.level
         if known is None:
             return [theta[BA] / s.sigma_accel, theta[BG] / s.sigma_gyro]
         f_n = applied(C0, applied(product(known.C_l0.T, known.C_ls), known.mean_f - theta[BA]))
@@ -278,7 +296,7 @@ class _Problem:
         s = self._s
         C, u = self.motion(theta)
         v = theta[V0] + self._passed[:, None] * self._down + applied(C0, u)
-        rows = [((v - self._v) / self._sigma_v).ravel(), *self._prior(C0, theta)]
+        rows = [((v - self._v) / self._sigma_v).ravel(), *self.prior(C0, theta)]
         if math.isfinite(s.sigma_slip):
             speed = norm(self._v[:, :2])
             x_n = applied(C0, C[:, :, 0])

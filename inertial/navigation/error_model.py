@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 STATES = 15
 PSI, DV, DP, B, D = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15)
+TILT = slice(0, 2)
 
 SCALE = {"scale_accel": 3, "scale_gyro": 3}
 LAG = {"lag_position": 1, "lag_velocity": 1}
@@ -40,6 +41,7 @@ class ImuNoise:
     shake: float = 1.0
     turn: float = 0.007  # of 1, scale and cross-axis errors of the gyros (E-139)
     cross: float = 0.005  # of 1, cross-axis errors alone: where scale errors are states
+    axes: float = 0.007  # rad, of the sensors' axes against one another (E-142)
     turn_length: float = 5.0  # s, over which a turn keeps its direction
     position: float = 1e-3  # m/sqrt(s), keeps the position covariance from closing completely
 
@@ -71,6 +73,7 @@ def make_model(noise: ImuNoise, scale: bool = False, lag: bool = False, car: boo
         density=np.concatenate([noise.density(), extra]),
         decay=np.concatenate([noise.decay(), extra]),
         shake=noise.shake,
+        axes=noise.axes,
         turn=(noise.cross if scale else noise.turn) ** 2 * noise.turn_length,
         **places,
     )

@@ -52,7 +52,7 @@ class Constraints:
     sigma_up: float = 0.2  # m/s
     least_speed: float = 2.0  # m/s
     most_turn: float = 0.7  # rad/s
-    still_v: float = 0.05  # m/s
+    still_v: float = 0.1  # m/s
     still_w: float = math.radians(0.1)  # rad/s
     still_speed: float = 0.5  # m/s
     still_f_change: float = 0.12  # m/s^2, of means over 0.1 s

@@ -21,7 +21,7 @@ from inertial.earth import ned_between
 from inertial.navigation import results
 from inertial.navigation.alignment import Start
 from inertial.navigation.drag import DragWatch
-from inertial.navigation.error_model import DP
+from inertial.navigation.error_model import DP, TILT
 from inertial.navigation.filters import FILTERS, FilterConfig, filter_of
 from inertial.navigation.fix import Fix, core_fix
 from inertial.navigation.settings import NavigatorConfig
@@ -79,9 +79,10 @@ class Navigator:
         return self._live.head.x
 
     def covariance(self) -> Array:
-        """(n, n) at the newest sample, with what wanders in the receiver's position (E-138)."""
-        head = self._live.head
-        P = head.covariance(self._live.model)
+        """(n, n) at the newest sample, with what stays of position (E-138) and tilt (E-142)."""
+        head, model = self._live.head, self._live.model
+        P = head.covariance(model)
+        P[TILT, TILT] += np.eye(2) * model.axes**2
         P[DP, DP] += np.diag(head.receiver.wander)
         return P
 
@@ -287,7 +288,7 @@ class Navigator:
     def _waiting_solution(self, t: float) -> Solution:
         c, fix, align = self.config, self._last_fix, self._startup.align
         age = t - self._last_used
-        v, where = np.zeros(3), (0.0, 0.0, 0.0)
+        v, where = np.zeros(3), (math.nan, math.nan, math.nan)
         sigma_p, sigma_v = np.full(3, 1e7), np.full(3, 100.0)
         if fix is not None:
             fix = fix.filled()

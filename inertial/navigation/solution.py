@@ -161,10 +161,10 @@ class Solution:
 
     t: float
     mode: Mode
-    latitude: float  # rad
-    longitude: float  # rad
+    latitude: float  # rad; NaN: no fix was used yet
+    longitude: float  # rad, likewise
     height: float  # m; NaN: unknown, no fix had one
-    p_ned: Array  # (3,) m from origin; down NaN where the height is
+    p_ned: Array  # (3,) m from origin; NaN where the place is, down where the height is
     v_n: Array  # (3,) m/s
     q_nb: Array  # (4,)
     bias_f_b: Array  # (3,) m/s^2

@@ -64,15 +64,19 @@ class Belief:
         sigma = config.offset_sigmas * self._uncalibrated
         n = layout.axes
         self.ratio = 1.0  # of the measured variance of the noise to the configured
+        self.rounded = 0.0
         self.white = self.noise**2 / per_block
         self.offset = sigma**2
         self.bias, self.reference = np.zeros(n), np.zeros(n)
         self.learned = np.zeros(n, dtype=bool)
 
-    def hear(self, ratio: float) -> None:
-        """The measured variance of the noise, over the configured one."""
-        if ratio != self.ratio:
-            self.ratio, self.white = ratio, self.noise**2 * (ratio / self._per_block)
+    def hear(self, ratio: float, rounded: float = 0.0) -> None:
+        """The measured variance of the noise, over the configured one; what readings are rounded
+        to, m/s^2, where that hides their noise: a mean of equal readings is no better than one.
+        """
+        if (ratio, rounded) != (self.ratio, self.rounded):
+            self.ratio, self.rounded = ratio, rounded
+            self.white = self.noise**2 * (ratio / self._per_block) + rounded**2 / 12.0
 
     def constants(self, width: Width | None = None) -> parity.Constants:
         """What is known of the axes, at this width or the present one."""

@@ -17,9 +17,10 @@ Integers = NDArray[np.int64]
 SAME, AT_LIMIT, LIMIT_AGE, SPIKES, SPIKE_AGE = range(5)
 ROWS = 5
 # Rows of what is kept: the last but two, the last but one, the last, the sum of the block without
-# spikes, the usual distance from the middle of the neighbours, the measured parity over the noise.
-EARLIER, BEFORE, LAST, SUM, USUAL, PARITY = range(6)
-KEPT = 6
+# spikes, the usual distance from the middle of the neighbours, the measured parity over the noise,
+# the smallest change from one reading to the next.
+EARLIER, BEFORE, LAST, SUM, USUAL, PARITY, CHANGE = range(7)
+KEPT = 7
 # Marks: how many of the first three are known, samples in the block, samples in PARITY.
 KNOWN, FILLED, HEARD = range(3)
 MARKS = 3
@@ -39,6 +40,9 @@ next one's row."""
 measured_noise = native.health.measured_noise
 """Variance of the axes' noise over the configured one, by the median axis; 1 where it is not more
 (H-11)."""
+resolution = native.health.resolution
+"""What readings are rounded to, m/s^2, by the median axis, where that hides their noise; 0 where it
+does not (H-14)."""
 flags = native.health.flags
 """Rows of out (3, N): axes that are stuck, at the end of their range, spiking, by counts. True for
-any."""
+any. coarse: equal readings are usual."""

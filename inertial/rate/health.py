@@ -61,8 +61,7 @@ class HealthMonitor:
         self.history = History(n)
         self._x: Array | None = None
         self._P = np.eye(parity.STATES)
-        self._sum = 0.0  # of NIS beyond the gate
-        self._doubted = False
+        self._sum, self._doubted = 0.0, False  # of NIS beyond the gate; it is so much
         self._asked = 0
         self._t = 0.0
         self._gap_s = 0.0
@@ -78,7 +77,7 @@ class HealthMonitor:
 
     @property
     def doubted(self) -> bool:
-        """Readings do not fit one motion: nothing that is made of them is valid (H-14)."""
+        """Readings do not fit one motion: nothing that is made of them is valid (H-15)."""
         return self._doubted or self._clean_blocks > self.counts.blocks
 
     def _known(self) -> Known:
@@ -156,7 +155,8 @@ class HealthMonitor:
 
     def _block(self, block: Array, dt: float) -> None:
         self.counts.blocks += 1
-        self.belief.hear(axis_samples.measured_noise(self._near, self._marks, self.belief.free))
+        ratio = axis_samples.measured_noise(self._near, self._marks, self.belief.free)
+        self.belief.hear(ratio, axis_samples.resolution(self._near, self.belief.noise))
         self._single_axes()
         if self._sees and np.count_nonzero(self.used) > 6:
             self._check(block, dt)
@@ -184,7 +184,8 @@ class HealthMonitor:
             max(3, round(c.limit_s / self.period_s)),
             c.spikes,
         )
-        if not axis_samples.flags(count, *fewest, self._whose) and not self._stale:
+        coarse = self.belief.rounded > 0.0
+        if not axis_samples.flags(count, *fewest, coarse, self._whose) and not self._stale:
             return
         stuck, limit, spiking = self._whose
         for i in range(len(self.faults)):
@@ -278,8 +279,7 @@ class HealthMonitor:
         """The filter believed the axis until now: run the newest blocks again without it."""
         again = self.history.replay_without(self._known())
         if again is not None:
-            self._x, self._P = again
-            self._sum, self._doubted = 0.0, False
+            (self._x, self._P), self._sum, self._doubted = again, 0.0, False
 
     def _restart(self) -> None:
         self.counts.restarts += 1

@@ -20,14 +20,14 @@ from inertial.simulation.motion import DEG, STEP, Motion, random_steps, smooth
 Array = NDArray[np.float64]
 
 
-def _start(seed: int, kind: int, seconds: float, still: float, rise: float):
+def begin(seed: int, kind: int, seconds: float, still: float, rise: float):
     """The draws, the times, and a share of motion that rises from 0 to 1 after the standstill."""
     draw = np.random.default_rng([seed, kind])
     t = STEP * np.arange(round(seconds / STEP) + 1)
     return draw, t, smooth((t > still).astype(float), rise)
 
 
-def _flown(t: Array, v_n: Array, heading: Array) -> Motion:
+def flown(t: Array, v_n: Array, heading: Array) -> Motion:
     """What hangs on rotors: it tilts so that its thrust gives the acceleration, whatever way its
     nose points.
     """
@@ -41,7 +41,7 @@ def _flown(t: Array, v_n: Array, heading: Array) -> Motion:
 
 def helicopter(seed: int, seconds: float = 300.0, still: float = 20.0) -> Motion:
     """Hovers, flies sideways and backwards as often as ahead, turns on the spot."""
-    draw, t, moving = _start(seed, 41, seconds, still, 1.5)
+    draw, t, moving = begin(seed, 41, seconds, still, 1.5)
     v = np.column_stack(
         [smooth(random_steps(draw, t, (8.0, 20.0), [-8.0, 0.0, 0.0, 8.0]), 2.0) for _ in "NE"]
         + [smooth(random_steps(draw, t, (10.0, 30.0), [-1.5, 0.0, 1.5]), 2.0)]
@@ -50,12 +50,12 @@ def helicopter(seed: int, seconds: float = 300.0, still: float = 20.0) -> Motion
     heading = draw.uniform(-np.pi, np.pi) + cumulative_simpson(
         moving * turning, dx=STEP, initial=0.0
     )
-    return _flown(t, moving[:, None] * v, heading)
+    return flown(t, moving[:, None] * v, heading)
 
 
 def drone(seed: int, seconds: float = 300.0, still: float = 20.0) -> Motion:
     """A small multirotor: up to 12 m/s any way, brisk, its nose turning at will."""
-    draw, t, moving = _start(seed, 42, seconds, still, 0.7)
+    draw, t, moving = begin(seed, 42, seconds, still, 0.7)
     v = np.column_stack(
         [
             smooth(random_steps(draw, t, (3.0, 9.0), [-12.0, -5.0, 0.0, 5.0, 12.0]), 1.0)
@@ -67,12 +67,12 @@ def drone(seed: int, seconds: float = 300.0, still: float = 20.0) -> Motion:
     heading = draw.uniform(-np.pi, np.pi) + cumulative_simpson(
         moving * turning, dx=STEP, initial=0.0
     )
-    return _flown(t, moving[:, None] * v, heading)
+    return flown(t, moving[:, None] * v, heading)
 
 
 def boat(seed: int, seconds: float = 300.0, still: float = 20.0) -> Motion:
     """A boat at 5 m/s in a current of 1.5 m/s across its way, with leeway and a light swell."""
-    draw, t, moving = _start(seed, 43, seconds, still, 3.0)
+    draw, t, moving = begin(seed, 43, seconds, still, 3.0)
     turns = DEG * smooth(random_steps(draw, t, (10.0, 25.0), [-8.0, 0.0, 0.0, 8.0]), 2.0)
     heading = draw.uniform(-np.pi, np.pi) + cumulative_simpson(moving * turns, dx=STEP, initial=0.0)
     set_by = draw.uniform(-np.pi, np.pi)
@@ -92,7 +92,7 @@ def boat(seed: int, seconds: float = 300.0, still: float = 20.0) -> Motion:
 
 def bicycle(seed: int, seconds: float = 300.0, still: float = 20.0) -> Motion:
     """6 m/s, leaning into every curve so that no side force is felt, and swaying a little."""
-    draw, t, moving = _start(seed, 44, seconds, still, 1.5)
+    draw, t, moving = begin(seed, 44, seconds, still, 1.5)
     speed = moving * (6.0 + 1.5 * np.sin(2.0 * np.pi * t / 41.0))
     turns = DEG * moving * smooth(random_steps(draw, t, (3.0, 10.0), [-18.0, 0.0, 0.0, 18.0]), 0.8)
     heading = draw.uniform(-np.pi, np.pi) + cumulative_simpson(turns, dx=STEP, initial=0.0)
@@ -103,7 +103,7 @@ def bicycle(seed: int, seconds: float = 300.0, still: float = 20.0) -> Motion:
 
 def train(seed: int, seconds: float = 300.0, still: float = 20.0) -> Motion:
     """Long gentle curves up to 35 m/s, slow to gather speed."""
-    draw, t, _ = _start(seed, 45, seconds, still, 2.0)
+    draw, t, _ = begin(seed, 45, seconds, still, 2.0)
     speed = smooth(np.clip(0.5 * (t - still), 0.0, draw.uniform(25.0, 35.0)), 2.0)
     curvature = smooth(random_steps(draw, t, (15.0, 40.0), [-1 / 800, 0.0, 0.0, 1 / 800]), 4.0)
     heading = draw.uniform(-np.pi, np.pi) + cumulative_simpson(
@@ -116,7 +116,7 @@ def train(seed: int, seconds: float = 300.0, still: float = 20.0) -> Motion:
 
 def backing_car(seed: int, seconds: float = 300.0, still: float = 20.0) -> Motion:
     """A car that backs out at 5 m/s for a while first, and does so again and again."""
-    draw, t, moving = _start(seed, 46, seconds, still, 0.8)
+    draw, t, moving = begin(seed, 46, seconds, still, 0.8)
     spells = random_steps(draw, t, (12.0, 30.0), [9.0, 12.0, -4.5])
     spells[t < still + draw.uniform(12.0, 20.0)] = -5.0
     speed = moving * smooth(spells, 1.2)
@@ -130,7 +130,7 @@ def backing_car(seed: int, seconds: float = 300.0, still: float = 20.0) -> Motio
 
 def car_on_ice(seed: int, seconds: float = 300.0, still: float = 20.0) -> Motion:
     """A car that holds its way for 150 s, and from then on drifts through every curve."""
-    draw, t, moving = _start(seed, 47, seconds, still, 1.5)
+    draw, t, moving = begin(seed, 47, seconds, still, 1.5)
     speed = moving * (9.0 + 2.0 * np.sin(2.0 * np.pi * t / 37.0))
     turns = DEG * moving * smooth(random_steps(draw, t, (4.0, 12.0), [-12.0, 0.0, 12.0]), 1.0)
     course = draw.uniform(-np.pi, np.pi) + cumulative_simpson(turns, dx=STEP, initial=0.0)

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from inertial.constants import GRAVITY
 from inertial.navigation.fix import Fix
 from inertial.simulation.craft import CRAFT, MOUNTED, mounted
+from inertial.simulation.craft_rare import RARE
 from inertial.simulation.drive import (
     REALISTIC,
     Condition,
@@ -109,6 +110,7 @@ VEHICLES: dict[str, Callable[..., Motion]] = {
     "walker": walker,
     "rolling body": rolling_body,
     **CRAFT,
+    **RARE,
 }
 CITY = Condition("town drive, one minute without fixes", REALISTIC, outages=((150.0, 60.0),))
 WALKING = replace(REALISTIC, accel_noise=0.02, gyro_noise=0.02 * DEG)

@@ -5,6 +5,7 @@ the same numbers under the names that logs have.
 import csv
 import re
 from collections.abc import Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import pyarrow.csv
 
 from logs.quantities import UNITS
 from logs.sheet import LogError, open_sheet
-from logs.sheet_form import COMMENTS, SEPARATORS, Lines, is_number, printable
+from logs.sheet_form import COMMENTS, SEPARATORS, Lines, is_number, iso_time, printable
 
 ROWS = 200  # looked at
 AXIS = r"a[1-9]\d?[1-3]"
@@ -62,7 +63,7 @@ def look(path: Path) -> dict[str, Any]:
     sheet = open_sheet(path)
     rows: list[list[str]] = []
     for number, line in enumerate(Lines(path, sheet.size, sheet.encoding), 1):
-        if number <= sheet.header_line or not line.strip() or line.startswith(COMMENTS):
+        if number <= sheet.head.above or not line.strip() or line.startswith(COMMENTS):
             continue
         rows.append(
             [printable(c.strip()) for c in next(csv.reader([line], delimiter=sheet.separator))]
@@ -70,13 +71,16 @@ def look(path: Path) -> dict[str, Any]:
         if len(rows) >= ROWS:
             break
     columns = []
-    for k, name in enumerate(sheet.header):
+    for k, (name, written) in enumerate(zip(sheet.header, sheet.head.written, strict=True)):
         cells = [row[k] if k < len(row) else "" for row in rows]
-        values = [_value(cell, sheet.decimal) for cell in cells]
+        values = [
+            _time(cell) if name in sheet.head.times else _value(cell, sheet.decimal)
+            for cell in cells
+        ]
         numeric = any(value is not None for value in values)
         columns.append(
             {
-                "name": printable(name),
+                "name": printable(written),
                 "guess": guess(name) if numeric else "",
                 "values": values if numeric else [],
             }
@@ -86,10 +90,21 @@ def look(path: Path) -> dict[str, Any]:
         "separator": SEPARATORS[sheet.separator],
         "decimal": "comma" if sheet.decimal == "," else "point",
         "header_line": sheet.header_line,
-        "own": sheet.own,
+        "own": sheet.head.own,
         "rows": rows[:8],
         "columns": columns,
     }
+
+
+def _time(cell: str) -> float | None:
+    """A date and time of ISO 8601 in s since 1970; without its zone it is taken for UTC."""
+    if not iso_time(cell):
+        return None
+    try:
+        moment = datetime.fromisoformat(cell)
+    except ValueError:
+        return None
+    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
 
 def _value(cell: str, decimal: str) -> float | None:
@@ -132,7 +147,7 @@ def rewritten(path: Path, columns: Mapping[str, str], out: Path) -> None:
         if targets.count(target) > 1:
             raise LogError(f"two columns are meant as {target}: want each once")
     sheet = open_sheet(path)
-    by_name = {printable(name): name for name in sheet.header}
+    by_name = {printable(w): n for w, n in zip(sheet.head.written, sheet.header, strict=True)}
     wanted = [by_name.get(name, name) for name in chosen]
     table = sheet.read(wanted, [n for n, t in zip(wanted, targets, strict=True) if t[0] in "lhqsv"])
     found = pa.table(

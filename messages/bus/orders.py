@@ -5,6 +5,7 @@ service that takes no order (it is stopping, the bytes are no command) says why 
 the one who asked gets that reason as it was said, and never "does not answer" for it.
 """
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -12,7 +13,9 @@ from typing import Generic, TypeVar
 import zenoh
 from google.protobuf.message import DecodeError, Message
 
+from messages.bus.claiming import OVERDUE, id_of, newest
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract import topics as tp
 from messages.contract.checks import MESSAGE_BYTES, check
 from messages.contract.topics import (
     TopicError,
@@ -22,7 +25,8 @@ from messages.contract.topics import (
     replay_control_key,
 )
 
-OVERDUE = b"Timeout"  # what Zenoh answers, here or in the router, when the time is over
+log = logging.getLogger(__name__)
+
 REASON_LENGTH = 500  # characters of a refusal that are passed on
 
 C = TypeVar("C", bound=Message)
@@ -51,6 +55,7 @@ class Kind(Generic[C, A]):
     look: str  # what to look at when nobody answers
     patience_s: float
     key: Callable[[str, str], str]  # of (prefix, device)
+    source: str  # of the topics on which it publishes: who has claimed them is who answers
 
 
 RECORDER = Kind(
@@ -60,6 +65,7 @@ RECORDER = Kind(
     "see that `gyrofree record` runs and reaches the router",
     10.0,  # it may have to close a file
     lambda prefix, device: recorder_control_key(prefix),
+    tp.RECORDER,
 )
 ESTIMATOR = Kind(
     "the estimator",
@@ -68,6 +74,7 @@ ESTIMATOR = Kind(
     "see that `gyrofree estimator` runs and reaches the router",
     20.0,  # a fit takes seconds, and the order waits for the samples before it
     lambda prefix, device: control_key(prefix, device, "estimator-control"),
+    tp.ESTIMATES,
 )
 BOARD = Kind(
     "the gateway",
@@ -76,6 +83,7 @@ BOARD = Kind(
     "see that `gyrofree gateway` runs and reaches the router",
     8.0,  # a self-test of the sensors takes up to 4 s
     lambda prefix, device: control_key(prefix, device, "board-control"),
+    tp.GATEWAY,
 )
 PROCEDURES = Kind(
     "the procedures",
@@ -84,6 +92,7 @@ PROCEDURES = Kind(
     "see that `gyrofree procedures` runs and reaches the router",
     25.0,  # a recording is closed and another begun
     lambda prefix, device: control_key(prefix, device, "procedure-control"),
+    tp.PROCEDURES,
 )
 REPLAY = Kind(
     "the replay",
@@ -92,6 +101,7 @@ REPLAY = Kind(
     "it has ended",
     5.0,
     lambda prefix, device: replay_control_key(prefix),
+    tp.REPLAY.source,
 )
 
 
@@ -113,7 +123,11 @@ def give(
         raise NoAnswer(f"{kind.who}: no connection to the router yet")
     key = kind.key(prefix, device)
     patience_s = kind.patience_s if timeout_s is None else timeout_s
+    who = {"device": device} if kind.source == tp.GATEWAY else {}
     try:
+        base = tp.claim_key(prefix, kind.source, **who)
+        # twice: a session that watches claims may know of a new one and not yet say so
+        serves = newest(session, base) or newest(session, base)
         replies = session.get(
             key,
             payload=command.SerializeToString(),
@@ -121,6 +135,15 @@ def give(
             consolidation=zenoh.ConsolidationMode.NONE,  # the first answer, at once
         )
         for reply in replies:
+            overdue = reply.ok is None and reply.err.payload.to_bytes() == OVERDUE
+            if serves and id_of(reply) not in (serves, "") and not overdue:
+                log.warning(
+                    "%s: an answer of %s is refused: %s has claimed to be the one who serves",
+                    kind.who,
+                    id_of(reply),
+                    serves,
+                )
+                continue
             return _read(reply, kind, patience_s)
     except zenoh.ZError as error:
         raise NoAnswer(f"{kind.who}: the order cannot be sent: {error}") from None

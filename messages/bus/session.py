@@ -25,6 +25,7 @@ from messages.history.spool import Spool
 from messages.setting import setting
 
 CLOSING_S = 5.0
+LARGEST = 16 << 20  # bytes; messages have at most 1 MB, answers to questions 8
 
 log = logging.getLogger(__name__)
 
@@ -70,6 +71,9 @@ def _config(settings: BusSettings, mode: str) -> zenoh.Config:
         # of 64 KiB, and some patience before DROP drops. Express publishing would be no faster at
         # these rates (measured), but takes a batch for each message: bursts of 17 were cut off.
         "transport/link/tx/queue/size/data": 16,
+        # A larger message is put together nowhere: Zenoh would take a GB for one, in each process
+        # that listens.
+        "transport/link/rx/max_message_size": LARGEST,
         "transport/link/tx/queue/congestion_control/drop/wait_before_drop": patience_us,
     }
     if mode == "router":

@@ -38,12 +38,17 @@ KINDS = (  # what a refusal can be counted as
     "time",  # far from that of all others
     "answer",  # of a publisher: not what was asked for
     "stale",  # of a publisher whose place another has taken
-    "claim",  # of a publisher that has claimed no such number
+    "claim",  # of a publisher that has claimed no such number, or nothing
     "repeated",  # it has come before, byte for byte
     "failure",  # we could not take it: a fault of ours
 )
 FLOATS = (FieldDescriptor.CPPTYPE_DOUBLE, FieldDescriptor.CPPTYPE_FLOAT)
 NATURAL = (FieldDescriptor.CPPTYPE_UINT32, FieldDescriptor.CPPTYPE_UINT64)
+FOREIGN = {  # rules of fields of types that are not ours: lowest, highest, NaN is not known
+    "foxglove.LocationFix.latitude": pb.Rule(min=-90, max=90),
+    "foxglove.LocationFix.longitude": pb.Rule(min=-360, max=360),
+    "foxglove.LocationFix.altitude": pb.Rule(min=-1e6, max=1e6, none=True),
+}
 
 
 class Refusal(NamedTuple):
@@ -84,7 +89,7 @@ class _Limits(NamedTuple):
 
 @cache
 def _limits(field: FieldDescriptor) -> _Limits:
-    rule = field.GetOptions().Extensions[pb.rule]
+    rule = FOREIGN.get(field.full_name) or field.GetOptions().Extensions[pb.rule]
     low = rule.min if rule.HasField("min") else None
     high = rule.max if rule.HasField("max") else None
     if low is None and high is not None:

@@ -631,7 +631,7 @@ class Truth(_message.Message):
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., for_index: _Optional[int] = ..., q_nb: _Optional[_Iterable[float]] = ..., omega_ib_b_radps: _Optional[_Iterable[float]] = ..., alpha_b_radps2: _Optional[_Iterable[float]] = ..., f_b_mps2: _Optional[_Iterable[float]] = ..., angle_z_rad: _Optional[float] = ..., profile_time_s: _Optional[float] = ...) -> None: ...
 
 class EstimatorStatus(_message.Message):
-    __slots__ = ("header", "estimator", "samples", "gaps", "missing_samples", "us_per_sample", "state", "message", "bias_f_b_mps2", "bias_alpha_radps2", "layout", "version", "restart", "refused", "behind_s", "waiting", "trouble", "skipped_s", "limit_hz")
+    __slots__ = ("header", "estimator", "samples", "gaps", "missing_samples", "us_per_sample", "state", "message", "bias_f_b_mps2", "bias_alpha_radps2", "layout", "version", "restart", "refused", "behind_s", "waiting", "trouble", "skipped_s", "limit_hz", "began_utc_ns")
     class RefusedEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -658,6 +658,7 @@ class EstimatorStatus(_message.Message):
     TROUBLE_FIELD_NUMBER: _ClassVar[int]
     SKIPPED_S_FIELD_NUMBER: _ClassVar[int]
     LIMIT_HZ_FIELD_NUMBER: _ClassVar[int]
+    BEGAN_UTC_NS_FIELD_NUMBER: _ClassVar[int]
     header: Header
     estimator: str
     samples: int
@@ -677,7 +678,8 @@ class EstimatorStatus(_message.Message):
     trouble: str
     skipped_s: float
     limit_hz: float
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., samples: _Optional[int] = ..., gaps: _Optional[int] = ..., missing_samples: _Optional[int] = ..., us_per_sample: _Optional[float] = ..., state: _Optional[str] = ..., message: _Optional[str] = ..., bias_f_b_mps2: _Optional[_Iterable[float]] = ..., bias_alpha_radps2: _Optional[_Iterable[float]] = ..., layout: _Optional[str] = ..., version: _Optional[str] = ..., restart: _Optional[bytes] = ..., refused: _Optional[_Mapping[str, int]] = ..., behind_s: _Optional[float] = ..., waiting: _Optional[int] = ..., trouble: _Optional[str] = ..., skipped_s: _Optional[float] = ..., limit_hz: _Optional[float] = ...) -> None: ...
+    began_utc_ns: int
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., estimator: _Optional[str] = ..., samples: _Optional[int] = ..., gaps: _Optional[int] = ..., missing_samples: _Optional[int] = ..., us_per_sample: _Optional[float] = ..., state: _Optional[str] = ..., message: _Optional[str] = ..., bias_f_b_mps2: _Optional[_Iterable[float]] = ..., bias_alpha_radps2: _Optional[_Iterable[float]] = ..., layout: _Optional[str] = ..., version: _Optional[str] = ..., restart: _Optional[bytes] = ..., refused: _Optional[_Mapping[str, int]] = ..., behind_s: _Optional[float] = ..., waiting: _Optional[int] = ..., trouble: _Optional[str] = ..., skipped_s: _Optional[float] = ..., limit_hz: _Optional[float] = ..., began_utc_ns: _Optional[int] = ...) -> None: ...
 
 class Horizon(_message.Message):
     __slots__ = ("n", "inputs", "membership_name", "membership", "crisp")
@@ -1175,7 +1177,7 @@ class GnssMute(_message.Message):
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., after_s: _Optional[float] = ..., until_s: _Optional[float] = ..., user: _Optional[str] = ...) -> None: ...
 
 class ProcedureCommand(_message.Message):
-    __slots__ = ("action", "device", "procedure", "unit", "user", "text", "own_session")
+    __slots__ = ("action", "device", "procedure", "unit", "user", "text", "own_session", "run", "step")
     class Action(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         ACTION_NONE: _ClassVar[ProcedureCommand.Action]
@@ -1197,6 +1199,8 @@ class ProcedureCommand(_message.Message):
     USER_FIELD_NUMBER: _ClassVar[int]
     TEXT_FIELD_NUMBER: _ClassVar[int]
     OWN_SESSION_FIELD_NUMBER: _ClassVar[int]
+    RUN_FIELD_NUMBER: _ClassVar[int]
+    STEP_FIELD_NUMBER: _ClassVar[int]
     action: ProcedureCommand.Action
     device: str
     procedure: str
@@ -1204,10 +1208,12 @@ class ProcedureCommand(_message.Message):
     user: str
     text: str
     own_session: bool
-    def __init__(self, action: _Optional[_Union[ProcedureCommand.Action, str]] = ..., device: _Optional[str] = ..., procedure: _Optional[str] = ..., unit: _Optional[str] = ..., user: _Optional[str] = ..., text: _Optional[str] = ..., own_session: _Optional[bool] = ...) -> None: ...
+    run: str
+    step: int
+    def __init__(self, action: _Optional[_Union[ProcedureCommand.Action, str]] = ..., device: _Optional[str] = ..., procedure: _Optional[str] = ..., unit: _Optional[str] = ..., user: _Optional[str] = ..., text: _Optional[str] = ..., own_session: _Optional[bool] = ..., run: _Optional[str] = ..., step: _Optional[int] = ...) -> None: ...
 
 class ProcedureStatus(_message.Message):
-    __slots__ = ("header", "state", "run", "procedure", "title", "sha256", "toml", "unit", "operator", "session", "step", "instruction", "progress", "message", "steps", "table", "table_radps", "offered", "started_utc_ns", "up_b", "reference")
+    __slots__ = ("header", "state", "run", "procedure", "title", "sha256", "toml", "unit", "operator", "session", "step", "instruction", "progress", "message", "steps", "table", "table_radps", "offered", "started_utc_ns", "up_b", "reference", "alarm")
     class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATE_IDLE: _ClassVar[ProcedureStatus.State]
@@ -1307,6 +1313,7 @@ class ProcedureStatus(_message.Message):
     STARTED_UTC_NS_FIELD_NUMBER: _ClassVar[int]
     UP_B_FIELD_NUMBER: _ClassVar[int]
     REFERENCE_FIELD_NUMBER: _ClassVar[int]
+    ALARM_FIELD_NUMBER: _ClassVar[int]
     header: Header
     state: ProcedureStatus.State
     run: str
@@ -1328,4 +1335,5 @@ class ProcedureStatus(_message.Message):
     started_utc_ns: int
     up_b: _containers.RepeatedScalarFieldContainer[float]
     reference: _containers.RepeatedScalarFieldContainer[str]
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., state: _Optional[_Union[ProcedureStatus.State, str]] = ..., run: _Optional[str] = ..., procedure: _Optional[str] = ..., title: _Optional[str] = ..., sha256: _Optional[str] = ..., toml: _Optional[str] = ..., unit: _Optional[str] = ..., operator: _Optional[str] = ..., session: _Optional[str] = ..., step: _Optional[int] = ..., instruction: _Optional[str] = ..., progress: _Optional[float] = ..., message: _Optional[str] = ..., steps: _Optional[_Iterable[_Union[ProcedureStatus.Step, _Mapping]]] = ..., table: _Optional[str] = ..., table_radps: _Optional[float] = ..., offered: _Optional[_Iterable[str]] = ..., started_utc_ns: _Optional[int] = ..., up_b: _Optional[_Iterable[float]] = ..., reference: _Optional[_Iterable[str]] = ...) -> None: ...
+    alarm: str
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., state: _Optional[_Union[ProcedureStatus.State, str]] = ..., run: _Optional[str] = ..., procedure: _Optional[str] = ..., title: _Optional[str] = ..., sha256: _Optional[str] = ..., toml: _Optional[str] = ..., unit: _Optional[str] = ..., operator: _Optional[str] = ..., session: _Optional[str] = ..., step: _Optional[int] = ..., instruction: _Optional[str] = ..., progress: _Optional[float] = ..., message: _Optional[str] = ..., steps: _Optional[_Iterable[_Union[ProcedureStatus.Step, _Mapping]]] = ..., table: _Optional[str] = ..., table_radps: _Optional[float] = ..., offered: _Optional[_Iterable[str]] = ..., started_utc_ns: _Optional[int] = ..., up_b: _Optional[_Iterable[float]] = ..., reference: _Optional[_Iterable[str]] = ..., alarm: _Optional[str] = ...) -> None: ...

@@ -21,10 +21,9 @@ M = TypeVar("M", bound=Message)
 REPLAY_SUFFIX = "-replay"  # of a device's name when a recording of it is played on the bus
 RECORDER = "recorder"  # the device name under which the recorder speaks
 
-GATEWAY, ESTIMATES = (
-    "gateway",
-    "estimator",
-)  # processes that keep what they publish, by the topics' `source`
+# processes by the topics' `source`: those that keep what they publish, and all of which one serves
+GATEWAY, ESTIMATES, PROCEDURES = "gateway", "estimator", "procedures"
+CLAIMED = (GATEWAY, ESTIMATES, PROCEDURES, RECORDER, "replay")
 
 
 class TopicError(ValueError):
@@ -184,6 +183,15 @@ def recorder_control_key(prefix: str) -> str:
 def history_key(prefix: str, device: str) -> str:
     """Key of a gateway's queryable for journal records: selector parameters `first` and `last`."""
     return f"{check_name(prefix)}/{check_name(device)}/history"
+
+
+def claim_key(prefix: str, source: str, device: str = "every") -> str:
+    """Key below which a process claims to be the one that publishes as `source`; a gateway does so
+    for each device.
+    """
+    if device != "*":
+        check_name(device)
+    return f"{check_name(prefix)}/{device}/{check_name(source)}"
 
 
 def published_key(prefix: str, device: str, source: str) -> str:

@@ -14,8 +14,10 @@ from operator import itemgetter
 import zenoh
 from google.protobuf.message import DecodeError
 
+from messages.bus.claiming import OVERDUE, id_of
+from messages.bus.fencing import Fence
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.checks import check
+from messages.contract.checks import Refusal, check
 from messages.contract.topics import TopicError, published_key
 from messages.history.spool import REPLY_BYTES, Spool
 
@@ -25,6 +27,7 @@ ANSWER_S = 10.0  # an answer is a MB from the disk; a busy machine takes its tim
 MOST_BYTES = 8 << 20  # of messages in one reply that we give, however much is asked for
 MOST_REPLY_BYTES = 32 << 20  # of all replies to a question that we read
 MOST_REPLIES = 16  # to one question; a device has one publisher, or two that take turns
+PATIENCE_S = 1800.0  # with one that is there, but does not answer in time
 LEAST_BYTES = 1 << 15  # of an answer that a busier machine is asked for
 
 
@@ -70,22 +73,33 @@ def ask(
     device: str,
     source: str,
     query: pb.HistoryQuery,
-    timeout_s: float = ANSWER_S,
+    timeout_s: float | None = None,
+    fence: Fence | None = None,
 ) -> pb.HistoryReply | None:
-    """The answer of one source, or of all of them put together (`*`); None when nobody answered.
+    """The answer about one source; None when nobody answered.
 
-    Whoever answers is believed no further than `together` says; what is beyond the limits is said.
+    Where somebody has claimed to be its publisher (`fence` knows) his answer is the one that
+    counts, and nobody else is waited for; answers of others are refused. Where nobody has, all that
+    come are put together. Whoever answers is believed no further than `together` says; what is
+    beyond the limits is said.
     """
+    claimed = fence.claims.publisher(device, source) if fence is not None else ""
     found: list[pb.HistoryReply] = []
     size = 0
     replies = session.get(
         published_key(prefix, device, source),
         payload=query.SerializeToString(),
-        timeout=timeout_s,
+        timeout=ANSWER_S if timeout_s is None else timeout_s,
         target=zenoh.QueryTarget.ALL,
         consolidation=zenoh.ConsolidationMode.NONE,
     )
     for reply in replies:
+        who = id_of(reply)
+        overdue = reply.ok is None and reply.err.payload.to_bytes() == OVERDUE
+        if claimed and who not in (claimed, "") and not overdue:
+            refusal = Refusal("claim", "publisher", who, f"{claimed}, who has claimed it")
+            fence.refuse(f"answer about {device}/{source}", refusal, device)
+            continue
         if reply.ok is None:
             log.warning(
                 "history of %s: %s",
@@ -108,6 +122,8 @@ def ask(
             found.append(pb.HistoryReply.FromString(reply.ok.payload.to_bytes()))
         except DecodeError as error:
             log.warning("history of %s: %s", device, error)
+        if claimed:
+            break
     return together(found)
 
 
@@ -140,15 +156,18 @@ class Asker:
 
     RETRIES = 4  # a link that is just back may carry samples before it carries questions
     RETRY_S = 0.5
-    PATIENCE_S = 1800.0  # with one that is there, but does not answer in time
 
     def __init__(
         self,
         session: zenoh.Session,
         prefix: str,
         done: Callable[[object, pb.HistoryReply | None], None],
+        fence: Fence | None = None,
+        patience_s: float = PATIENCE_S,
     ):
+        """`fence` knows who publishes what."""
         self._session, self._prefix, self._done = session, prefix, done
+        self._fence, self._patience_s = fence, patience_s
         self._questions: queue.SimpleQueue[tuple | None] = queue.SimpleQueue()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="history", daemon=True)
@@ -167,22 +186,42 @@ class Asker:
     def _run(self) -> None:
         while (question := self._questions.get()) is not None and not self._stop.is_set():
             token, device, source, asked = question
-            reply, nobody, end = None, 0, time.monotonic() + self.PATIENCE_S
-            query = pb.HistoryQuery()
-            query.CopyFrom(asked)
-            while reply is None and nobody < self.RETRIES and time.monotonic() < end:
-                began = time.monotonic()
-                try:
-                    reply = ask(self._session, self._prefix, device, source, query)
-                except zenoh.ZError as error:
-                    log.warning("history of %s: %s", device, error)
-                if reply is None:
-                    slow = time.monotonic() - began >= ANSWER_S / 2  # it is there
-                    nobody += not slow
-                    if (
-                        slow and query.every_s <= 0.0
-                    ):  # whoever was slow is asked for less at a time
-                        query.max_bytes = max(LEAST_BYTES, (query.max_bytes or REPLY_BYTES) // 2)
-                    if self._stop.wait(self.RETRY_S):
-                        return
+            reply = self._insist(device, source, asked)
+            if self._stop.is_set():
+                return
             self._done(token, reply)
+
+    def _insist(self, device: str, source: str, asked: pb.HistoryQuery) -> pb.HistoryReply | None:
+        """Ask until there is an answer, or nobody to be waited for."""
+        query, began, nobody, said = pb.HistoryQuery(), time.monotonic(), 0, False
+        query.CopyFrom(asked)
+        while nobody < self.RETRIES and time.monotonic() - began < self._patience_s:
+            asked_at = time.monotonic()
+            try:
+                reply = ask(self._session, self._prefix, device, source, query, fence=self._fence)
+            except zenoh.ZError as error:
+                log.warning("history of %s: %s", device, error)
+                reply = None
+            if reply is not None:
+                return reply
+            # it is there, but late; whoever else does not answer is not waited for again and again
+            slow = time.monotonic() - asked_at >= ANSWER_S / 2 and self._serves(device, source)
+            nobody += not slow
+            if slow and not said:
+                said = True
+                log.warning(
+                    "%s: its %s does not answer what is missing; what comes meanwhile waits, for"
+                    " %.0f s at most",
+                    device,
+                    source,
+                    self._patience_s,
+                )
+            if slow and query.every_s <= 0.0:  # whoever was slow is asked for less at a time
+                query.max_bytes = max(LEAST_BYTES, (query.max_bytes or REPLY_BYTES) // 2)
+            if self._stop.wait(self.RETRY_S):
+                break
+        return None
+
+    def _serves(self, device: str, source: str) -> bool:
+        """Is there a publisher, as far as can be known?"""
+        return self._fence is None or bool(self._fence.claims.publisher(device, source))

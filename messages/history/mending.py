@@ -137,7 +137,7 @@ class Mender:
         if reply is not None and reply.next:
             refusal = question.goes_on(reply)
             if refusal is None:
-                self._ask(question.more(reply.next))
+                self._ask(question.more(reply.next, bool(out)))
                 return out
             self._refuse(question.about, refusal, question.stream[0])
         if stream.waiting:
@@ -261,6 +261,10 @@ class Mender:
             return []  # never heard live: not this consumer's gap
         for gap in key.missing:
             if gap[0] == item.run and gap[1] <= item.sequence <= gap[2]:
+                if self._hold and (item.run, item.sequence) < (key.run, key.last):
+                    # a second publisher's answer came after one that goes on behind this
+                    self._refuse(f"{device}/{item.topic}", key.overtaken(item), device)
+                    return []
                 take_out(key.missing, gap, item.sequence)
                 key.repaired += 1
                 if (item.run, item.sequence) > (key.run, key.last):
@@ -283,10 +287,7 @@ class Mender:
                 and BY_NAME[name.partition("/")[0]].source == stream[1]
                 and key.missing
             ):
-                lost = sum(
-                    max(0, last - first + 1) * countable
-                    for _, first, last, countable in key.missing
-                )
+                lost = key.give_up()
                 if lost:
                     log.warning(
                         "%s/%s: %d messages are lost: their publisher has them no more",
@@ -294,14 +295,6 @@ class Mender:
                         name,
                         lost,
                     )
-                key.lost += lost
-                newest = max(
-                    ((run, last) for run, _, last, _ in key.missing if last < 1 << 62),
-                    default=(0, 0),
-                )
-                if newest > (key.run, key.last):
-                    key.run, key.last = newest
-                key.missing.clear()
 
     def _release(self, stream: Stream) -> list[Arrival]:
         """Let go what is held, gaps and all."""

@@ -17,6 +17,7 @@ from messages.contract.topics import BY_NAME, NAME, Topic
 log = logging.getLogger(__name__)
 
 MOST_REPLIES = 10_000  # of one answer; a reply has about a MB
+MOST_IDLE = 64  # of those in a row: what is missing of one topic has others around it
 CLOCKS_NS = 5_000_000_000  # two clocks that are set by one another differ by less
 FARTHEST = 10_000_000  # messages; a sequence that jumps further has begun anew: a day at 100 Hz
 
@@ -43,6 +44,7 @@ class Question(NamedTuple):
     stream: tuple[str, str]  # device, source
     query: pb.HistoryQuery
     replies: int = 0  # parts of the answer that have come
+    idle: int = 0  # of those in a row that brought nothing
 
     @property
     def about(self) -> str:
@@ -50,24 +52,28 @@ class Question(NamedTuple):
         return f"answer about {'/'.join(self.stream)}"
 
     def goes_on(self, reply: pb.HistoryReply) -> Refusal | None:
-        """Why a reply that says there is more is not asked for more: each part must bring
-        something and get ahead, and an answer has an end.
+        """Why a reply that says there is more is not asked for more: each part must have
+        something and get ahead, some must bring something, and an answer has an end.
         """
         if not reply.items:
             return Refusal("answer", "next", str(reply.next), "0 where a reply brings nothing")
         if reply.next <= self.query.position:
             wanted = f"more than {self.query.position}"
             return Refusal("answer", "next", str(reply.next), wanted)
+        if self.idle >= MOST_IDLE:
+            wanted = f"an end after {MOST_IDLE} parts that brought nothing"
+            return Refusal("answer", "next", str(reply.next), wanted)
         if self.replies >= MOST_REPLIES:
             return Refusal("answer", "next", str(reply.next), f"an end after {MOST_REPLIES}")
         return None
 
-    def more(self, position: int) -> "Question":
-        """The question for the next part."""
+    def more(self, position: int, brought: bool = True) -> "Question":
+        """The question for the next part, after one that brought something or not."""
         query = pb.HistoryQuery()
         query.CopyFrom(self.query)
         query.position = position
-        return Question(self.stream, query, self.replies + 1)
+        idle = 0 if brought else self.idle + 1
+        return Question(self.stream, query, self.replies + 1, idle)
 
 
 @dataclass
@@ -88,6 +94,20 @@ class KeyState:
         follows = run == self.run and self.filled[1] == self.last
         self.filled = (self.filled[0] if follows else sequence, sequence)
         self.run, self.last = run, sequence
+
+    def overtaken(self, item: pb.HistoryItem) -> Refusal:
+        """A filled-in message that comes behind what was given on already."""
+        wanted = f"what comes behind {self.run}, {self.last}"
+        return Refusal("stale", "message", f"{item.run}, {item.sequence}", wanted)
+
+    def give_up(self) -> int:
+        """What is missing will not come; how many messages that are."""
+        lost = sum(max(0, last - first + 1) * count for _, first, last, count in self.missing)
+        known = ((run, last) for run, _, last, _ in self.missing if last < 1 << 62)
+        self.run, self.last = max((self.run, self.last), *known, (0, 0))
+        self.lost += lost
+        self.missing.clear()
+        return lost
 
 
 @dataclass

@@ -151,4 +151,4 @@ def _tracks(ax: Axes, tracks: list[tuple[int, Overlaid, str]]) -> None:
             )
     ax.set(xlabel="east, m", ylabel="north, m")
     ax.set_aspect("equal", adjustable="datalim")
-    ax.legend(fontsize=7)
+    ax.legend(fontsize=7, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.3, ncols=3)

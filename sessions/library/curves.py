@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating[Any]]
 
 FILE = "curves.npz"
-FORMAT = 2
+FORMAT = 4
 BINS = 100_000  # at most, per line
 STEPS = (1, 2, 5)  # bins are 1, 2 or 5 times a power of ten, s
 
@@ -44,6 +44,8 @@ class Line:
     low: Array  # the same as mean where a bin holds one sample at most
     high: Array
     names: tuple[str, ...] = ()  # of the columns, where the kind does not say them
+    # (n, 3): the worst that an estimator said of x, y, z in a bin, RateEstimate.Sight
+    sight: NDArray[np.uint8] | None = None
 
     @property
     def kind(self) -> str:
@@ -80,6 +82,9 @@ class Track:
     key: str  # <device>/nav/<filter> or <device>/gnss
     points: Array  # (m, 4): t s, north, east, down m from the origin
     origin: tuple[float, float, float]  # latitude, longitude rad, height m
+    # (m, 4): covariance north-north, north-east, east-east, m², NaN where it is not said, and
+    # GnssFix.Quality
+    told: Array
 
 
 @dataclass(frozen=True)
@@ -188,13 +193,15 @@ def save(curves: Curves, recording: Path) -> Path:
     arrays: dict[str, Any] = {}
     for k, line in enumerate(curves.lines.values()):
         arrays[f"mean{k}"] = line.mean.astype(np.float32)
+        if line.sight is not None:
+            arrays[f"sight{k}"] = line.sight
         if line.low is not line.mean:
             arrays[f"low{k}"], arrays[f"high{k}"] = (
                 line.low.astype(np.float32),
                 line.high.astype(np.float32),
             )
     for k, track in enumerate(curves.tracks.values()):
-        arrays[f"track{k}"] = track.points
+        arrays[f"track{k}"], arrays[f"told{k}"] = track.points, track.told
     for k, line in enumerate(curves.axes.values()):
         arrays[f"axes{k}"] = line.mean.astype(np.float32)
     facts = {
@@ -269,13 +276,14 @@ def load(recording: Path) -> Curves | None:
         for k, key in enumerate(facts["lines"]):
             mean = data[f"mean{k}"]
             low, high = (data[f"low{k}"], data[f"high{k}"]) if f"low{k}" in data else (mean, mean)
-            lines[key] = Line(key, mean, low, high)
+            sight = data[f"sight{k}"] if f"sight{k}" in data else None
+            lines[key] = Line(key, mean, low, high, sight=sight)
         axes = {
             key: Line(key, data[f"axes{k}"], data[f"axes{k}"], data[f"axes{k}"], tuple(names))
             for k, (key, names) in enumerate(facts["axes"])
         }
         tracks = {
-            key: Track(key, data[f"track{k}"], (origin[0], origin[1], origin[2]))
+            key: Track(key, data[f"track{k}"], (origin[0], origin[1], origin[2]), data[f"told{k}"])
             for k, (key, origin) in enumerate(facts["tracks"])
         }
     return Curves(

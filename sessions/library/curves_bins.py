@@ -18,6 +18,7 @@ GAP_PERIODS = 4.0  # a hole of more than so many sample periods is a gap and sta
 LEAST_GAP_S = 0.05
 PULSE_S = 0.1  # a pulse nearer than that says that the line worked
 POINTS = 4000  # of a track, at most
+UNTOLD = (np.nan, np.nan, np.nan, 0.0)  # nothing is said of how certain a position is
 
 
 class Binner:
@@ -31,9 +32,10 @@ class Binner:
         self._low = np.full((n, width), np.inf, dtype=np.float32)
         self._high = np.full((n, width), -np.inf, dtype=np.float32)
         self._period = np.inf
+        self._sight: NDArray[np.uint8] | None = None
 
-    def add(self, t: Array, values: Array) -> None:
-        """Samples at times t (m,), values (m, width), nearly in order."""
+    def add(self, t: Array, values: Array, sight: NDArray[Any] | None = None) -> None:
+        """Samples at times t (m,), values (m, width), nearly in order; sight (m, 3) of a rate."""
         if len(t) > 1:
             self._period = min(self._period, float(np.median(np.diff(t))))
         at = np.clip((t / self._bin_s).astype(np.int64), 0, len(self._count) - 1)
@@ -43,6 +45,11 @@ class Binner:
         np.add.at(self._count, bins, np.diff(begins, append=len(at)))
         np.minimum.at(self._low, bins, np.minimum.reduceat(values, begins).astype(np.float32))
         np.maximum.at(self._high, bins, np.maximum.reduceat(values, begins).astype(np.float32))
+        if sight is not None:
+            if self._sight is None:
+                self._sight = np.zeros((len(self._count), 3), dtype=np.uint8)
+            worst = np.maximum.reduceat(sight, begins).astype(np.uint8)
+            np.maximum.at(self._sight, bins, worst)
 
     def line(self, n: int) -> Line:
         """The first n bins as a line; holes no longer than a few samples are closed."""
@@ -52,13 +59,13 @@ class Binner:
         longest = int(max(GAP_PERIODS * period, LEAST_GAP_S, 2.5 * self._bin_s) / self._bin_s)
         holes = _holes(count > 0, longest)
         mean = _closed(mean, holes).astype(np.float32)
+        sight = None if self._sight is None else self._sight[:n]
         if count.max(initial=0) <= 1:
-            return Line(self._key, mean, mean, mean)
+            return Line(self._key, mean, mean, mean, sight=sight)
         low = np.where(count[:, None] > 0, self._low[:n], np.nan)
         high = np.where(count[:, None] > 0, self._high[:n], np.nan)
-        return Line(
-            self._key, mean, np.fmin(_closed(low, holes), mean), np.fmax(_closed(high, holes), mean)
-        )
+        low, high = np.fmin(_closed(low, holes), mean), np.fmax(_closed(high, holes), mean)
+        return Line(self._key, mean, low, high, sight=sight)
 
 
 def _holes(there: NDArray[np.bool_], longest: int) -> NDArray[np.bool_]:
@@ -129,24 +136,29 @@ class TrackLine:
 
     def __init__(self, key: str, origin: tuple[float, float, float]) -> None:
         self._key, self._origin = key, origin
-        self._points: list[tuple[float, float, float, float]] = []
+        self._points: list[tuple[float, ...]] = []
         self._every, self._seen = 1, 0
 
-    def add(self, t: float, north: float, east: float, down: float) -> None:
-        """One position, m."""
+    def add(
+        self, t: float, north: float, east: float, down: float, told: tuple[float, ...] = UNTOLD
+    ) -> None:
+        """One position, m; told as Track has it."""
         self._seen += 1
         if self._seen % self._every:
             return
-        self._points.append((t, north, east, down))
+        self._points.append((t, north, east, down, *told))
         if len(self._points) >= 2 * POINTS:
             self._points = self._points[::2]
             self._every *= 2
 
-    def add_place(self, t: float, latitude: float, longitude: float, height: float) -> None:
-        """One position, rad and m."""
-        self.add(t, *ned_between(self._origin, (latitude, longitude, height)))
+    def add_place(
+        self, t: float, place: tuple[float, float, float], told: tuple[float, ...] = UNTOLD
+    ) -> None:
+        """One position: latitude and longitude, rad, and height, m."""
+        north, east, down = ned_between(self._origin, place)
+        self.add(t, north, east, down, told)
 
     def track(self) -> Track:
         """What it has become."""
-        points = np.array(self._points) if self._points else np.zeros((0, 4))
-        return Track(self._key, points, self._origin)
+        points = np.array(self._points) if self._points else np.zeros((0, 8))
+        return Track(self._key, points[:, :4], self._origin, points[:, 4:])

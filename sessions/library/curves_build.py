@@ -18,7 +18,7 @@ from inertial.rate.names import LEADER
 from logs.figures.names import axis_channel
 from messages.contract.topics import ACCEL, GNSS, IMU, NAV, NOTE, RATE, TACHO, TRUTH, Topic, parse
 from sessions.library.curves import Curves, Line, Mark, bin_for, bins_of, load, save
-from sessions.library.curves_bins import Binner, PulseLine, TrackLine
+from sessions.library.curves_bins import UNTOLD, Binner, PulseLine, TrackLine
 from sessions.library.scan import Block, Extent, Progress, extent, scan
 from sessions.recording.manifest import SessionError, name_of, read_manifest
 from sessions.recording.mcap_damage import Damage
@@ -30,18 +30,19 @@ Array = NDArray[np.float64]
 PLACE = ("latitude_deg", "longitude_deg", "height_m")
 TURN = ("omega_ib_b_radps", "angle_z_rad")
 WANTED: dict[Topic, tuple[str, ...]] = {  # and which of their fields
-    RATE: TURN,
+    RATE: (*TURN, "sight"),
     IMU: ("omega_ib_b_radps", "f_b_mps2"),
     ACCEL: ("f_mps2",),
     TACHO: ("omega_radps",),
     TRUTH: TURN,
-    NAV: ("p_ned_m", *(f"origin_{name}" for name in PLACE)),
-    GNSS: ("quality", *PLACE),
+    NAV: ("p_ned_m", "sigma", "position_covariance", *(f"origin_{name}" for name in PLACE)),
+    GNSS: ("quality", "position_sigma_ned_m", *PLACE),
     NOTE: ("text", "author", "seconds", "at_utc_ns"),
 }
 STRAY_S = (
     5.0  # a sample whose own time lies further outside the recording is put where it was received
 )
+NO_PLACE_M = 1e4  # one sigma, from which a place is none
 COARSE_CHUNKS = 250  # read for the first look at a recording ...
 COARSE_THIN = 4  # ... and of those one message in so many
 LONG_CHUNKS = 4 * COARSE_CHUNKS  # a recording of more gets one
@@ -167,7 +168,7 @@ class _Reading:
     def _rate(self, key: str, read: Samples, t: Array) -> None:
         omega, angle = read.fields["omega_ib_b_radps"], read.fields["angle_z_rad"]
         if (read.lengths["omega_ib_b_radps"] == 3).all():
-            self._binner(key, t, 4).add(t, np.column_stack([omega, angle]))
+            self._binner(key, t, 4).add(t, np.column_stack([omega, angle]), _sight(read))
 
     _truth = _rate
 
@@ -202,16 +203,24 @@ class _Reading:
     def _nav(self, key: str, read: Samples, t: Array) -> None:
         latitude, longitude, height = (read.fields[f"origin_{name}"] for name in PLACE)
         known = (read.lengths["p_ned_m"] == 3) & ((latitude != 0) | (longitude != 0))
+        certain = read.lengths["position_covariance"] == 9
+        covariance = read.fields["position_covariance"]
+        known &= _placed(read)
         for k in np.flatnonzero(known):
             origin = _origin(np.radians(latitude[k]), np.radians(longitude[k]), float(height[k]))
-            self._track(key, origin).add(float(t[k]), *read.fields["p_ned_m"][k].tolist())
+            told = (*covariance[k][[0, 1, 4]].tolist(), 0.0) if certain[k] else UNTOLD
+            self._track(key, origin).add(float(t[k]), *read.fields["p_ned_m"][k].tolist(), told)
 
     def _gnss(self, key: str, read: Samples, t: Array) -> None:
         fields = read.fields
         for k in np.flatnonzero(fields["quality"]):
             latitude, longitude, height = (float(fields[name][k]) for name in PLACE)
             place = (float(np.radians(latitude)), float(np.radians(longitude)), height)
-            self._track(key, _origin(*place)).add_place(float(t[k]), *place)
+            sigma, quality = UNTOLD[:3], float(fields["quality"][k])
+            if read.lengths["position_sigma_ned_m"][k] == 3:
+                north, east, _ = fields["position_sigma_ned_m"][k].tolist()
+                sigma = (north**2, 0.0, east**2)
+            self._track(key, _origin(*place)).add_place(float(t[k]), place, (*sigma, quality))
 
     def _track(self, key: str, origin: tuple[float, float, float]) -> TrackLine:
         return self._tracks.setdefault(key, TrackLine(key, origin))
@@ -230,9 +239,27 @@ def _means(binner: Binner, names: tuple[str, ...], n: int) -> Line:
     return Line(line.key, line.mean, line.mean, line.mean, names)
 
 
+def _sight(read: Samples) -> NDArray[np.uint8] | None:
+    """What an estimator says of each component (n, 3); None where it never says it."""
+    said = read.fields.get("sight")
+    if said is None or said.shape[1] != 3:
+        return None
+    return np.where((read.lengths["sight"] == 3)[:, None], said, 0).astype(np.uint8)
+
+
 def _origin(latitude: float, longitude: float, height: float) -> tuple[float, float, float]:
     """Where a track counts from, at height 0 where its first point has none."""
     return latitude, longitude, height if np.isfinite(height) else 0.0
+
+
+def _placed(read: Samples) -> NDArray[np.bool_]:
+    """Where a navigation filter has a place (n,): before its first fix old ones say 0 with a sigma
+    of 10,000 km.
+    """
+    sigma = read.fields["sigma"]
+    if sigma.shape[1] < 8:
+        return np.ones(len(sigma), dtype=bool)
+    return ~(np.hypot(sigma[:, 6], sigma[:, 7]) > NO_PLACE_M)
 
 
 def _dark(key: str, lines: dict[str, Line]) -> NDArray[np.bool_] | None:

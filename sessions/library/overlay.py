@@ -3,6 +3,7 @@ here, at the last.
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ Array = NDArray[np.floating[Any]]
 POINTS = 1200  # per line, two for each bin of the window
 TRACK_POINTS = 1500
 DEG = float(np.degrees(1.0))
+SIGHTS = {1: "ambiguous", 2: "blind"}  # RateEstimate.Sight
 PROCEDURE = "procedure"  # author of what a procedure says in a recording
 
 
@@ -51,7 +53,9 @@ def drawing(
         "span": list(span),
         "start_utc_s": found.sessions[0].curves.start_utc_ns * 1e-9,
         "window": [begin, end],
-        "sessions": [_session(one) for one in found.sessions],
+        "sessions": [
+            _session(one) | {"shades": _shades(one, (begin, end), points)} for one in found.sessions
+        ],
         "lines": [line for line in lines if line["rate"] or line["error"]],
         "tracks": _tracks(found),
         "own": _own(found, own, (begin, end), points, cursors),
@@ -126,6 +130,28 @@ def _session(one: Overlaid) -> dict[str, Any]:
         "whole": all(line.low is line.mean for line in one.curves.lines.values()),
         "marks": [_mark(mark, one.offset_s) for mark in one.curves.marks],
     }
+
+
+def _shades(one: Overlaid, window: tuple[float, float], points: int) -> dict[str, Any]:
+    """Where the leading line does not vouch for x, y, z: [from, until, word] of each."""
+    line = one.curves.lines.get(one.lead)
+    if line is None or line.sight is None:
+        return {}
+    inside = (window[0] - one.offset_s, window[1] - one.offset_s)
+    _, step, first, last, every = _grid(len(line.sight), one.curves.bin_s, inside, points // 2 or 1)
+    sight = line.sight[first:last]
+    sight = np.pad(sight, ((0, -len(sight) % every), (0, 0)))
+    worst = sight.reshape(-1, every, 3).max(axis=1)
+    begin = first * one.curves.bin_s + one.offset_s
+    found = {}
+    for k, name in enumerate("xyz"):
+        edges = np.flatnonzero(np.diff(worst[:, k], prepend=0, append=0))
+        found[name] = [
+            [round(begin + a * step, 4), round(begin + b * step, 4), SIGHTS[int(worst[a, k])]]
+            for a, b in pairwise(edges.tolist())
+            if int(worst[a, k]) in SIGHTS
+        ]
+    return found
 
 
 def _mark(mark: Mark, offset_s: float) -> dict[str, Any]:

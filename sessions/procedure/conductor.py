@@ -4,23 +4,21 @@ any.
 """
 
 import logging
-import threading
 import time
 from collections.abc import Callable
 
-from sessions.procedure.model import DEG, Step
+from sessions.procedure.driven.description import TableError
+from sessions.procedure.driven.drive import Drive
+from sessions.procedure.driven.table import RateTable
+from sessions.procedure.model import Step
 from sessions.procedure.run import ABORTED, DONE, HELD, RUNNING, STOPPED, Journal
 from sessions.procedure.seen import Line, Samples, Seen, TableSays
-from sessions.procedure.table import RateTable, TableError
 from sessions.procedure.watch import State, Watch
 
 log = logging.getLogger(__name__)
 
 SILENT_S = 5.0  # s without a sample: a driven table is stopped
-ASK_S = 1.0  # s between two questions to the table
 PATIENCE_S = 20.0  # s beyond the ramp that a driven table may need to get there
-STANDS = 1.0 * DEG  # rad/s
-CLOSING_S = 30.0  # s that a table may need to stand
 
 Say = Callable[[str, int, float], None]  # remark, its moment by the data's clock, its length in s
 
@@ -37,20 +35,20 @@ class Conductor:
     ) -> None:
         """record(on): begin or end the recording of this run; what could not be done, or empty."""
         self.journal, self.run = journal, journal.run
-        self.table, self.table_rate, self._taken = table, 0.0, False
+        self.drive = Drive(table)
         self._say, self._record = say, record
         first = self.run.plan.steps[0]
         self.watch = Watch(first, 0.0, self.run.plan.vibration_max)
-        self._heard = self._asked = time.monotonic()
-        self._stopped = threading.Event()
-        self._driving = threading.Lock()
+        self._heard = time.monotonic()
         self._closing_since: float | None = None
 
     # --- orders
 
     def begin(self) -> None:
         """Take the table and go to the first step, or on with the one that was being done."""
-        problem = self._take_table()
+        problem = self.drive.take()
+        if self.run.emergency and not self.run.over:
+            self._end(STOPPED, "emergency stop, before the service was restarted")
         if self.run.over or self.run.state == HELD:
             return  # killed while it ended, or while a person was asked
         if problem:
@@ -62,21 +60,14 @@ class Conductor:
             self._say("the service was restarted: the step begins anew", 0, 0.0)
             self._go(self.run.at)
 
-    def _take_table(self) -> str:
-        """What is wrong with the table, or empty."""
-        if self.table is None or self._taken:
-            return ""
-        try:
-            self.table.take()
-        except TableError as error:
-            return str(error)
-        self._taken = True
-        return ""
-
     def next(self, by: str, text: str) -> str:
         """An open step is done, or a failed one is left out; empty, or why not."""
         step = self._step
+        if self.run.over:
+            return "the run has ended"
         if self.run.state == HELD:
+            if problem := self.drive.take():
+                return problem
             self.journal.add("skipped", k=self.run.at, by=by)
             self._go(self.run.at + 1)
             return ""
@@ -94,7 +85,7 @@ class Conductor:
         """Begin the present step anew; empty, or why not."""
         if self.run.over:
             return "the run has ended"
-        if problem := self._take_table():
+        if problem := self.drive.take():
             return problem
         self._say(f"step {self.run.at + 1} is repeated by {by or 'somebody'}", 0, 0.0)
         self._go(max(self.run.at, 0))
@@ -108,16 +99,16 @@ class Conductor:
         return ""
 
     def emergency(self) -> str:
-        """Stop the table at once, from any thread; what went wrong, or empty."""
-        self._stopped.set()
-        with self._driving:
-            try:
-                if self.table is not None:
-                    self.table.stop()
-            except TableError as error:
-                log.error("emergency stop: %s", error)
-                return f"THE TABLE DID NOT TAKE THE STOP, switch it off: {error}"
-        return ""
+        """Stop the table at once, from any thread, and never turn it again in this run, whatever
+        dies; what went wrong, or empty.
+        """
+        problem = self.drive.stop()
+        self.journal.add("emergency")
+        return problem
+
+    def abandon(self) -> None:
+        """Another process runs this now: command nothing any more, not even to stand."""
+        self.drive.abandon()
 
     def stopped(self, by: str) -> None:
         """After `emergency`: the run has ended."""
@@ -139,23 +130,25 @@ class Conductor:
     def tick(self) -> None:
         """A few times a second: ask the table, notice silence, close what has ended."""
         now = time.monotonic()
+        self.journal.save()
         if self.run.over:
             self._close(now)
             return
-        if self.table is not None and now - self._asked > ASK_S:
-            self._asked = now
-            try:
-                self.table_rate = self.table.rate()
-                self.watch.take(TableSays(self.table_rate))
-            except TableError as error:
-                if self.run.state == RUNNING:
-                    self._hold(str(error))
+        if self.journal.fault and self.run.state == RUNNING:
+            self._hold(f"what happens cannot be saved: {self.journal.fault}: make room")
+        try:
+            told = self.drive.ask(now)
+            if told is not None:
+                self.watch.take(TableSays(told))
+        except TableError as error:
+            if self.run.state == RUNNING:
+                self._hold(str(error))
         if self._watched and now - self._heard > SILENT_S and self.run.state == RUNNING:
             why = f"no samples for {now - self._heard:.0f} s"
             self.watch.take(Line(False, why))
             if self.watch.over:
                 self._judge()
-            elif self.table is not None and abs(self.table_rate) > STANDS:
+            elif self.drive.turns:
                 self._hold(f"{why}: the table is stopped")
 
     @property
@@ -189,24 +182,15 @@ class Conductor:
         self.journal.add("step", k=k)
         procedure, plan = self.run.plan.procedure, self.run.plan
         patience = float("inf")
-        if self.table is not None and step.kind in ("rate", "still"):
+        if self.drive.table is not None and step.kind in ("rate", "still"):
             patience = step.ramp_s + procedure.settle_s + PATIENCE_S
         before = self.watch
         self.watch = before.then(step, procedure.settle_s, plan.vibration_max, patience)
         target = step.target if step.kind == "rate" else 0.0
         try:
-            self._drive(target, step.ramp_s)
+            self.drive.turn(target, step.ramp_s)
         except TableError as error:
             self._hold(str(error))
-
-    def _drive(self, omega: float, ramp_s: float) -> None:
-        """Command the table, unless it was stopped meanwhile; raises TableError."""
-        with self._driving:
-            if self.table is None or self._stopped.is_set():
-                return
-            change = abs(omega - self.table_rate)
-            self.table.set_rate(omega, max(change / ramp_s, 5.0 * DEG) if ramp_s else None)
-            self.table_rate = omega
 
     def _judge(self) -> None:
         """What the watch came to."""
@@ -245,18 +229,12 @@ class Conductor:
             self.journal.add("step", k=0)
         self.journal.add("failed", k=k, reason=why)
         self._say(f"step {k + 1} is held: {why}", 0, 0.0)
-        try:
-            self._drive(0.0, 0.0)
-        except TableError as error:
-            log.error("the table did not take the order to stand: %s", error)
+        self.drive.stand()
 
     def _end(self, state: str, message: str) -> None:
         self.journal.add("end", state=state, message=message)
         self._say(f"procedure {self.run.plan.name}: {state} {message}".rstrip(), 0, 0.0)
-        try:
-            self._drive(0.0, 2.0)
-        except TableError as error:
-            log.error("the table did not take the order to stand: %s", error)
+        self.drive.stand(2.0)
 
     def _close(self, now: float) -> None:
         """Once the table stands, let it go, then end the recording."""
@@ -267,23 +245,12 @@ class Conductor:
             return  # one more status goes out, and into the recording
         if now - self._closing_since < 1.0:
             return
-        if self.table is not None and not self._let_go(now):
+        if not self.drive.let_go(now, self._closing_since) or self.journal.fault:
             return
         problem = self._record(False)
         if problem:
             log.error("%s", problem)
         self.journal.add("closed")
-
-    def _let_go(self, now: float) -> bool:
-        late = self._closing_since is not None and now - self._closing_since > CLOSING_S
-        try:
-            self.table_rate = self.table.rate()
-            if abs(self.table_rate) > STANDS and not late:
-                return False
-            self.table.release()
-        except TableError as error:
-            log.error("%s", error)
-        return True
 
 
 def _known(value: float) -> float | None:

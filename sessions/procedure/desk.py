@@ -12,6 +12,7 @@ from messages import text
 from messages.bus import orders
 from messages.contract import gyrofree_pb2 as pb
 from sessions.procedure import library
+from sessions.procedure.model import DEG
 from sessions.procedure.run import Journal
 from sessions.procedure.settings import ProcedureSettings
 
@@ -29,14 +30,21 @@ class ProcedureDesk:
         self._session, self._prefix = session, prefix
         self._settings, self._device = settings, device
 
-    def begin(self, command: pb.ProcedureCommand, life: int) -> Journal:
-        """A new run with its recording; raises ProcedureError, OrderError, OSError."""
+    def begin(self, command: pb.ProcedureCommand, limit: float) -> Journal:
+        """A new run with its recording, on a table that can turn at `limit`, rad/s; raises
+        ProcedureError, OrderError, OSError.
+        """
         for what, value in (("serial number", command.unit), ("operator", command.user)):
             if fault := text.check(value):
                 raise library.ProcedureError(f"{what}: {fault}")
         if not command.user.strip():
             raise library.ProcedureError("operator: it is not said who runs the test: sign in")
         plan = library.find(command.procedure, self._settings.folder)
+        fastest = max(plan.steps, key=lambda step: abs(step.target))
+        if abs(fastest.target) > limit:
+            raise library.ProcedureError(
+                f"{fastest.name}: the table can {limit / DEG:.4g} °/s: change the procedure"
+            )
         stamp = time.strftime("%Y%m%dT%H%M%S", time.gmtime())
         start = {
             "run": f"{stamp}-{time.time_ns() // 1000 % 1_000_000:06d}",

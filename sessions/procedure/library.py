@@ -1,6 +1,8 @@
 """Procedures by name: those that come with gyrofree, and those in a folder of the installation."""
 
 import difflib
+import functools
+import logging
 import re
 import tomllib
 from pathlib import Path
@@ -9,8 +11,11 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from inertial.toml_file import parsed, text_of
+from messages import text as texts
 from sessions.procedure import model
 from sessions.procedure.model import Plan, Procedure, plan_of
+
+log = logging.getLogger(__name__)
 
 TEMPLATES = Path(__file__).parent / "templates"
 LONGEST = 65536  # characters of a procedure's file
@@ -29,11 +34,23 @@ class ProcedureError(ValueError):
 
 
 def names(folder: Path | None = None) -> list[str]:
-    """What `find` knows, in order; a file of the folder hides a template of its name."""
+    """What `find` knows, in order; a file of the folder hides a template of its name. One whose
+    name cannot be shown is left out, and said in the log.
+    """
     found = {path.stem for path in TEMPLATES.glob("*.toml")}
-    if folder is not None and folder.is_dir():
-        found |= {path.stem for path in folder.glob("*.toml")}
+    own = sorted(folder.glob("*.toml")) if folder is not None and folder.is_dir() else []
+    for path in own:
+        fault = texts.check(path.stem) or ("" if path.is_file() else "it is no file")
+        if fault:
+            _say_once(f"{texts.plain(path)} is left out: {fault}")
+        else:
+            found.add(path.stem)
     return sorted(found)
+
+
+@functools.cache
+def _say_once(text: str) -> None:
+    log.warning("%s", text)
 
 
 def find(name: str, folder: Path | None = None) -> Plan:

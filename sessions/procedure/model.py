@@ -239,7 +239,7 @@ def plan_of(procedure: Procedure) -> tuple[Step, ...]:
                 found.append(_turn(step.name or f"{step.rate_dps:+g} °/s", step.rate_dps, step))
             case Staircase():
                 for k, level in enumerate(step.levels(), 1):
-                    where = f"{step.name or 'stair'} {k}: {level:+.4g} °/s"
+                    where = f"{step.name[:150] or 'stair'} {k}: {level:+.4g} °/s"
                     found.append(_turn(where, level, step))
             case Pose():
                 name = step.name or f"{step.up} up"

@@ -7,6 +7,7 @@ Every line is a JSON object with `e`, its kind. A line that a crash cut off is l
 import json
 import logging
 import os
+import threading
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -50,6 +51,7 @@ class Run:
     at: int = -1  # present step
     started_utc_ns: int = 0
     closed: bool = False
+    emergency: bool = False  # the table was stopped: it is not turned again
     message: str = ""
     steps: list[StepRecord] = field(default_factory=list)
 
@@ -88,15 +90,22 @@ class Run:
                 self.state, self.message = event["state"], event.get("message", "")
                 if step.state == "active":
                     step.state, step.reason = "failed", self.message
+            case "emergency":
+                self.emergency = True
             case "closed":
                 self.closed = True
 
 
 class Journal:
-    """The file of one run; `run` is what its events come to."""
+    """The file of one run; `run` is what its events come to.
+
+    What a full disk does not take is kept, in order, and tried again by `save`; `fault` says why.
+    """
 
     def __init__(self, path: Path, run: Run) -> None:
-        self.path, self.run = path, run
+        self.path, self.run, self.fault = path, run, ""
+        self._lock = threading.RLock()
+        self._unsaved = b""
 
     @classmethod
     def begin(cls, root: Path, start: dict[str, Any]) -> "Journal":
@@ -104,8 +113,12 @@ class Journal:
         folder = root / start["device"]
         folder.mkdir(parents=True, exist_ok=True)
         journal = cls(folder / f"{start['run']}.jsonl", _run_of(start))
-        journal._write({"e": "start"} | start)
-        _sync_folder(folder)
+        try:
+            journal._write(_line({"e": "start"} | start))
+            _sync_folder(folder)
+        except OSError:
+            journal.path.unlink(missing_ok=True)  # half a run would be taken for a damaged one
+            raise
         return journal
 
     @classmethod
@@ -136,17 +149,42 @@ class Journal:
         return cls(path, run)
 
     def add(self, kind: str, **more: Any) -> None:
-        """Something happened: on the disk first, then in the state. Raises OSError."""
+        """Something happened: on the disk first, then in the state. From any thread."""
         event = {"e": kind} | more
-        self._write(event)
-        self.run.apply(event)
+        with self._lock:
+            self._unsaved += _line(event)
+            self.save()
+            self.run.apply(event)
 
-    def _write(self, event: dict[str, Any]) -> None:
-        line = json.dumps(event, ensure_ascii=False, separators=(",", ":")).encode() + b"\n"
-        with self.path.open("ab") as file:
-            file.write(line)
-            file.flush()
-            os.fsync(file.fileno())
+    def save(self) -> None:
+        """What the disk did not take, once more."""
+        with self._lock:
+            if not self._unsaved:
+                return
+            try:
+                self._write(self._unsaved)
+            except OSError as error:
+                if not self.fault:
+                    log.error("%s: %s", self.path, error.strerror)
+                self.fault = error.strerror or str(error)
+            else:
+                self.fault, self._unsaved = "", b""
+
+    def _write(self, lines: bytes) -> None:
+        """All or nothing; raises OSError."""
+        with self.path.open("ab", buffering=0) as file:
+            before = os.fstat(file.fileno()).st_size
+            try:
+                while lines:
+                    lines = lines[file.write(lines) :]
+                os.fsync(file.fileno())
+            except OSError:
+                file.truncate(before)
+                raise
+
+
+def _line(event: dict[str, Any]) -> bytes:
+    return json.dumps(event, ensure_ascii=False, separators=(",", ":")).encode() + b"\n"
 
 
 def _run_of(start: dict[str, Any]) -> Run:

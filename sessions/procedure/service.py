@@ -3,6 +3,7 @@ over the bus; what happens is kept in [procedures] root, so that a killed servic
 """
 
 import logging
+import math
 import threading
 import time
 from collections import deque
@@ -10,21 +11,37 @@ from collections import deque
 import zenoh
 
 from messages.bus import orders
-from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client, subscribe
+from messages.bus.claiming import Claim
+from messages.bus.session import BusSettings, Publishers, subscribe
+from messages.bus.turns import in_turn, sessions
+from messages.clock import elapsed_ns
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import ACCEL, AXES, IMU, LINK, NOTE, PROCEDURE, RATE, TACHO, parse
+from messages.contract.topics import (
+    ACCEL,
+    AXES,
+    IMU,
+    LINK,
+    NOTE,
+    PROCEDURE,
+    PROCEDURES,
+    RATE,
+    TACHO,
+    parse,
+)
 from sessions.procedure import library, seen
 from sessions.procedure.conductor import Conductor
 from sessions.procedure.desk import ProcedureDesk
+from sessions.procedure.driven.description import TableError, described
+from sessions.procedure.driven.table import RateTable, TextTable
 from sessions.procedure.run import Journal, unfinished
 from sessions.procedure.settings import ProcedureSettings
 from sessions.procedure.status import status_of
-from sessions.procedure.table import RateTable, TableError, TextTable, described
 
 log = logging.getLogger(__name__)
 
 TICK_S = 0.05
 STATUS_S = 0.25
+STOPPED_NS = 2_000_000_000  # between two steps: this process did not run
 IDLE_S = 2.0
 DATA = (ACCEL, IMU, TACHO, RATE, AXES, LINK)
 WAITING = 20_000  # messages of a device; more are dropped, which the watch takes for lost data
@@ -50,11 +67,14 @@ class Tables(dict[str, RateTable]):
 class Service:
     """All conductors. Zenoh's threads only put things into queues, and stop tables."""
 
-    def __init__(self, settings: ProcedureSettings, session: zenoh.Session, prefix: str) -> None:
-        """Raises TableError."""
+    def __init__(
+        self, settings: ProcedureSettings, session: zenoh.Session, prefix: str, number: int = 0
+    ) -> None:
+        """number: of the claim. Raises TableError."""
         self._settings, self._session, self._prefix = settings, session, prefix
         self._tables = Tables(settings)
         self._publishers = Publishers(session, prefix)
+        self._publishers.number = number
         self._since = time.time_ns()
         self._devices: dict[str, float] = {}  # heard, and when its idle status is due
         self._conductors: dict[str, Conductor] = {}
@@ -140,7 +160,15 @@ class Service:
         self._links.undeclare()
         for device, conductor in self._conductors.items():
             self._silence(device)
-            conductor.emergency()
+            conductor.drive.stop()
+
+    def abandon(self) -> None:
+        """Another process has taken over: say nothing more, least of all to its tables."""
+        self._taking.undeclare()
+        self._links.undeclare()
+        for device, conductor in self._conductors.items():
+            self._silence(device)
+            conductor.abandon()
 
     def _obey(self, order: orders.Order[COMMAND, pb.Reply]) -> None:
         command, device = order.command, order.device
@@ -159,11 +187,15 @@ class Service:
         if command.action == COMMAND.ACTION_START:
             if conductor is not None:
                 return f"{conductor.run.plan.name} runs on {device}: end or abort it first"
-            journal = self._desk(device).begin(command, self._since)
+            limit = self._tables[device].limit if device in self._tables else math.inf
+            journal = self._desk(device).begin(command, limit)
             self._start(journal)
             return ""
         if conductor is None:
             return f"no procedure runs on {device}"
+        if command.action in (COMMAND.ACTION_NEXT, COMMAND.ACTION_REPEAT):
+            if problem := late(conductor, command):
+                return problem
         match command.action:
             case COMMAND.ACTION_NEXT:
                 return conductor.next(command.user, command.text)
@@ -231,19 +263,54 @@ class Service:
         self._publishers.put(PROCEDURE, device, message)
 
 
+def late(conductor: Conductor, command: COMMAND) -> str:
+    """Why an order comes too late: it was meant for what another has answered already."""
+    run = conductor.run
+    if command.run and command.run != run.id:
+        return "another test runs now: look at it first"
+    if command.step and command.step != run.at + 1:
+        return f"step {command.step} has been answered already; this is step {run.at + 1}"
+    return ""
+
+
 def run(settings: ProcedureSettings, bus: BusSettings, stop: threading.Event) -> None:
-    """Run procedures until `stop` is set. Raises TableError for a table's description."""
+    """Run procedures until `stop` is set; wait while another process does. Raises TableError for a
+    table's description.
+    """
+    Tables(settings)
+    with sessions(bus, stop) as mine:
+        if mine is not None:
+            in_turn(
+                mine,
+                bus.prefix,
+                PROCEDURES,
+                stop,
+                lambda claimed: _serve(settings, bus, mine.session, claimed, stop),
+                "procedures service",
+            )
+
+
+def _serve(
+    settings: ProcedureSettings,
+    bus: BusSettings,
+    session: zenoh.Session,
+    claimed: Claim,
+    stop: threading.Event,
+) -> None:
+    """Until `stop`, or until another has taken over: after a moment in which this process did not
+    run, nothing is commanded before it is known that none has.
+    """
+    service = Service(settings, session, bus.prefix, claimed.number)
     try:
-        session = open_client(bus, stop)
-    except BusUnavailable:
-        if stop.is_set():
-            return
-        raise
-    with session:
-        service = Service(settings, session, bus.prefix)
-        try:
-            service.resume()
-            while not stop.wait(TICK_S):
-                service.step()
-        finally:
+        service.resume()
+        last_ns = elapsed_ns()
+        while not (claimed.lost.is_set() or stop.wait(TICK_S)):
+            if elapsed_ns() - last_ns > STOPPED_NS and not claimed.look():
+                continue
+            service.step()
+            last_ns = elapsed_ns()
+    finally:
+        if claimed.lost.is_set():
+            service.abandon()
+        else:
             service.close()

@@ -51,8 +51,9 @@ def status_of(conductor: Conductor) -> pb.ProcedureStatus:
         instruction=_instruction(conductor),
         progress=watch.progress if run.state == RUNNING else 0.0,
         message=_message(conductor),
-        table=conductor.table.name if conductor.table is not None else "",
-        table_radps=conductor.table_rate,
+        table=conductor.drive.name,
+        table_radps=conductor.drive.rate,
+        alarm=conductor.drive.alarm,
         started_utc_ns=run.started_utc_ns,
         reference=sorted({step.reference for step in run.steps if step.reference}),
     )
@@ -104,6 +105,8 @@ def _number(value: float | None) -> float:
 
 def _message(conductor: Conductor) -> str:
     run, watch = conductor.run, conductor.watch
+    if fault := conductor.journal.fault:
+        return f"what happens cannot be saved: {fault}: make room on the disk"
     if run.state == RUNNING:
         if conductor.silent_s > SILENT_S:
             return f"no samples for {conductor.silent_s:.0f} s: does the board send?"
@@ -127,8 +130,8 @@ def _instruction(conductor: Conductor) -> str:
         return step.instruction + (f"; then give {step.ask}" if step.ask else "; then confirm")
     if watch.state is State.DWELL:
         left = step.dwell_s * (1.0 - watch.progress)
-        return f"{_keep(step, conductor.table is not None)}: {left:.0f} s to go"
-    return asked(step, conductor.table is not None)
+        return f"{_keep(step, bool(conductor.drive.name))}: {left:.0f} s to go"
+    return asked(step, bool(conductor.drive.name))
 
 
 def _keep(step: Step, driven: bool) -> str:

@@ -14,7 +14,7 @@ from enum import Enum
 import numpy as np
 
 from inertial.constants import GRAVITY, MILLI_G
-from sessions.procedure.evidence import Evidence, Reference
+from sessions.procedure.evidence import TABLE_FRESH, Evidence, Reference
 from sessions.procedure.live import Live
 from sessions.procedure.model import DEG, Step
 from sessions.procedure.seen import Axes, Line, Pulse, Samples, Seen, TableSays, Turned
@@ -204,7 +204,16 @@ class Watch:
             return f"{said} standstill"
         wanted = f"{said} {target / DEG:+.1f} ± {self.step.tolerance / DEG:g}"
         other_way = abs(omega + target) <= self.step.tolerance and found.signed
-        return wanted + (": the other way round" if other_way else "")
+        return wanted + (": the other way round" if other_way else self._table_differs(found))
+
+    def _table_differs(self, found: Reference) -> str:
+        """A table that takes itself for right: its unit or sign may be described wrongly."""
+        said = self.evidence.table
+        if found.source == "table" or said is None or self.now - said[0] > TABLE_FRESH:
+            return ""
+        if abs(said[1] - self.step.target) > self.step.tolerance:
+            return ""
+        return f"; the table says {said[1] / DEG:+.1f}: look at unit and sign in its description"
 
     def _not_posed(self, t: float) -> str:
         if self.reference is not None and abs(self.reference.omega) > 2.0 * DEG:

@@ -65,7 +65,7 @@ class Recorder:
         self._fresh = True
         self._clock = SessionClock()
         self._bytes_in = self._bytes_out = 0  # of the inbox: counted each by one thread
-        self._door = self._new_door()
+        self._door = Door("recorder", most_devices=self.settings.max_devices)
         self.fence = Fence(lambda *refusal: self._door.refuse(*refusal))
         self._intake = Intake(bus.prefix, None, 0, self._door)
         self._overflow = 0
@@ -75,6 +75,11 @@ class Recorder:
         self._message = ""  # of the last start or stop that did not work
         self._retry_at: float | None = 0.0 if settings.auto_start else None
         self._last = pb.RecorderStatus()  # of the last session, for the time after it
+
+    @property
+    def recording(self) -> bool:
+        """Is there a session?"""
+        return self._store is not None
 
     def on_sample(self, sample: zenoh.Sample) -> None:
         """Zenoh's thread: note the receive time and leave."""
@@ -115,6 +120,11 @@ class Recorder:
             name=manifest.id[16:48], note=manifest.note, user=manifest.user, continues=manifest.id
         ):
             self._intake.resume(manifest)
+
+    def take_over(self, session: str) -> None:
+        """Begin a session where another recorder, which is gone, was recording that one."""
+        log.info("going on where %s ended: its recorder is gone", plain(session))
+        self._begin(name=slug(session[16:48]), continues=plain(session))
 
     def step(self) -> None:
         """Write what came in, answer orders, close a chunk when it is time."""
@@ -162,15 +172,9 @@ class Recorder:
             failure = Refusal("failure", "message", type(error).__name__, "to be recorded")
             self._door.refuse(key, failure, device_of(key))
 
-    def _new_door(self) -> Door:
-        return Door("recorder", most_devices=self.settings.max_devices)
-
     def _auto_start(self) -> None:
-        if (
-            self._store is None
-            and self._retry_at is not None
-            and time.monotonic() >= self._retry_at
-        ):
+        due = self._retry_at is not None and time.monotonic() >= self._retry_at
+        if self._store is None and due:
             self._begin(name=self.settings.name)
 
     def _begin(
@@ -203,7 +207,7 @@ class Recorder:
             return False
         self._message, self._retry_at = "", None
         if self._fresh:  # a file that only goes on keeps what is known of the streams
-            self._door = self._new_door()
+            self._door = Door("recorder", most_devices=self.settings.max_devices)
             self._intake = Intake(
                 self.bus.prefix,
                 self._ask,
@@ -302,7 +306,7 @@ class Recorder:
         """The state of now."""
         status = pb.RecorderStatus()
         status.CopyFrom(self._describe(self._store) if self._store else self._last)
-        status.recording = self._store is not None
+        status.recording = self.recording
         status.header.device = RECORDER
         status.header.utc_ns = self._clock.now_ns()
         status.message = (self._store.error if self._store else "") or self._message
@@ -313,9 +317,8 @@ class Recorder:
         return status
 
     def _describe(self, store: SessionStore) -> pb.RecorderStatus:
-        manifest = store.manifest
         return pb.RecorderStatus(
-            session=manifest.id,
+            session=store.manifest.id,
             seconds=store.seconds,
             messages=store.messages,
             bytes=store.size,

@@ -5,8 +5,13 @@ import threading
 import time
 from pathlib import Path
 
+import zenoh
+
 from messages.bus import orders
-from messages.bus.session import BusSettings, BusUnavailable, Publishers, open_client
+from messages.bus.claiming import Claim
+from messages.bus.session import BusSettings, Publishers, subscribe
+from messages.bus.turns import in_turn, sessions
+from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import RECORDER, STATUS
 from messages.history.answers import Asker
 from sessions.library.catalogue import Catalogue
@@ -32,46 +37,80 @@ def run(
     """Record until `stop` is set; then the running session is closed.
 
     `configuration` goes into session.json of every session. A router that is not there yet is
-    waited for.
+    waited for. While another recorder serves, this one waits; it takes over what was recorded.
     """
-    try:
-        session = open_client(bus, stop)
-    except BusUnavailable:
-        if stop.is_set():
+    with sessions(bus, stop) as mine:
+        if mine is None:
             return
-        raise
-    with session:
-        publishers = Publishers(session, bus.prefix)
-        asker = Asker(
-            session, bus.prefix, lambda question, reply: recorder.on_answer(question, reply)
-        )
-        recorder = Recorder(
-            settings, bus, configuration, lambda q: asker.ask(q, *q.stream, q.query)
-        )
-        samples = session.declare_subscriber(f"{bus.prefix}/**", recorder.on_sample)
-        control = orders.take(session, bus.prefix, orders.RECORDER, recorder.on_order)
-        fence = recorder.fence.declare(session, bus.prefix)
-        _go_on(recorder, settings.root)
-        # the session that begins now has its session.json before recovery looks at the folders
-        recorder.step()
-        # Beside the recording, not before it: a large file takes a minute, and what runs is locked
-        # against recovery.
-        # When the process ends first, the session stays open and the next start does it.
-        threading.Thread(target=_tend, args=(settings,), name="recovery", daemon=True).start()
-        next_status = 0.0
-        try:
-            while not stop.is_set():
-                recorder.step()
-                if time.monotonic() >= next_status:
-                    next_status = time.monotonic() + STATUS_S
-                    publishers.put(STATUS, RECORDER, recorder.status())
-                recorder.wake.wait(DRAIN_S)
-        finally:
-            samples.undeclare()
-            control.undeclare()
-            fence.undeclare()
-            recorder.close()
-            asker.close()
+        status = _Heard()
+        listening = subscribe(mine.session, STATUS, bus.prefix, status.take, RECORDER)
+
+        def serve(claimed: Claim) -> None:
+            _serve(settings, bus, configuration, mine.session, claimed, status.of_another, stop)
+            status.forget()
+
+        in_turn(mine, bus.prefix, STATUS.source, stop, serve)
+        listening.undeclare()
+
+
+class _Heard:
+    """What another recorder last said."""
+
+    def __init__(self) -> None:
+        self.of_another = pb.RecorderStatus()
+
+    def take(self, _: str, status: pb.RecorderStatus) -> None:
+        """Zenoh's thread."""
+        self.of_another.CopyFrom(status)
+
+    def forget(self) -> None:
+        """It was ourselves."""
+        self.of_another.Clear()
+
+
+def _serve(
+    settings: RecorderSettings,
+    bus: BusSettings,
+    configuration: dict[str, object] | None,
+    session: zenoh.Session,
+    claimed: Claim,
+    before: pb.RecorderStatus,
+    stop: threading.Event,
+) -> None:
+    """Record until `stop`, or until another recorder has taken over; go on with what the one
+    `before` recorded when it was gone.
+    """
+    publishers = Publishers(session, bus.prefix)
+    publishers.number = claimed.number
+    recorder = Recorder(settings, bus, configuration, lambda q: asker.ask(q, *q.stream, q.query))
+    asker = Asker(session, bus.prefix, recorder.on_answer, recorder.fence)
+    samples = session.declare_subscriber(f"{bus.prefix}/**", recorder.on_sample)
+    control = orders.take(session, bus.prefix, orders.RECORDER, recorder.on_order)
+    fence = recorder.fence.declare(session, bus.prefix)
+    if not _go_on(recorder, settings.root) and before.recording:
+        recorder.take_over(before.session)
+    # the session that begins now has its session.json before recovery looks at the folders
+    recorder.step()
+    # Beside the recording, not before it: a large file takes a minute, and what runs is locked
+    # against recovery.
+    # When the process ends first, the session stays open and the next start does it.
+    threading.Thread(target=_tend, args=(settings,), name="recovery", daemon=True).start()
+    next_status, said = 0.0, None
+    try:
+        while not (stop.is_set() or claimed.lost.is_set()):
+            recorder.step()
+            # at once where it begins or ends: who takes over goes on by what was heard last
+            if time.monotonic() >= next_status or recorder.recording != said:
+                next_status, said = time.monotonic() + STATUS_S, recorder.recording
+                publishers.put(STATUS, RECORDER, recorder.status())
+            recorder.wake.wait(DRAIN_S)
+    finally:
+        samples.undeclare()
+        control.undeclare()
+        fence.undeclare()
+        recorder.close()
+        asker.close()
+        if not claimed.lost.is_set():
             publishers.put(STATUS, RECORDER, recorder.status())
 
 
@@ -83,18 +122,19 @@ def _tend(settings: RecorderSettings) -> None:
         retain(Catalogue(settings.root), rule)
 
 
-def _go_on(recorder: Recorder, root: Path) -> None:
+def _go_on(recorder: Recorder, root: Path) -> bool:
     """Recover the session that a crash cut off a moment ago, and go on with it; older ones are not
-    gone on with.
+    gone on with. False: there is none.
     """
     folder = cut_off(root, RESUME_S, RESUME_BYTES)
     if folder is None:
-        return
+        return False
     recorder.listen()  # a recovery takes a second: what comes meanwhile belongs to the next session
     try:
         manifest = recover_session(folder)
     except (SessionError, OSError) as error:
         log.error("recovery: %s", error)
-        return
+        return False
     if manifest is not None:
         recorder.resume(manifest)
+    return manifest is not None

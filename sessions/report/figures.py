@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from logs.figures.colours import COLOURS
@@ -59,6 +60,11 @@ def pictures(found: Analysis) -> list[Picture]:
     return drawn
 
 
+def _legend(ax: Axes, ncols: int = 4, **look: float) -> None:
+    """Above the axes: to look for the emptiest place takes minutes where curves are long."""
+    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.3, ncols=ncols, **look)
+
+
 def _png(figure: Figure) -> bytes:
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None})
@@ -91,7 +97,7 @@ def _p(figure: Figure, found: Analysis) -> bool:
     ax = _axes(figure, "specific force of the centre, m/s²")
     for k, name in enumerate("xyz"):
         ax.plot(found.cube.t, found.cube.p_b[:, k], label=f"p$_{name}$", linewidth=0.7)
-    ax.legend(ncols=3)
+    _legend(ax)
     return True
 
 
@@ -128,7 +134,7 @@ def _omega(figure: Figure, found: Analysis) -> bool:
         ax.plot(
             t, np.degrees(omega), color=REFERENCE, linestyle="--", linewidth=0.8, label="tachometer"
         )
-    ax.legend()
+    _legend(ax)
     return True
 
 
@@ -147,7 +153,7 @@ def _angle(figure: Figure, found: Analysis) -> bool:
             linestyle="--",
             label="tachometer",
         )
-    ax.legend()
+    _legend(ax)
     return True
 
 
@@ -159,7 +165,7 @@ def _position(figure: Figure, found: Analysis) -> bool:
     for rate in moving:
         distance = np.linalg.norm(rate.p_n, axis=1)
         ax.semilogy(rate.t, np.where(distance > 1e-4, distance, np.nan), **_look(rate.name))
-    ax.legend()
+    _legend(ax)
     return True
 
 
@@ -185,7 +191,7 @@ def _plateau_errors(figure: Figure, found: Analysis) -> bool:
     ax.set_yscale("symlog", linthresh=1.0)
     ax.set_xlabel(f"reference, {RATE_UNIT}")
     ax.set_ylabel(f"mean error, {RATE_UNIT}")
-    ax.legend()
+    _legend(ax)
     return True
 
 
@@ -201,7 +207,7 @@ def _allan(figure: Figure, found: Analysis) -> bool:
     ax.loglog(first.tau, white, "k:", linewidth=0.8, label="slope −1/2")
     ax.set_xlabel("averaging time τ, s")
     ax.set_ylabel("Allan deviation, m/s²")
-    ax.legend(ncols=4, fontsize=6.5)
+    _legend(ax, ncols=6, fontsize=6.5)
     return True
 
 
@@ -220,7 +226,7 @@ def _nis(figure: Figure, found: Analysis) -> bool:
         ax.plot(t[at][: len(smooth)] + 0.5 * (t[at][width - 1] - t[at][0]), smooth, **_look(name))
     ax.axhline(1.0, color="#555555", linestyle="--", linewidth=0.8)
     ax.set_yscale("log")
-    ax.legend()
+    _legend(ax)
     return True
 
 
@@ -235,7 +241,7 @@ def _track(figure: Figure, found: Analysis) -> bool:
     ax.set_aspect("equal", adjustable="datalim")
     ax.set_xlabel("east, m")
     ax.set_ylabel("north, m")
-    ax.legend()
+    _legend(ax)
     return True
 
 

@@ -42,7 +42,7 @@ def main() -> int:
             message = convert.gnss_fix(arrival.fix)
             message.device_time_s = max(0.0, arrival.device_time_s)
             wrong += check(message) != [] or not math.isfinite(arrival.device_time_s)
-            convert.location_fix(message, "cube")
+            wrong += bool(message.quality and check(convert.location_fix(message, "cube")))
             fixes += 1
         if k == options.messages // 10:
             early = _megabytes()

@@ -37,7 +37,7 @@ from messages.bus.session import BusSettings, Publishers, open_client, open_rout
 from messages.contract.topics import ESTIMATES, GATEWAY  # noqa: E402
 from messages.history.answers import declare  # noqa: E402
 from messages.history.spool import Spool  # noqa: E402
-from tests.system.test_browser import CHROMIUM, FLAGS  # noqa: E402
+from tests.support.browser import CHROMIUM, FLAGS  # noqa: E402
 
 DT, DEVICE = 0.01, "cube-01"
 PATIENCE_S = 60.0

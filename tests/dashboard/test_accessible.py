@@ -8,9 +8,10 @@ import threading
 from types import SimpleNamespace
 
 import pytest
-from playwright.sync_api import expect, sync_playwright
+from playwright.sync_api import expect
+from support.browser import visit as opened
 from support.feeder import UTC0_NS, Feeder
-from support.front_door import open_door
+from support.front_door import open_door, wait_for
 
 from dashboard.data.store import Store
 from dashboard.desk import Desk
@@ -22,9 +23,6 @@ from messages.contract import topics as tp
 axe_of = pytest.importorskip("axe_playwright_python.sync_playwright")
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
 
-PATIENCE = 60_000  # ms
-CHROMIUM = "/usr/bin/chromium"
-FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 SIZES = {"desk": (1440, 900), "tablet": (1024, 768), "narrow": (768, 1024), "phone": (390, 844)}
 # elements that hide a part of their own text; those that scroll are meant to
 CLIPPED = """() => [...document.querySelectorAll('body *')].filter((e) => {
@@ -94,32 +92,14 @@ def door(tmp_path_factory):
         handle.stop()
 
 
-@pytest.fixture(scope="module")
-def chromium():
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield browser
-        browser.close()
-
-
 @contextlib.contextmanager
 def visit(chromium, door, user="otto", size="desk", scheme="dark", path="/"):
-    """The live page of a person, its scene there; what its console complained of."""
+    """The live page of a person, its tabs there; what its console complained of."""
     width, height = SIZES[size]
-    context = chromium.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
-    with door.client(user) as client:
-        cookies = [{"name": k, "value": v, "url": door.url} for k, v in client.cookies.items()]
-    context.add_cookies(cookies)
-    page, said = context.new_page(), []
-    page.set_default_timeout(PATIENCE)
-    page.on("console", lambda message: message.type == "error" and said.append(message.text))
-    page.on("pageerror", lambda error: said.append(error.stack))
-    try:
-        page.goto(door.url + path)
+    viewport = {"width": width, "height": height}
+    with opened(chromium, door, user, path, viewport, color_scheme=scheme) as (page, said):
         page.locator("#rooms [aria-selected=true]").wait_for()
         yield page, said
-    finally:
-        context.close()
 
 
 def scene_of(page):
@@ -165,6 +145,7 @@ def test_no_page_of_the_scene_has_a_serious_finding_or_clipped_text(chromium, do
                 seen.add(key)
                 turn_to(page, key)
                 found = serious(scene, rules) + [page.evaluate(CLIPPED), scene.evaluate(CLIPPED)]
+                found.append("</" in scene.evaluate("document.body.innerText"))  # tags as text
                 wrong |= {(device, key): found} if any(found) else {}
         assert not wrong
         assert not said
@@ -249,7 +230,12 @@ def test_an_alarm_is_in_every_workspace_and_leads_to_its_page(chromium, door):
         for key in ("1", "3", "4", "5"):
             page.keyboard.press(key)
             expect(alarm).to_be_visible()
+        expect(alarm.locator("abbr", has_text="stuck")).to_have_attribute(
+            "title", re.compile("same value")
+        )
         alarm.click()
+        expect(page.locator("#pages [aria-selected=true]")).to_have_text("Health")
+        page.wait_for_timeout(3000)  # what the link asked for is not asked for again
         expect(page.locator("#pages [aria-selected=true]")).to_have_text("Health")
 
 
@@ -263,3 +249,43 @@ def test_a_viewer_sees_what_he_may_not_and_why(chromium, door):
         expect(scene.get_by_role("button", name="Start sampling")).to_be_disabled()
         page.locator("#pause").click()
         expect(page.locator("#paused")).to_be_visible()
+
+
+CHARTS = """() => Object.values(window.__viserTestpoints?.uplots ?? {}).map(({ chart }) =>
+  [chart.scales.x.min, chart.scales.x.max, ...chart.data.slice(0, 2).map((d) => [...d])])"""
+
+
+def test_a_zoom_stays_while_data_come_in_until_one_follows_again(chromium, door):
+    path = "/?p=rates&device=cube-01&window=10&layers=grid"
+    with visit(chromium, door, path=path) as (page, said):
+        scene = scene_of(page)
+        scene.wait_for_function(f"() => ({CHARTS})().some(([a, b]) => b - a > 1)")
+        scene.wait_for_selector(".uplot .gf-tools")  # until then it is uPlot that is dragged
+        chart = scene.locator(".uplot .u-over").first
+        box = chart.bounding_box()
+        y = box["y"] + box["height"] / 2
+        page.mouse.move(box["x"] + 0.3 * box["width"], y)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 0.6 * box["width"], y, steps=4)
+        page.mouse.up()
+        expect(page.locator("#zoomed")).to_contain_text("data keep coming in")
+        zoom = page.evaluate("new URLSearchParams(location.search).get('zoom')")
+        a, b = map(float, zoom.split("_"))
+        device, utc0 = door.front.store.devices["cube-01"], UTC0_NS * 1e-9
+
+        def is_zoomed():
+            """The first chart shows the stretch of the link, from end to end."""
+            low, high, x, _ = scene.evaluate(CHARTS)[0]
+            near = 0.01 * (b - a)  # points stand at quarters of their buckets
+            ends = abs(low - (a - utc0)) < near and abs(high - (b - utc0)) < near
+            return ends and (low, high) == (x[0], x[-1])
+
+        wait_for(is_zoomed, "the stretch")
+        before, newest = scene.evaluate(CHARTS), device.t_newest
+        wait_for(lambda: device.t_newest > newest + 2.0, "new data")
+        page.wait_for_timeout(1500)  # three more updates of the charts
+        assert scene.evaluate(CHARTS) == before
+        page.locator("#zoomed button").click()
+        expect(page.locator("#zoomed")).to_be_hidden()
+        wait_for(lambda: scene.evaluate(CHARTS)[0][1] > newest + 1.0, "the newest data")
+        assert not said

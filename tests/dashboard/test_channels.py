@@ -99,9 +99,9 @@ def test_the_page_draws_every_line_that_is_right_and_says_what_is_wrong_with_the
         page.update(snapshot(store, []))
         assert "omega_z" in page._top.content and not page._charts
         page.update(snapshot(store, [LINE, "omga_z <i>", "a1_x * 2 [g]"]))
-        drawn = {key: chart._title for key, chart in page._charts.items()}
+        drawn = {key: chart.name.title for key, chart in page._charts.items()}
         assert drawn == {"derived0": LINE, "derived2": "a1_x * 2"}
-        assert page._charts["derived2"]._unit == "g"
+        assert page._charts["derived2"].name.unit == "g"
         assert "&lt;i&gt;" in page._top.content and "<i>" not in page._top.content
         spectrum = Spectrum(SimpleNamespace(gui=server.gui), server.gui.add_folder("spectrum"))
         spectrum.update(snapshot(store, [LINE]))

@@ -1,16 +1,18 @@
 """Charts of the sessions' pages in real Chromium: drawn, zoomed, gaps left open, both themes."""
 
+import contextlib
 import shutil
 
 import pytest
-from playwright.sync_api import expect, sync_playwright
-from support.front_door import PASSWORDS, open_door
+from playwright.sync_api import expect
+from support.browser import DESKTOP, PHONE
+from support.browser import visit as opened
+from support.front_door import open_door
 from support.table_session import SESSION, table_root
 
 from sessions.library.annotations import SessionNote, add_note
 from sessions.recording.mcap_log import read
 from sessions.replay.rerun import write_session
-from tests.system.test_browser import CHROMIUM, DESKTOP, FLAGS, PHONE
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
 
@@ -53,40 +55,23 @@ def door(tmp_path_factory):
         door.front.readings.close()
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
-
-
 @pytest.fixture
-def visit(browser, door):
+def visit(chromium, door):
     """Open a page signed in; at the end nothing may have complained, the content policy neither."""
-    contexts, complaints = [], []
+    with contextlib.ExitStack() as stack:
+        heard = []
 
-    def open_page(path, viewport=DESKTOP, scheme="dark", **options):
-        context = browser.new_context(viewport=viewport, color_scheme=scheme, **options)
-        contexts.append(context)
-        page = context.new_page()
-        page.set_default_timeout(60_000)
-        page.on("console", lambda m: m.type == "error" and complaints.append(m.text))
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.goto(f"{door.url}/login")
-        page.fill("input[name=username], input[name=name]", "otto")
-        page.fill("input[name=password]", PASSWORDS["otto"])
-        page.click("main button")
-        page.wait_for_load_state()
-        page.goto(door.url + path)
-        page.wait_for_selector("body[data-plotted=done]")
-        page.wait_for_selector("figure[data-plot='rate z'] .u-over")
-        return page
+        def open_page(path, viewport=DESKTOP, scheme="dark", **options):
+            page, said = stack.enter_context(
+                opened(chromium, door, "otto", path, viewport, color_scheme=scheme, **options)
+            )
+            heard.append(said)
+            page.wait_for_selector("body[data-plotted=done]")
+            page.wait_for_selector("figure[data-plot='rate z'] .u-over")
+            return page
 
-    yield open_page
-    for context in contexts:
-        context.close()
-    assert not complaints
+        yield open_page
+        assert not any(heard), heard
 
 
 def plot(page, name):

@@ -72,9 +72,39 @@ def test_two_sessions_come_aligned_with_few_points_and_their_notes(door):
         assert by_hand["span"] == pytest.approx([-1.5, 29.99], abs=0.02)
         part = drawn(client, ids=SESSION, begin=10.0, end=12.0, everything=True)
         assert part["window"] == [10.0, 12.0] and len(part["lines"]) == 3
+        shades = drawn(client, ids=SESSION)["sessions"][0]["shades"]
+        assert set(shades) == set("xyz") and {word for *_, word in shades["z"]} <= {
+            "blind",
+            "ambiguous",
+        }
+        assert all(0.0 <= a < b <= 30.02 for parts in shades.values() for a, b, _ in parts)
+        assert sum(b - a for a, b, _ in shades["z"]) < sum(b - a for a, b, _ in shades["x"]) + 30.0
         page = client.get("/compare", params={"ids": f"{SESSION},{OTHER}"}).text
         assert f"/sessions/{OTHER}" in page and "compare.js" in page
     assert curves.state(door.settings.sessions_root / SESSION / "recording.mcap") == "fresh"
+
+
+def test_any_curve_of_a_stretch_has_a_spectrum_or_says_why_not(door):
+    with door.client("vera") as client:
+        drawn(client, ids=SESSION)
+        path = f"/api/sessions/{SESSION}/spectrum"
+        names = [
+            one["name"]
+            for one in client.get(f"/api/sessions/{SESSION}/channels").json()["channels"]
+        ]
+        for curve in ("omega_z", "a1_x", "omega_z - omega_x * 2"):
+            assert curve in names or " " in curve
+            answer = client.get(path, params={"curve": curve, "begin": 3, "end": 14})
+            told = answer.json()
+            assert answer.status_code == 200, told
+            assert "1100 values without a hole, 11 s at 100 Hz" in told["said"], told["said"]
+            f, level = told["density"]["x"], told["density"]["y"]
+            assert len(f) == len(level) > 50 and f[-1] == pytest.approx(50.0, rel=0.01)
+            assert min(level) > 0.0 and told["allan"]["random_walk"] > 0.0
+        short = client.get(path, params={"curve": "omega_z", "begin": 3, "end": 4}).json()
+        assert short["density"] is None and "200 are needed" in short["said"]
+        assert client.get(path, params={"curve": "no_such"}).status_code == 409
+        assert client.get(path, params={"curve": "__import__('os')"}).status_code == 409
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import httpx
 import pytest
 from support.front_door import message, open_door, wait_for
 
+from dashboard.web import connections
 from dashboard.web.connections import trusted
 
 HEAD = b"GET /login HTTP/1.1\r\nHost: 127.0.0.1\r\n"
@@ -124,6 +125,41 @@ def test_what_asks_nothing_is_ended_and_what_works_is_not(tmp_path):
             # a scene that only looks on is no idle connection
             scene.send(message("ViewerCameraMessage"))
             assert scene.recv(timeout=20.0)
+
+
+def test_who_takes_nothing_of_an_answer_is_ended_and_who_takes_little_is_not(tmp_path, monkeypatch):
+    """Real sockets with small buffers, a file of a MB; memory that waits for them is the kernel's
+    and little. Half a kB at a time is enough to stay.
+    """
+    monkeypatch.setattr(connections, "LEAST_TAKEN", 64)
+    ask = b"GET /static/vendor/maplibre/maplibre-gl.mjs HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+    with open_door(tmp_path, take_s=3.0) as door, contextlib.ExitStack() as stack:
+        links = []
+        for _ in range(12):
+            link = stack.enter_context(socket.socket())
+            link.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            link.settimeout(10.0)
+            link.connect(("127.0.0.1", door.settings.port))
+            link.sendall(ask)
+            links.append(link)
+        slow, silent = links[:2], links[2:]
+
+        def ended() -> bool:
+            for link in slow:
+                link.settimeout(0.0)
+                with contextlib.suppress(BlockingIOError):
+                    assert link.recv(2048), "it was ended, and took what it could"
+            return door.front.ended["took nothing"] == len(silent)
+
+        wait_for(ended, "the end of all that take nothing")
+        for link in silent:
+            with pytest.raises(ConnectionResetError):
+                while link.recv(65536):
+                    pass
+        end = time.monotonic() + 2 * door.settings.take_s
+        while time.monotonic() < end:
+            time.sleep(0.02)
+            assert ended()
 
 
 def test_a_connection_that_goes_on_asking_is_not_idle(tmp_path):

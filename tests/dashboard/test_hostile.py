@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 import viser
-from playwright.sync_api import sync_playwright
+from support.browser import KNOWN, visit
 from support.feeder import Feeder
 from support.front_door import open_door
 from support.hostile import HOSTILE
@@ -27,7 +27,6 @@ from sessions.library.annotations import Annotations, SessionNote
 from sessions.recording.manifest import Manifest, write_manifest
 from tests.dashboard.test_health import health
 from tests.dashboard.test_scene import Direct
-from tests.system.test_browser import CHROMIUM, FLAGS, KNOWN
 
 OURS = set(
     "p b i em small sub span div table tr td svg g defs clippath polyline polygon path text rect"
@@ -196,30 +195,6 @@ def test_the_scene_page_lets_no_other_script_run():
 
 
 # --- in a real browser
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield browser
-        browser.close()
-
-
-@contextlib.contextmanager
-def visit(chromium, door, user: str):
-    """A page of that browser, signed in; what its console said, and the policy's refusals."""
-    context = chromium.new_context(viewport={"width": 1200, "height": 800})
-    with door.client(user) as client:
-        cookies = [{"name": k, "value": v, "url": door.url} for k, v in client.cookies.items()]
-    context.add_cookies(cookies)
-    page, said = context.new_page(), []
-    page.on("console", lambda message: message.type == "error" and said.append(message.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
-    try:
-        yield page, said
-    finally:
-        context.close()
 
 
 ATTACK = """() => {

@@ -16,8 +16,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
-from playwright.sync_api import expect, sync_playwright
+from playwright.sync_api import expect
 from support import tiles
+from support.browser import visit
 from support.feeder import ORIGIN, Feeder
 from support.front_door import open_door, wait_for
 
@@ -27,13 +28,14 @@ from dashboard.data.whereabouts import Known, ellipse, whereabouts
 from dashboard.desk import Desk
 from dashboard.scene.service import OWN_INPUTS, start
 from dashboard.web.map.archive import ArchiveError, open_archive
+from dashboard.web.map.recorded import ways_of
 from inertial.earth import ned_between, place_from_ned
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
+from sessions.library.curves import Curves
+from sessions.library.curves import Track as RecordedTrack
 
-CHROMIUM = "/usr/bin/chromium"
 MAP = "/?w=navigate&p=map&device=car-01"
-SWIFTSHADER = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 GROUND = (18, 20, 22)  # of the page, dark
 VENDOR = Path(dashboard.__file__).parent / "web" / "static" / "vendor"
 
@@ -181,6 +183,20 @@ def test_the_ellipse_is_oriented_as_the_covariance(a, b, bearing):
         assert abs(off) < 1e-4 * longer / (longer - shorter)
 
 
+def test_a_recorded_way_has_the_accuracy_and_quality_that_were_said():
+    points = np.column_stack([np.arange(4.0), 10.0 * np.arange(4.0), np.zeros(4), np.zeros(4)])
+    told = np.array([[np.nan] * 3 + [4.0], [4.0, 0, 1, 4], [1, 0, 9, 3], [-1, 0, 1, 99]])
+    place = (math.radians(ORIGIN[0]), math.radians(ORIGIN[1]), ORIGIN[2])
+    track = RecordedTrack("car/gnss", points, place, told)
+    [way] = ways_of(Curves("a", 0, 3.0, 1.0, tracks={track.key: track}))
+    assert way["ellipse"][0] is None and way["ellipse"][3] is None
+    assert way["ellipse"][1] == pytest.approx([4.0, 2.0, 0.0])
+    assert way["ellipse"][2] == pytest.approx([6.0, 2.0, math.pi / 2], rel=1e-3)
+    words = [pb.GnssFix.Quality.Name(int(k)) for k in told[:3, 3]]
+    assert [f"QUALITY_{one.upper().replace(' ', '_')}" for one in way["quality"][:3]] == words
+    assert way["quality"][3] == "none"
+
+
 @pytest.mark.parametrize("wrong", [np.full((2, 2), np.nan), np.zeros((2, 2)), -np.eye(2)])
 def test_what_is_no_covariance_is_no_ellipse(wrong):
     assert ellipse(wrong) is None
@@ -246,12 +262,6 @@ def test_what_is_not_known_says_why():
 # --- in a real browser
 
 
-@pytest.fixture(scope="module")
-def chromium():
-    with sync_playwright() as playwright:
-        yield playwright.chromium
-
-
 @contextlib.contextmanager
 def live(folder, path):
     """A live page that a car goes on driving for."""
@@ -279,27 +289,6 @@ def live(folder, path):
         handle.stop()
 
 
-def opened(chromium, door, flags):
-    """The map's page, what its console complained of, and who was asked besides us."""
-    browser = chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", *flags])
-    context = browser.new_context(viewport={"width": 1440, "height": 900}, color_scheme="dark")
-    with door.client("otto") as client:
-        cookies = [{"name": k, "value": v, "url": door.url} for k, v in client.cookies.items()]
-    context.add_cookies(cookies)
-    page, said, others = context.new_page(), [], []
-    page.set_default_timeout(90_000)
-    page.on("console", lambda m: m.type == "error" and said.append(m.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
-    page.on(
-        "request",
-        lambda r: (
-            r.url.startswith(("http", "ws")) and door.url not in r.url and others.append(r.url)
-        ),
-    )
-    page.goto(door.url + MAP)
-    return browser, page, said, others
-
-
 def serious(page, where):
     """What axe-core finds that counts."""
     axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
@@ -317,6 +306,9 @@ def colour_at(page, x, y):
     return shot
 
 
+NO_WEBGL = """const asked = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+  return kind.startsWith('webgl') ? null : asked.call(this, kind, ...more); };"""
 DRAWN = """() => { const c = document.querySelector('.map-canvas'), seen = new Set();
   const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
   for (let k = 0; k < d.length; k += 4) if (d[k + 3] > 250) seen.add(d.slice(k, k + 3).join());
@@ -328,23 +320,36 @@ DRAWN = """() => { const c = document.querySelector('.map-canvas'), seen = new S
 def test_the_map_in_a_browser_with_vector_tiles_raster_tiles_and_none(tmp_path, chromium):
     """One visit: nobody else is asked, nothing is against the policy, axe finds nothing."""
     path = tiles.vector(tmp_path / "lab.pmtiles")
-    with live(tmp_path, path) as door:
-        browser, page, said, others = opened(chromium, door, SWIFTSHADER)
-        try:
-            _vector(page)
-            tiles.raster(path, (200, 40, 40))
-            page.goto(door.url + MAP)
-            page.locator("#map[data-tiles=raster]").wait_for()
-            wait_for(lambda: (at := colour_at(page, 30, 400))[0] > at[1] + 60, "raster tiles")
-            path.unlink()
-            page.goto(door.url + MAP)
-            page.locator(".map-note", has_text="is not there").wait_for()
-            wait_for(lambda: "50,150,216" in page.evaluate(DRAWN), "a way on the grid")
-            loaded = page.evaluate("performance.getEntriesByType('resource').map((r) => r.name)")
-            assert not any("maplibre" in name for name in loaded)
-        finally:
-            browser.close()
+    with live(tmp_path, path) as door, visit(chromium, door) as (page, said):
+        others = []
+        page.on("request", lambda r: elsewhere(r.url, door) and others.append(r.url))
+        page.goto(door.url + MAP)
+        _vector(page)
+        tiles.raster(path, (200, 40, 40))
+        page.goto(door.url + MAP)
+        page.locator("#map[data-tiles=raster]").wait_for()
+        wait_for(lambda: (at := colour_at(page, 30, 400))[0] > at[1] + 60, "raster tiles")
+        path.unlink()
+        page.goto(door.url + MAP)
+        page.locator(".map-note", has_text="is not there").wait_for()
+        wait_for(lambda: "50,150,216" in page.evaluate(DRAWN), "a way on the grid")
+        loaded = page.evaluate("performance.getEntriesByType('resource').map((r) => r.name)")
+        assert not any("maplibre" in name for name in loaded)
+        # without WebGL there is no scene: the page says why, and the way is drawn all the same
+        page.add_init_script(NO_WEBGL)
+        page.goto(door.url + "/")
+        expect(page.locator("#plain")).to_contain_text("This browser has no WebGL")
+        expect(page.locator("#plain dl")).to_contain_text("speed, km/h")
+        expect(page.locator("#pages [aria-selected=true]")).to_have_text("Map")
+        page.locator(".map-canvas").wait_for()
+        wait_for(lambda: "50,150,216" in page.evaluate(DRAWN), "a way without WebGL")
+        assert not serious(page, "#stage")
         assert not others and not said
+
+
+def elsewhere(url, door):
+    """Does that ask anybody else?"""
+    return url.startswith(("http", "ws")) and door.url not in url
 
 
 def _vector(page):

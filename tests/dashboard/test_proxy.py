@@ -334,6 +334,9 @@ def test_text_that_is_none_ends_the_connection_with_one_line(door: Door, caplog)
             assert len(lines) == (1, 2, 2, 3)[k]  # the 1st, 2nd, 4th
         assert not any(record.exc_info for record in caplog.records)
         assert "(4 so far)" in lines[-1].message
+        with door.client("anna") as admin:
+            assert '<td data-label="Why">text is not UTF-8</td>' in admin.get("/users").text
+        assert door.front.ended["text is not UTF-8"] == 4
         other.send(message("ViewerCameraMessage", **CAMERA))
         assert isinstance(other.recv(timeout=20.0), bytes)
 

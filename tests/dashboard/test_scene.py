@@ -23,7 +23,7 @@ from dashboard.data.track import Track
 from dashboard.desk import Desk
 from dashboard.scene.drawing import camera, series
 from dashboard.scene.drawing import geometry as geo
-from dashboard.scene.drawing.chart import Curve, _data
+from dashboard.scene.drawing.drawn import Curve, _data
 from dashboard.scene.drawing.palette import estimator_colour, number
 from dashboard.scene.panels import PAGES, Snapshot
 from dashboard.scene.panels.base import Panel
@@ -377,7 +377,7 @@ class Seen(Panel):
     """Mixed into a page: keeps what would be drawn instead of drawing it."""
 
     def show(self, key, title, unit, curves, s, **options) -> None:
-        self.drawn[key] = (unit, list(curves))
+        self.drawn[key] = (unit, list(curves() if callable(curves) else curves))
 
     def html(self, content, handle):
         self.text = content

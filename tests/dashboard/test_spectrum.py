@@ -10,7 +10,8 @@ from support.feeder import Feeder
 
 from dashboard.data.store import Store
 from dashboard.scene.panels import Snapshot
-from dashboard.scene.panels.motion.spectrum import Spectrum, _scales, density, unbroken
+from dashboard.scene.panels.motion.spectrum import Spectrum, _scales
+from logs.figures.spectrum import density, unbroken
 
 PERIOD = 0.01
 

@@ -230,7 +230,7 @@ def test_nothing_valid_on_the_line_ends_the_decoder_or_grows_in_it():
             message = convert.gnss_fix(arrival.fix)
             message.device_time_s = max(0.0, arrival.device_time_s)
             assert check(message) == [] and math.isfinite(arrival.device_time_s)
-            convert.location_fix(message, "cube")
+            assert not message.quality or check(convert.location_fix(message, "cube")) == []
             seen += 1
         if k == 2000:
             tracemalloc.start()

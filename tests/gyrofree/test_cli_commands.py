@@ -2,6 +2,7 @@
 
 import json
 import logging
+import math
 
 import pytest
 from support.command_tree import commands
@@ -64,6 +65,19 @@ def test_every_command_with_a_result_speaks_json():
         name for name, c in COMMANDS.items() if not any("--json" in p.opts for p in c.params)
     }
     assert without == SERVICES | ORDERS
+
+
+def test_every_number_that_is_taken_has_two_ends():
+    """So neither inf nor nan nor a number that takes all memory gets further than the parser."""
+    for name, command in COMMANDS.items():
+        for parameter in command.params:
+            annotation = str(parameter.type_descriptor.annotation)
+            if "float" in annotation or "int" in annotation:
+                ends = parameter.min, parameter.max
+                assert None not in ends and all(map(math.isfinite, ends)), (name, parameter.name)
+    for value in ("nan", "inf", "-inf", "1e999"):
+        result = gyrofree("calibrate", "plan", f"--seconds={value}")
+        assert result.exit_code == 2 and "--seconds" in result.stderr, result.output
 
 
 WRONG = (

@@ -4,6 +4,7 @@ anew by the axes that stay.
 
 import numpy as np
 import pytest
+from support import wrong_axes
 
 from inertial.layouts.catalogue import CUBE
 from inertial.rate import sight
@@ -99,6 +100,17 @@ def test_single_samples_far_off_cost_no_truth(name, seed):
     sigma = np.sqrt(np.einsum("kii->ki", said.P))
     valid = said.sight == sight.VALID
     assert ((np.abs(said.omega_b - omega) > 5.0 * sigma) & valid).sum() <= 0.001 * valid.sum()
+
+
+@pytest.mark.parametrize("profile", ["published", "wobble"])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_readings_rounded_to_more_than_their_noise_are_no_stuck_axes(profile, seed):
+    """16 g at ten bits: 31 mg, and noise of 4 mg."""
+    run = wrong_axes.followed(wrong_axes.CASES["rounded to 31 mg"](profile, seed))
+    assert not run.masks.any()
+    assert run.valid.mean() > 0.7
+    ratio = (run.error / run.sigma)[run.valid]
+    assert np.mean(np.abs(ratio) > 5.0) < 0.005 and np.mean(ratio**2) < 3.0
 
 
 def test_where_many_axes_do_not_fit_none_is_believed():

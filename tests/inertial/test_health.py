@@ -146,12 +146,14 @@ def test_counters_equal_their_twin():
             row = maker.gather(f, row, 4, near, marks, noise, limit, free, count)
             marks[axis_samples.FILLED] = 0
             ratio = maker.measured_noise(near, marks, free)
-            seen.append((row, near.copy(), marks.copy(), count.copy(), ratio))
+            rounded = maker.resolution(near, 1e-4 * noise), maker.resolution(near, noise)
+            seen.append((row, near.copy(), marks.copy(), count.copy(), ratio, rounded))
             near[axis_samples.SUM] = 0.0
         found.append(seen)
     for mine, theirs in zip(*found, strict=True):
         for a, b in zip(mine, theirs, strict=True):
             np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-12)
+    assert found[0][-1][5] == (pytest.approx(1e-3), 0.0)
     assert found[0][-1][4] == 1.0 or found[0][-1][4] > 1.25
     assert found[0][-1][3][axis_samples.SPIKES].max() >= 0 and len(found[0]) == 100
 

@@ -25,7 +25,13 @@ def judged(case, profile, seed):
     return np.mean(np.abs(ratio) > 5.0), np.mean(ratio**2), run.valid.mean()
 
 
-LESS_EXACT = ("imperfect device", "position 2 mm", "scale 5 %")
+LESS_EXACT = (
+    "imperfect device",
+    "position 2 mm",
+    "scale 5 %",
+    "all scales 1.1",
+    "all scales 0.9",
+)
 ONE_AXIS = ("scale 1.2",)
 
 
@@ -42,7 +48,7 @@ def test_axes_of_a_wrong_scale_direction_or_place_widen_sigma(case, profile):
 @pytest.mark.parametrize("case, most", [("scale 0.7", 0.002), ("swap", 0.006), ("triads", 0.05)])
 def test_while_axes_mislead_nothing_is_valid(case, most, profile):
     """Innovations that no error of 2 % explains, and a monitor that has not found out yet (E-91,
-    H-14). It was 11 % with one axis times 0.7, 6 % with two exchanged, 32 % with six.
+    H-15). It was 11 % with one axis times 0.7, 6 % with two exchanged, 32 % with six.
     """
     assert np.mean([judged(case, profile, seed)[0] for seed in SEEDS]) < most
 

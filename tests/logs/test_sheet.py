@@ -195,3 +195,99 @@ def test_a_refused_log_ends_the_process_in_peace(tmp_path):
     for _ in range(5):  # it went wrong in two of nine
         done = subprocess.run([sys.executable, "-c", code, log], capture_output=True, text=True)
         assert done.returncode == 0 and "does not rise" in done.stdout, done.stderr
+
+
+# --- how other programs head their tables
+
+
+@st.composite
+def headed(draw):
+    """One table of inertial samples, and the bytes of one way to head it."""
+    rows = draw(st.lists(st.tuples(numbers, numbers, numbers), min_size=1, max_size=4))
+    separator = draw(st.sampled_from([",", ";", "\t", "|"]))
+    heads = draw(
+        st.sampled_from(
+            [
+                (("t_s", "fx_mps2", "wz_radps"), None),
+                (("T_S", "FX_MPS2", "WZ_RADPS"), None),
+                (("t s", "fx mps2", "wz radps"), None),
+                (("Time (s)", "fx [m/s^2]", "wz (rad/s)"), None),
+                (("time [sec]", "FX (m/s\u00b2)", "Wz [rad/s]"), None),
+                (("Timestamp", "fx", "wz"), ("s", "m/s2", "rad/s")),
+                (("t", "Fx", "WZ"), ("[s]", "[m/s^2]", "(rad/s)")),
+                (("t_s", "fx_mps2", "wz_radps"), ("s", "m/s/s", "rad/s")),
+            ]
+        )
+    )
+    ends = draw(
+        st.sampled_from([("", ""), (separator, separator), ("", separator), (separator, "")])
+    )
+    newline = draw(st.sampled_from(["\n", "\r\n", "\r"]))
+    lines = [f"sep={separator}"] if draw(st.booleans()) else []
+    for k, row in enumerate([part for part in heads if part] + rows):
+        texts = [cell if isinstance(cell, str) else f"{cell:.6f}" for cell in row]
+        lines.append(separator.join(texts) + ends[bool(k)])
+    lines += [""] * draw(st.integers(0, 3))
+    return np.array(rows), (newline.join(lines) + newline).encode()
+
+
+@settings(max_examples=200)
+@given(headed())
+def test_the_same_columns_however_they_are_headed(tmp_path_factory, pair):
+    rows, data = pair
+    path = tmp_path_factory.mktemp("sheet") / "log.csv"
+    path.write_bytes(data)
+    names = ("t_s", "fx_mps2", "wz_radps")
+    got = read(path, names)
+    np.testing.assert_array_equal(np.column_stack([got[name] for name in names]), rows)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "apart"),
+    [
+        ("2024-06-14T12:00:00.000Z", "2024-06-14T12:00:00.010Z", 0.010),
+        ("2024-06-14T14:00:00+02:00", "2024-06-14T14:00:01+02:00", 1.0),
+        ("2024-06-14 12:00:00.25", "2024-06-14 12:00:00.5", 0.25),
+        ("2024-06-14T12:00:00", "2024-06-15T12:00:00", 86400.0),
+    ],
+)
+@pytest.mark.parametrize("name", ["t_s", "time", "Timestamp", "t"])
+def test_a_date_is_a_time(tmp_path, first, second, apart, name):
+    path = tmp_path / "log.csv"
+    path.write_text(f"{name},a\n{first},1\n{second},2\n")
+    t = read(path)["t_s"]
+    assert t[0] // 1 == 1718366400 and t[1] - t[0] == pytest.approx(apart, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("t_s,a\n2024-06-14T12:00:00Z,1\n12.5,2\n", ":3: column 't_s': '12.5'"),
+        ("t_s,a\nms,-\n1,2\n", ":2: column 't_s' is in 'ms'"),
+        ('t_s,a\n0,1\n1,"1,234"\n', "thousands"),
+        ("t_s;a\n0;1\n1;1.234,5\n", "thousands"),
+        ("t_s,a,a\n0,1,2\n", "column 'a' stands there twice"),
+        ("time (ms),a\n0,1\n", "column 't_s' is missing, found time (ms), a"),
+        ("time (furlongs),a\n0,1\n", "column 't_s' is missing"),
+    ],
+)
+def test_what_two_readings_has_is_not_guessed(tmp_path, text, said):
+    path = tmp_path / "log.csv"
+    path.write_text(text)
+    with pytest.raises(LogError) as caught:
+        read(path)
+    assert said in str(caught.value)
+
+
+def test_columns_that_nobody_asks_for_may_stand_twice(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("t_s,a,note,note\n0,1,x,y\n1,2,x,y\n")
+    assert len(read(path)) == 2
+
+
+@pytest.mark.parametrize("last", ["2,3.25e-", "2,3.2.", "2", "2024-", "-"])
+def test_a_log_that_ends_within_a_row_keeps_the_rows_before_it(tmp_path, last):
+    path = tmp_path / "log.csv"
+    path.write_text(f"t_s,a\n0,1\n1,2\n{last}")
+    table = read(path)
+    assert len(table) == 2 and table.cut_off

@@ -112,6 +112,7 @@ def test_estimates_may_say_that_nothing_is_known():
     assert checks.check(pb.NavSolution(p_ned_m=[1.0, 2.0, math.nan], height_m=math.nan)) == []
     assert checks.check(pb.GnssFix(height_m=math.nan, v_n_mps=[1.0, 2.0, math.nan])) == []
     assert checks.check(pb.GnssFix(v_n_mps=[1.0, 2e5, math.nan])) != []
+    assert checks.check(pb.NavSolution(latitude_deg=math.nan, longitude_deg=math.nan)) == []
     (wrong,) = checks.check(pb.NavSolution(p_ned_m=[math.inf] * 3))
     assert wrong.field == "p_ned_m[0]"
 

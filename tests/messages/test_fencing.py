@@ -1,5 +1,6 @@
 """Whose number is believed: real sessions over a real router."""
 
+import contextlib
 import functools
 import os
 import signal
@@ -7,29 +8,36 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import zenoh
 from support.stack import free_port
 
-from messages.bus import fencing
-from messages.bus.fencing import FAR_NS, Claim, Fence, alive, claim, heard_of, packed
+from messages.bus import claiming
+from messages.bus.claiming import FAR_NS, Claim, Claimant, alive, claim
+from messages.bus.fencing import Fence, heard_of, packed
 from messages.bus.session import BusSettings, connected, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import GATEWAY
+from messages.contract.topics import GATEWAY, claim_key
 from messages.history import answers
 from messages.history.answers import ask, together
 
-KEY, BASE = "t/cube/accel", "t/cube/gateway"
+KEY, BASE = "t/cube/accel", claim_key("t", GATEWAY, "cube")
 HOUR_NS = 3600 * 10**9
 
 
 @pytest.fixture
-def bus():
+def settings():
     endpoint = f"tcp/127.0.0.1:{free_port()}"
-    settings = BusSettings(prefix="t", router=endpoint, listen=[endpoint])
+    return BusSettings(prefix="t", router=endpoint, listen=[endpoint])
+
+
+@pytest.fixture
+def bus(settings):
     with open_router(settings), open_client(settings) as a, open_client(settings) as b:
-        yield a, b
+        with open_client(settings) as onlooker:
+            yield Claimant(a, onlooker), Claimant(b, onlooker)
 
 
 class Listener:
@@ -50,9 +58,9 @@ class Listener:
 
 
 def test_a_number_that_nobody_claimed_silences_nobody(bus):
-    session, other = bus
-    listener, number = Listener(other), time.time_ns()
-    serving = Claim(session, [BASE], number)
+    mine, other = bus
+    listener, number = Listener(other.session), time.time_ns()
+    serving = Claim(mine, [BASE], number)
     listener.knows(number)
     assert listener.hears(number)
     for forged in (number + 1, number + HOUR_NS, number + FAR_NS, 2**63, 2**64 - 1):
@@ -64,16 +72,16 @@ def test_a_number_that_nobody_claimed_silences_nobody(bus):
 
 
 def test_a_number_forged_before_anybody_serves_is_outdone(bus):
-    session, other = bus
-    listener, number = Listener(other), time.time_ns()
+    mine, other = bus
+    listener, number = Listener(other.session), time.time_ns()
     assert listener.hears(number + 10 * HOUR_NS)
     made = claim(
-        session,
+        mine,
         [BASE],
         number,
         threading.Event(),
         lambda other: None,
-        lambda: heard_of(session, "t", "cube", GATEWAY),
+        lambda: heard_of(mine.session, "t", "cube", GATEWAY),
     )
     assert made.number == number + 10 * HOUR_NS + 1
     listener.knows(made.number)
@@ -101,20 +109,21 @@ def test_nobody_is_taken_for_gone_while_the_router_does_not_answer(monkeypatch):
     try:
         assert router.stdout.readline() == b"ready\n"
         settings = BusSettings(prefix="t", router=endpoint, listen=[], lease_ms=500)
-        with open_client(settings) as session, open_client(settings) as other:
+        clients = [open_client(settings) for _ in range(3)]
+        with clients[0] as session, clients[1] as onlooker, clients[2] as other:
             own = session.liveliness().declare_token(f"{BASE}/waiting-one")
-            look = functools.partial(alive, session, [BASE], "waiting-one")
+            look = functools.partial(alive, onlooker, [BASE], "waiting-one")
             with other.liveliness().declare_token(f"{BASE}/1-other"):
-                while look() != [(1, "other")]:
+                while look() is None or look().serving != [(1, "other")]:
                     time.sleep(0.01)
                 router.send_signal(signal.SIGSTOP)
                 os.waitpid(router.pid, os.WUNTRACED)  # until it has stopped
-                while connected(session):  # also at the moment when the connection is given up
+                while connected(onlooker):  # also at the moment when the connection is given up
                     assert look() is None
                 assert look() is None
-            monkeypatch.setattr(fencing, "RETRY_S", 0.01)
+            monkeypatch.setattr(claiming, "RETRY_S", 0.01)
             stop, ended = threading.Event(), []
-            args = session, [BASE], time.time_ns(), stop, ended.append
+            args = Claimant(session, onlooker), [BASE], time.time_ns(), stop, ended.append
             waiting = threading.Thread(target=lambda: ended.append(claim(*args)))
             waiting.start()
             waiting.join(2.5)
@@ -124,7 +133,7 @@ def test_nobody_is_taken_for_gone_while_the_router_does_not_answer(monkeypatch):
             assert ended[0].number == args[2]
             router.kill()
             router.wait()
-            while session.info.routers_zid():
+            while connected(onlooker):
                 time.sleep(0.01)
             assert look() is None and not ended[0].look()
             assert not ended[0].lost.is_set()
@@ -135,9 +144,9 @@ def test_nobody_is_taken_for_gone_while_the_router_does_not_answer(monkeypatch):
 
 
 def test_one_that_claims_more_takes_over_and_when_it_is_gone_the_other_is_heard_again(bus):
-    session, other = bus
-    listener, number = Listener(other), time.time_ns()
-    serving = Claim(session, [BASE], number)
+    mine, other = bus
+    listener, number = Listener(other.session), time.time_ns()
+    serving = Claim(mine, [BASE], number)
     serving.watch()
     foreign = Claim(other, [BASE], number + HOUR_NS)
     listener.knows(number, number + HOUR_NS)
@@ -152,9 +161,9 @@ def test_one_that_claims_more_takes_over_and_when_it_is_gone_the_other_is_heard_
 
 
 def test_a_claim_is_raised_to_the_number_of_its_messages(bus):
-    session, other = bus
-    listener, number = Listener(other), time.time_ns()
-    serving = Claim(session, [BASE], number)
+    mine, other = bus
+    listener, number = Listener(other.session), time.time_ns()
+    serving = Claim(mine, [BASE], number)
     serving.watch()
     serving.raise_to(number + 5)
     listener.knows(number + 5)
@@ -162,6 +171,52 @@ def test_a_claim_is_raised_to_the_number_of_its_messages(bus):
     assert listener.hears(number + 5) and not listener.hears(number)
     listener.declared.undeclare()
     serving.release()
+
+
+def test_who_watches_and_publishes_can_still_ask_who_is_there(bus):
+    """A session answers a query partly itself, with what it has heard as a subscriber: a gateway
+    that was stopped for a second never published again.
+    """
+    mine, other = bus
+    number = time.time_ns()
+    serving = Claim(mine, [BASE], number)
+    serving.watch()
+    listener = Listener(mine.session)
+    assert all(serving.look() for _ in range(20))
+    foreign = Claim(other, [BASE], number + 1)
+    assert not serving.look() and serving.lost.is_set()
+    listener.declared.undeclare()
+    foreign.release()
+    serving.release()
+
+
+def test_of_many_that_start_in_one_moment_one_serves_and_the_others_never_did(
+    bus, settings, monkeypatch
+):
+    """In every round all begin at once; who is refused waits, and is next when the one has gone."""
+    monkeypatch.setattr(claiming, "RETRY_S", 0.02)
+    served, refused, serving = [], [], []
+    start = threading.Barrier(6)
+
+    def begin(k: int, mine: Claimant) -> None:
+        start.wait()
+        got = claim(mine, [BASE], time.time_ns(), threading.Event(), lambda _: refused.append(k))
+        serving.append(got)
+        assert len(serving) == 1 and not got.lost.is_set()
+        served.append(k)
+        time.sleep(0.05)
+        serving.remove(got)
+        got.release()
+
+    with contextlib.ExitStack() as stack:
+        all_of_them = [
+            Claimant(stack.enter_context(open_client(settings)), bus[0].onlooker) for _ in range(6)
+        ]
+        with ThreadPoolExecutor(6) as pool:
+            for done in [pool.submit(begin, k, one) for k, one in enumerate(all_of_them)]:
+                done.result()
+    assert len(set(served)) == 6 and not serving
+    assert served[0] not in refused and len(set(refused)) == len(refused) > 0
 
 
 def reply_of(run: int, *sequences: int) -> pb.HistoryReply:
@@ -182,14 +237,14 @@ def test_of_two_answers_the_older_processs_messages_come_first():
 
 
 def test_answers_without_end_are_read_up_to_a_limit(bus, monkeypatch, caplog):
-    session, other = bus
+    mine, other = bus
 
     def flood(query: zenoh.Query) -> None:
         for k in range(200):
             query.reply("t/cube/published/gateway", reply_of(7, k + 1).SerializeToString())
 
-    lying = other.declare_queryable("t/cube/published/gateway", flood)
-    while (found := ask(session, "t", "cube", GATEWAY, pb.HistoryQuery())) is None:
+    lying = other.session.declare_queryable("t/cube/published/gateway", flood)
+    while (found := ask(mine.session, "t", "cube", GATEWAY, pb.HistoryQuery())) is None:
         time.sleep(0.01)
     assert len(found.items) == answers.MOST_REPLIES
     assert "the rest is left out" in caplog.text

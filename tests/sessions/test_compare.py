@@ -125,6 +125,10 @@ def test_curves_are_the_recordings_and_kept_until_it_changes(root, tmp_path):
     again = kept.load(mine)
     for key, one in made.lines.items():
         assert np.array_equal(again.lines[key].mean, one.mean, equal_nan=True)
+    said = np.array([m.sight[2] if m.sight else 0 for m in sent], dtype=np.uint8)
+    # some bins hold two samples
+    assert said.any() and np.mean(line.sight[:, 2] != said[: len(line.sight)]) < 0.02
+    assert np.array_equal(again.lines[line.key].sight, line.sight)
     with mine.open("ab") as stream:
         stream.write(b"x")
     assert kept.state(mine) == "stale" and kept.load(mine) is None
@@ -259,12 +263,16 @@ def test_tracks_are_compared_from_one_origin_and_drawn(tmp_path):
             )
             north = n * 0.5 - np.radians(shift_deg) * 6_366_000.0
             nav.p_ned_m.extend((north, 3.0 + east_m, 0.0))
+            if n >= 50:
+                nav.position_covariance.extend((4.0, 0.5, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0, 9.0))
             yield nav.header.utc_ns, NAV.key("gyrofree", "car", "kf"), nav.SerializeToString()
 
     one = write_session(tmp_path, "20010909-014640-a", drive(0.0, 0.0), "", {}) / "recording.mcap"
     two = (
         write_session(tmp_path, "20010909-014640-b", drive(0.001, 0.25), "", {}) / "recording.mcap"
     )
+    told = build(one).tracks["car/nav/kf"].told
+    assert np.isnan(told[:50, :3]).all() and np.array_equal(told[50], (4.0, 0.5, 1.0, 0.0))
     found = compare([build(one), build(two)])
     (track,) = found.tracks
     north, east, down = track.rms_ned_m
@@ -275,6 +283,26 @@ def test_tracks_are_compared_from_one_origin_and_drawn(tmp_path):
         3.25, abs=0.01
     )
     assert draw(found, tmp_path / "tracks.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("place", [(0.0, -1.2e6, 0.0), ()])
+def test_a_filter_that_waits_for_its_first_fix_is_nowhere(tmp_path, place):
+    """Old ones said 0, 0 with a sigma of 10,000 km, those of today no place."""
+
+    def drive():
+        for n in range(60):
+            nav = pb.NavSolution(
+                header=pb.Header(device="car", sequence=n + 1, run=9, utc_ns=10**18 + n * 10**8),
+                origin_latitude_deg=48.0,
+                origin_longitude_deg=11.0,
+                sigma=[1.0] * 6 + [1e7 if n < 28 else 2.0] * 3 + [1.0] * 6,
+            )
+            nav.p_ned_m.extend(place if n < 28 else (n * 0.5, 3.0, 0.0))
+            yield nav.header.utc_ns, NAV.key("gyrofree", "car", "kf"), nav.SerializeToString()
+
+    folder = write_session(tmp_path, "20010909-014640-a", drive(), "", {})
+    (track,) = build(folder / "recording.mcap").tracks.values()
+    assert len(track.points) == 32 and np.abs(track.points[:, 1:]).max() < 40.0
 
 
 def test_the_picture_and_the_facts_of_a_comparison(pair, tmp_path):

@@ -7,22 +7,21 @@ import subprocess
 import sys
 import threading
 import time
-import tty
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.procedures import STILL, Answers, start
 
 from sessions.procedure import library
 from sessions.procedure.batch import COLUMNS, Cell, Unit, marked, remarks
-from sessions.procedure.left_alone import watch
+from sessions.procedure.driven.description import TableError, described
+from sessions.procedure.driven.left_alone import watch
+from sessions.procedure.driven.table import TextTable
 from sessions.procedure.library import ProcedureError, find, names, of_text
 from sessions.procedure.model import DEG
 from sessions.procedure.profile_file import profile_of
 from sessions.procedure.run import Journal, unfinished
-from sessions.procedure.table import TableError, TextTable, described
-
-STILL = 'title = "a"\n[[steps]]\nkind = "still"\nseconds = 1\n'
 
 
 @pytest.mark.parametrize("name", names())
@@ -64,11 +63,6 @@ def test_no_text_is_taken_or_refused_but_by_a_sentence(text, word):
             assert str(error)
 
 
-def start(**more) -> dict:
-    whole = {"run": "20260101T000000-1", "procedure": "x", "toml": STILL, "device": "cube"}
-    return whole | {"unit": "SN", "operator": "anna", "own_session": False} | more
-
-
 def test_a_journal_cut_off_anywhere_gives_what_was_written_before(tmp_path):
     journal = Journal.begin(tmp_path, start())
     journal.add("step", k=0)
@@ -84,30 +78,6 @@ def test_a_journal_cut_off_anywhere_gives_what_was_written_before(tmp_path):
         assert found.run.steps[0].spoilt == (0, 0, 1, 1)[lines]
         found.add("closed")  # goes on, on a line of its own
         assert unfinished(tmp_path) == {}
-
-
-class Answers:
-    """The other end of a serial line; `answer` makes the reply to each line."""
-
-    def __init__(self, answer) -> None:
-        self.fd, slave = os.openpty()
-        tty.setraw(slave)
-        self.path, self._keep, self.lines = os.ttyname(slave), slave, []
-        threading.Thread(target=self._serve, args=(answer,), daemon=True).start()
-
-    def _serve(self, answer) -> None:
-        said = b""
-        while True:
-            try:
-                said += os.read(self.fd, 100)
-            except OSError:
-                return
-            while b"\n" in said:
-                line, said = said.split(b"\n", 1)
-                self.lines.append(line.decode())
-                reply = answer(line.decode())
-                if reply is not None:
-                    os.write(self.fd, reply.encode() + b"\n")
 
 
 def test_a_table_is_spoken_to_in_its_own_words():
@@ -137,7 +107,8 @@ def test_a_table_is_spoken_to_in_its_own_words():
 
 DRIVER = """
 import sys, time
-from sessions.procedure.table import TextTable, described
+from sessions.procedure.driven.description import described
+from sessions.procedure.driven.table import TextTable
 table = TextTable(described("simulated"), sys.argv[1])
 table.take()
 table.set_rate(1.0)

@@ -275,12 +275,17 @@ def gather(
     """Take samples f[begin:] (n, N), m/s^2, until a block is full or there are no more; returns the
     next one's row.
 
-    near (6, N): the samples before the last but one, before the last, the last, and the sum of the
+    near (7, N): the samples before the last but one, before the last, the last, and the sum of the
     block, spikes removed; the usual distance from the middle of the neighbours; the running mean of
-    squared third differences that no motion explains, over the noise's. marks: how many of the
-    first three are known, samples in the block, in that mean. free (N, N): the projection.
+    squared third differences that no motion explains, over the noise's; the smallest change between
+    samples. marks: how many of the first three are known, samples in the block, in that mean.
+    free (N, N): the projection.
     """
     for k in range(begin, len(f)):
+        if marks[KNOWN] > 0:
+            change = np.abs(f[k] - near[2])
+            least = np.where(near[6] > 0.0, np.minimum(near[6], change), change)
+            near[6] = np.where(change > 0.0, least, near[6])
         clean = look(f[k], near[2], near[1], marks[KNOWN], noise, limit, count, near[4])
         if marks[KNOWN] == 3:
             hear(f[k] - 3.0 * clean + 3.0 * near[1] - near[0], near[5], marks, noise, free)
@@ -314,13 +319,32 @@ def measured_noise(near: Array, marks: Integers, free: Array) -> float:
     return 1.0 if ratio < 1.0 + 0.25 * np.sqrt(256.0 / marks[HEARD]) else ratio
 
 
-def flags(count: Integers, stuck: int, at_limit: int, spikes: int, out: NDArray[np.bool_]) -> bool:
+def resolution(near: Array, noise: Array) -> float:
+    """What readings are rounded to, where that hides their noise."""
+    changed = near[6] > 0.0
+    if 2 * np.count_nonzero(changed) < near.shape[1]:
+        return 0.0
+    middle = float(np.median(near[6][changed]))
+    return middle if middle > 2.0 * np.median(noise[changed]) else 0.0
+
+
+def flags(
+    count: Integers,
+    stuck: int,
+    at_limit: int,
+    spikes: int,
+    coarse: bool,
+    out: NDArray[np.bool_],
+) -> bool:
     """Rows of out (3, N): axes that are stuck, at the end of their range, spiking, by counts. True
     for any.
     """
     n, standing, found = count.shape[1], 0, False
     for i in range(n):
-        out[0, i], out[1, i] = count[SAME, i] >= stuck, count[AT_LIMIT, i] >= at_limit
+        out[0, i], out[1, i] = (
+            not coarse and count[SAME, i] >= stuck,
+            count[AT_LIMIT, i] >= at_limit,
+        )
         out[2, i] = count[SPIKES, i] >= spikes
         standing += 1 if out[0, i] else 0
     if standing * 2 > n:  # most stand still exactly: a source without noise, not a fault

@@ -12,10 +12,9 @@ from playwright.sync_api import Page, sync_playwright
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
+from support.browser import CHROMIUM, FLAGS  # noqa: E402
 from support.stack import RunningDemo  # noqa: E402
 
-CHROMIUM = "/usr/bin/chromium"
-FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 SIZE = {"width": 1440, "height": 900}
 PATIENCE = 120_000  # ms; the scene is drawn in software
 TURNING = 42_000  # ms: the charts then have a run of the table to show, and it turns again

@@ -53,6 +53,26 @@ def scaled(factor: float, since_s: float = 0.0) -> Callable[[str, int], Log]:
     return made
 
 
+def all_scaled(factor: float) -> Callable[[str, int], Log]:
+    """All axes alike: a wrong range, or counts of another resolution."""
+
+    def made(profile: str, seed: int) -> Log:
+        log = published(profile, seed)
+        return log._replace(f_axis=factor * log.f_axis)
+
+    return made
+
+
+def rounded(step: float) -> Callable[[str, int], Log]:
+    """Readings in steps that hide the noise, m/s^2: a wide range at few bits."""
+
+    def made(profile: str, seed: int) -> Log:
+        log = published(profile, seed)
+        return log._replace(f_axis=np.round(log.f_axis / step) * step)
+
+    return made
+
+
 def exchanged(axes: int, since_s: float = 0.0) -> Callable[[str, int], Log]:
     """One axis of a triad (1) or all (3) with those of another one, others by every seed."""
 
@@ -98,6 +118,9 @@ CASES: dict[str, Callable[[str, int], Log]] = {
     "scale 1.5": scaled(1.5),
     "scale 0.7": scaled(0.7),
     "scale 1.3 from 12 s": scaled(1.3, 12.0),
+    "all scales 1.1": all_scaled(1.1),
+    "all scales 0.9": all_scaled(0.9),
+    "rounded to 31 mg": rounded(0.304),
     "imperfect device": imperfect(Imperfections()),
     "scale 5 %": imperfect(Imperfections(scale=0.05)),
     "misalignment 3 deg": imperfect(Imperfections(scale=0.005, misalignment=0.052, position=0.0)),

@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from playwright.sync_api import expect, sync_playwright
+from playwright.sync_api import expect
 from scipy.spatial.transform import Rotation
+from support.browser import DESKTOP, KNOWN, PATIENCE, PHONE
 from support.stack import RunningDemo
 
 from dashboard.web.users import add_user
@@ -25,23 +26,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
 
 ROOT = Path(__file__).resolve().parents[2]
 ARTEFACTS = ROOT / "artefacts"
-DESKTOP, PHONE = {"width": 1440, "height": 900}, {"width": 390, "height": 844}
 SMALL = {"width": 900, "height": 640}  # where only state counts: drawing is done in software here
-CHROMIUM = "/usr/bin/chromium"
-FLAGS = [
-    "--no-sandbox",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]
-# said without harm: drawing in software; a part of viser that we do not use wants to evaluate texts
-KNOWN = ("GPU stall", "Evaluating a string as JavaScript")
-PATIENCE = 90_000  # ms; the scene is drawn in software here
 PASSWORD = "correct horse battery"
 
 POSE = """() => {
@@ -60,20 +45,12 @@ def demo(tmp_path_factory):
         yield running
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
-
-
 class Visitor:
     """One browser context with its page and everything that its console complained of."""
 
-    def __init__(self, browser, demo, viewport):
+    def __init__(self, chromium, demo, viewport):
         self.demo = demo
-        self.context = browser.new_context(viewport=viewport, accept_downloads=True)
+        self.context = chromium.new_context(viewport=viewport, accept_downloads=True)
         self.page = self.context.new_page()
         self.page.set_default_timeout(PATIENCE)
         self.complaints = []
@@ -128,8 +105,8 @@ def people(demo):
 
 
 @pytest.fixture(scope="module")
-def anna(browser, demo, people):
-    visitor = Visitor(browser, demo, SMALL)
+def anna(chromium, demo, people):
+    visitor = Visitor(chromium, demo, SMALL)
     visitor.sign_in("anna")
     yield visitor
     visitor.context.close()
@@ -164,12 +141,12 @@ def wait_for_second_turn(demo):
         subscription.undeclare()
 
 
-def test_the_printed_link_signs_in_once(browser, demo):
-    first = Visitor(browser, demo, SMALL)
+def test_the_printed_link_signs_in_once(chromium, demo):
+    first = Visitor(chromium, demo, SMALL)
     first.page.goto(demo.link)
     first.page.wait_for_selector("#scene")
     first.leave()
-    second = Visitor(browser, demo, SMALL)
+    second = Visitor(chromium, demo, SMALL)
     second.page.goto(demo.link)
     expect(second.page.locator("main")).to_contain_text("used already")
     first.page.goto(demo.link)  # whoever is signed in already just goes on
@@ -290,9 +267,9 @@ def test_the_live_page_opens_on_the_replay_that_was_asked_for(anna):
     anna.page.goto(anna.demo.url)
 
 
-def test_a_viewer_sees_but_cannot_operate(browser, demo, people, anna):
+def test_a_viewer_sees_but_cannot_operate(chromium, demo, people, anna):
     anna.leave()
-    victor = Visitor(browser, demo, SMALL)
+    victor = Visitor(chromium, demo, SMALL)
     victor.sign_in("victor")
     assert victor.scene.evaluate(POSE)[0]
     assert victor.page.locator("#record").is_disabled()
@@ -315,9 +292,9 @@ def test_desktop_page_for_the_eye(anna, demo):
     assert not unexpected
 
 
-def test_phone_page_for_the_eye(browser, demo, people, anna):
+def test_phone_page_for_the_eye(chromium, demo, people, anna):
     anna.leave()
-    visitor = Visitor(browser, demo, PHONE)
+    visitor = Visitor(chromium, demo, PHONE)
     visitor.sign_in("anna")
     assert visitor.scene.evaluate(POSE)[0]
     time.sleep(2)  # for the picture only

@@ -40,7 +40,7 @@ def test_a_session_over_a_clock_that_is_set_and_a_gateway_that_is_stopped(tmp_pa
             subscribe(session, STATUS, "gyrofree", lambda _, m: states.append(m)),
             subscribe(session, BOARD, "gyrofree", lambda _, m: boards.append(m)),
         ]
-        until(lambda: states and states[-1].messages > 500, "recording")
+        until(lambda: links and states and states[-1].messages > 500, "recording")
         wall.set(-YEAR_S)
         until(lambda: links[-1].clock_offset_s < -0.9 * YEAR_S, "step back in the link's status")
         until(lambda: states[-1].clock_steps == 1, "step back in the recorder's status")

@@ -1,5 +1,6 @@
 """Which labels of the scene are shown, so that none lies on another: the weightier first."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -29,9 +30,9 @@ def pixels(camera: viser.CameraHandle, points: np.ndarray) -> np.ndarray | None:
     position, look_at = np.asarray(camera.position), np.asarray(camera.look_at)
     ahead = look_at - position
     right = np.cross(ahead, np.asarray(camera.up_direction))
-    if not np.linalg.norm(right) > 0.0:
+    if not math.hypot(*right) > 0.0:
         return None
-    ahead, right = ahead / np.linalg.norm(ahead), right / np.linalg.norm(right)
+    ahead, right = ahead / math.hypot(*ahead), right / math.hypot(*right)
     from_camera = points - position
     depth = from_camera @ ahead
     depth = np.where(depth > 1e-6, depth, np.nan)

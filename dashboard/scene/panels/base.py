@@ -2,8 +2,8 @@
 
 import logging
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 
 import numpy as np
@@ -12,9 +12,11 @@ import viser
 from dashboard.data.device import Device
 from dashboard.data.store import Store
 from dashboard.desk import Desk
-from dashboard.scene.drawing.chart import Chart, Curve, Range, Shade
+from dashboard.scene.drawing.chart import Chart
+from dashboard.scene.drawing.drawn import Curve, Drawn, Name, Range, Shade, drawn
 from dashboard.scene.drawing.page import Markup, html
 from dashboard.scene.drawing.palette import estimator_colour, estimator_title
+from dashboard.scene.shared import Made, Shared
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
 from messages.text import plain
@@ -43,6 +45,13 @@ class Snapshot:
     dark: bool
     cursors: tuple[float, float] | tuple[()] = ()  # s, of the stretch that is measured
     derived: tuple[str, ...] = ()  # expressions of this browser, as people typed them
+    shared: Shared = field(default_factory=Shared)  # with the browsers that show the same
+
+    def once(self, key: Hashable, make: Callable[[], Made]) -> Made:
+        """The result of make(), which is the same for every browser that shows this stretch."""
+        device = self.device
+        mine = (device.name, device.generation, self.t0, self.t1, self.dark, self.cursors)
+        return self.shared.once((*mine, self.derived, key), make)
 
     def rows(self, topic: str, estimator: str = "") -> tuple[np.ndarray, np.ndarray]:
         """Times (n,) s and rows (n,) of a topic inside the window; columns by name (tables.py)."""
@@ -109,7 +118,7 @@ class Panel:
             self._place += 2.0
             found = Chart(self.client, self.folder, self._place, title, unit, height, digits)
             self._charts[key] = found
-        found.name(title, unit, digits)
+        found.name = Name(title, unit, digits)
         return found
 
     def show(
@@ -117,27 +126,37 @@ class Panel:
         key: str,
         title: str,
         unit: str,
-        curves: Sequence[Curve],
+        curves: Sequence[Curve] | Callable[[], Sequence[Curve]],
         s: Snapshot,
-        shades: Sequence[Shade] = (),
+        shades: Callable[[], Sequence[Shade]] = tuple,
         **options,
     ) -> None:
-        """Draw a chart for the window of the snapshot; one too many is left out, as are curves."""
+        """Draw a chart for the window of the snapshot; one too many is left out, as are curves.
+
+        Curves and shades that are given as functions are asked for once for all browsers that show
+        the same.
+        """
         if key not in self._shown and len(self._shown) >= CHARTS:
             return
         self._shown.add(key)
-        curves = curves[:CURVES]
-        self.chart(key, title, unit, **options).show(
-            curves,
-            s.t0,
-            s.t1,
-            s.dark,
-            late=s.device.late,
-            ranges=ranges(s.device),
-            cursors=s.cursors,
-            origin=f"s since {when(s.device.utc0_ns)} UTC",
-            shades=shades,
-        )
+        chart = self.chart(key, title, unit, **options)
+
+        def made() -> Drawn:
+            return drawn(
+                chart.name,
+                (curves() if callable(curves) else curves)[:CURVES],
+                s.t0,
+                s.t1,
+                s.dark,
+                late=s.device.late,
+                ranges=ranges(s.device),
+                cursors=s.cursors,
+                origin=f"s since {when(s.device.utc0_ns)} UTC",
+                shades=shades(),
+            )
+
+        # what a person has chosen on this page may change its charts
+        chart.draw(made() if self.own_inputs else s.once((type(self), key), made))
 
     def html(self, content: Markup, handle: viser.GuiHtmlHandle | None) -> viser.GuiHtmlHandle:
         """Set an HTML element's content when it changed; make it at first use. What is no Markup is
@@ -177,6 +196,13 @@ def when(utc_ns: int) -> str:
     """A moment for people, UTC."""
     moment = datetime.fromtimestamp(utc_ns * 1e-9, UTC) if 0 <= utc_ns < 1 << 62 else None
     return "?" if moment is None else f"{moment:%Y-%m-%d %H:%M:%S}"
+
+
+def from_zero(device: Device, name: str) -> str:
+    """What the angle of a rate estimator counts from, in words; empty where nobody says."""
+    status = device.get("estimator", name)
+    began_ns = 0 if status is None else status.message.began_utc_ns
+    return f"from 0 at {when(began_ns)[11:]} UTC" if began_ns else ""
 
 
 def ranges(device: Device) -> list[Range]:

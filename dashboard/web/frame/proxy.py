@@ -93,6 +93,7 @@ def router(
             open_scenes.total() >= settings.scenes
         ):
             log.warning("%s has %d scenes open: one more refused", user, open_scenes[user])
+            socket.app.state.front.ended["too many scenes"] += 1
             await socket.close(1013, "too many scenes are open: close other tabs")
             return
         open_scenes[user] += 1
@@ -194,6 +195,7 @@ class Relay:
                     self._who,
                     self._settings.stall_s,
                 )
+                self._count("a scene took nothing")
                 return 1013, "this browser is too slow"
         return 1012, "the scene restarts"
 
@@ -204,6 +206,7 @@ class Relay:
                 return 1000, ""
             data = message.get("bytes")
             if data is None or len(data) > self._settings.message_limit:
+                self._count("a scene sent what is too large, or text")
                 return 1009, f"want binary messages of at most {self._settings.message_limit} bytes"
             found = self._gate.look_up(self._key)
             if found is None:
@@ -214,17 +217,23 @@ class Relay:
                     self._who,
                     self._settings.message_rate,
                 )
+                self._count("a scene sent too much")
                 return 1008, "too many messages"
             self._who, role = found[1].name, found[1].role
             try:
                 name, fields = message_type(data)
             except BadMessage as error:
                 log.warning("browser of %s: %s", self._who, error)
+                self._count("a scene sent what is no message")
                 return 1007, "not a message of viser's"
             if may_send(role, name, fields, self._widgets):
                 await scene.send(data)
             else:
                 self._note(role, name)
+
+    def _count(self, why: str) -> None:
+        """A scene that is ended, for the page."""
+        self._socket.app.state.front.ended[why] += 1
 
     def _note(self, role: Role, name: str) -> None:
         """Say each refused kind once per connection: a browser may repeat it at any rate."""

@@ -39,6 +39,7 @@ def _users(
         tokens=[(one, gate.tokens.uses.get(one.id)) for one in tokens],
         refused_tokens=gate.tokens.refused,
         secret=secret,
+        ended=front_of(request).ended.most_common(),
     )
 
 

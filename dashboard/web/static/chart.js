@@ -74,14 +74,16 @@ export class Plot {
     this.title = figure.querySelector("figcaption > span")?.textContent ?? "";
     this.unit = figure.querySelector("small")?.textContent ?? "";
     this.lines = [];
-    this.marks = [];
+    this.marks = this.shades = [];
     group.plots.push(this);
     new ResizeObserver(() => this.resize()).observe(this.root);
     this.root.addEventListener("keydown", (event) => group.key(event));
   }
 
-  set(lines, marks) {
+  // shades: [from, until, word] of what a filter does not vouch for.
+  set(lines, marks, shades = []) {
     this.marks = marks;
+    this.shades = shades;
     this.lines = lines.filter((line) => !line.hidden);
     const shape = JSON.stringify(this.lines.map((l) => [l.short, l.color, l.dash, l.width, l.alpha, l.high === l.low]));
     if (this.shape !== shape) this.build();
@@ -136,7 +138,7 @@ export class Plot {
     const fresh = this.lines.every((line) => line.measured && line.asked === this.group.asked);
     return {
       title: this.title, unit: this.unit, origin: this.group.origin, of: this.group.of, provisional: this.group.provisional, done: true,
-      ranges: this.marks.map((mark) => [mark.t, mark.until ?? mark.t, mark.text, mark.kind ?? "mark"]), lines: () => lines,
+      ranges: [...this.shades.map(([from, until, word]) => [from, until, word, word]), ...this.marks.map((mark) => [mark.t, mark.until ?? mark.t, mark.text, mark.kind ?? "mark"])], lines: () => lines,
       measured: fresh ? Object.fromEntries(this.lines.map((line) => [line.short, line.measured])) : null,
     };
   }
@@ -170,6 +172,12 @@ export class Group {
     this.cursorKey = `charts ${Group.count++}`;
     Object.assign(this, { onLook, click });
     onTheme(() => this.plots.forEach((plot) => { if (plot.chart) { plot.build(); plot.look(); } }));
+  }
+
+  // What lies between the cursors, else what is shown.
+  stretch() {
+    const at = this.cursors.at;
+    return at ? [Math.min(...at), Math.max(...at)] : this.window;
   }
 
   remove(plot) {

@@ -4,7 +4,8 @@
 const FAR = 4; // widths of the bulk that a point is away from it before it counts as an outlier
 const FEW = 4; // of them at one side; more are a signal
 const FRESH = 0.04; // newest share of the window, in which a jump may be the beginning of something
-const TINT = { mark: "#c564a0", step: "#3296d8", late: "#b08000" };
+export const SHADES = { blind: "#d55e00", ambiguous: "#c9b400" }; // what a filter does not vouch for: no lines, few names
+const TINT = { ...SHADES, mark: "#c564a0", step: "#3296d8", late: "#b08000" };
 const FACE = "system-ui, 'DejaVu Sans', sans-serif";
 
 const number = (v) => (v === 0 ? "0" : Math.abs(v) >= 1e5 || Math.abs(v) < 1e-3 ? v.toExponential(2) : String(Number(v.toPrecision(4))));
@@ -70,7 +71,7 @@ function pen(u, work) {
 
 function drawRanges(u, { ranges }) {
   pen(u, (c, box, px) => {
-    const ends = []; // of the names on each line of text
+    const ends = [], shaded = {}; // of the names on each line of text; how far each word has been said
     for (const [t0, t1, text, kind] of ranges) {
       const a = u.valToPos(t0, "x", true), b = u.valToPos(t1, "x", true);
       if (b < box.left || a > box.right) continue;
@@ -80,6 +81,15 @@ function drawRanges(u, { ranges }) {
         c.globalAlpha = 0.13;
         c.fillRect(a, box.top, b - a, box.bottom - box.top);
         c.globalAlpha = 1;
+      }
+      if (kind in SHADES) {
+        const from = Math.max(a, box.left) + 3 * px, wide = c.measureText(text).width;
+        if (from + wide > b || from < (shaded[kind] ?? -Infinity)) continue;
+        shaded[kind] = from + 6 * wide;
+        c.textBaseline = "bottom";
+        c.textAlign = "left";
+        c.fillText(text, from, box.bottom - 2 * px);
+        continue;
       }
       c.setLineDash([3 * px, 3 * px]);
       for (const x of t1 > t0 ? [a, b] : [a]) {

@@ -69,13 +69,29 @@ function showAlarms(devices, bench) {
   }
 }
 
+// A text with the first of each word explained; words: [[word, meaning]].
+function explained(text, words) {
+  const found = words.map(([word, meaning]) => [text.toLowerCase().indexOf(word.toLowerCase()), word, meaning])
+    .filter(([at]) => at >= 0).sort(([a], [b]) => a - b);
+  const parts = [];
+  let done = 0;
+  for (const [at, word, meaning] of found) {
+    if (at < done) continue;
+    const term = document.createElement("abbr");
+    Object.assign(term, { textContent: text.slice(at, at + word.length), title: meaning });
+    parts.push(text.slice(done, at), term);
+    done = at + word.length;
+  }
+  return [...parts, text.slice(done)];
+}
+
 function alarmButton(alarm) {
   const button = document.createElement(alarm.page ? "button" : "span");
-  const strong = document.createElement("b"), text = document.createElement("span");
-  strong.textContent = `▲ ${alarm.other ? `${alarm.device}: ` : ""}${alarm.title}`;
-  text.textContent = alarm.text;
+  const strong = document.createElement("b"), text = document.createElement("span"), words = Object.entries(alarm.words);
+  strong.append(...explained(`▲ ${alarm.other ? `${alarm.device}: ` : ""}${alarm.title}`, words));
+  text.append(...explained(alarm.text, words));
   button.className = "alarm";
-  button.title = alarm.text;
+  button.title = [alarm.text, ...words.map(([word, meaning]) => `${word}: ${meaning}`)].join("\n");
   button.append(strong, text);
   if (alarm.page) {
     button.type = "button";

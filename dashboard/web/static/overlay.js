@@ -1,5 +1,6 @@
 // Sessions over one another on one axis of time; also the plots of a single session.
 import { Group, Plot } from "/static/chart.js";
+import { SHADES } from "/static/figure.js";
 import { call } from "/static/rest.js";
 import { Tracks } from "/static/tracks.js";
 
@@ -62,7 +63,7 @@ export class Overlay {
       }));
       figure.hidden = !mine.length;
       if (kind === "error" && mine.length) figure.querySelector("small").textContent = `against ${[...new Set(mine.map((l) => REFERENCES[l.against] ?? l.against))].join(", ")}, °/s`;
-      plot.set(mine, marks);
+      plot.set(mine, marks, kind === "rate" && answer.sessions.length === 1 ? answer.sessions[0].shades[part] : []);
     }
     this.showOwn(answer.own, marks);
     this.trackFigure.hidden = !answer.tracks.length;
@@ -141,6 +142,18 @@ export class Overlay {
         this.show(this.answer, false);
       });
       return button;
-    }));
+    }), ...this.shades());
+  }
+
+  // What the tinted times mean, with a link to the word.
+  shades() {
+    const said = this.ids.length > 1 ? [] : Object.values(this.answer.sessions[0].shades).flat();
+    return [...new Set(said.map(([, , word]) => word))].map((word) => {
+      const link = document.createElement("a"), sample = document.createElement("i");
+      Object.assign(link, { className: "shade", href: `/words#${word}`, title: "What the leading filter says of itself" });
+      sample.style.background = SHADES[word];
+      link.append(sample, word);
+      return link;
+    });
   }
 }

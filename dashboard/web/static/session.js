@@ -1,8 +1,9 @@
 // The page of one session: plots, replay, report, export, notes, labels, deletion.
-import { showMap, showSky } from "/static/map/session.js";
+import { showAt, showMap, showSky } from "/static/map/session.js";
 import { Derived } from "/static/derived.js";
 import { Overlay } from "/static/overlay.js";
 import { call, ended, send, toast } from "/static/rest.js";
+import { Spectrum } from "/static/spectrum.js";
 
 const session = document.querySelector("main").dataset.session;
 const path = `sessions/${encodeURIComponent(session)}`;
@@ -153,6 +154,7 @@ if (by("plots")) {
     data: (answer) => {
       document.body.dataset.plotted = answer.state;
       editor.show(answer.own);
+      if (answer.state === "done") spectrum.changed();
     },
     click: (t) => {
       if (t < 0) return;
@@ -161,6 +163,7 @@ if (by("plots")) {
       if (by("replay")) by("replay").textContent = `Replay from ${moment} s`;
       address({ t: moment });
       showSky(path, moment);
+      showAt(moment);
     },
   });
   const editor = new Derived(by("own-curves"), {
@@ -172,9 +175,10 @@ if (by("plots")) {
       overlay.load(...overlay.group.window);
     },
   });
+  const spectrum = new Spectrum(by("spectrum"), path, { own: () => lines, stretch: () => overlay.group.stretch() });
   if (lines.length) by("own-curves").open = true;
   overlay.load();
-  showMap(path);
+  showMap(path, moment > 0 ? moment : undefined);
   showSky(path, moment || 0);
 }
 

@@ -10,15 +10,27 @@ const listeners = [];
 
 export const whenStated = (listener) => listeners.push(listener);
 
+let stand = null; // what answers where there is no scene, see plain.js
+
+export const standIn = (answer) => { stand = answer; };
+
+// The state of the view, as it or who stands in for it says.
+export function stateIs(now) {
+  state = now;
+  for (const listener of listeners) listener(now);
+}
+
 // Ask once.
 export function ask(fields) {
-  Object.assign(pending, fields);
+  if (stand) stand(fields);
+  else Object.assign(pending, fields);
 }
 
 // Ask, and hold to it when the connection is made anew.
 export function choose(fields) {
   Object.assign(wish, fields);
-  if ("w" in fields && !("p" in fields)) delete wish.p;
+  if ("p" in fields) delete wish.w; // a page is in one workspace: two wishes would turn it to and fro
+  else if ("w" in fields) delete wish.p;
   ask(fields);
 }
 
@@ -59,14 +71,14 @@ function flush() {
 }
 
 function look() {
+  if (stand) return;
   const text = frame.contentDocument?.querySelector(".gf-state")?.dataset.state;
   if (text && text !== last) {
     last = text;
     for (const area of frame.contentDocument.querySelectorAll("[data-scrollarea-viewport]:not([tabindex])")) {
       area.tabIndex = 0; // what scrolls is reached by the keyboard
     }
-    state = JSON.parse(text);
-    for (const listener of listeners) listener(state);
+    stateIs(JSON.parse(text));
   }
   if (state && Date.now() - sent > AGAIN_MS) {
     const now = stated(state);

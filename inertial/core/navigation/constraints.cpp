@@ -11,7 +11,6 @@ constexpr int FORWARD = 0, SIDE = 1, BELOW = 2;  // of the body
 constexpr int SIDEWAYS = 0, VERTICAL = 1, WHEEL_ROWS = 2;
 constexpr int ZERO_V = 0, ZERO_W = 3, STILL_ROWS = 6;
 
-constexpr double MOST_MOVED = 3.0;     // then it hovers or drifts: quiet, but no standstill
 constexpr double STRAIN_SHARE = 0.05;  // of the newest look in the mean: 10 s at two looks a second
 constexpr double MOST_STRAIN = 25.0;   // of one look
 constexpr int LEAST_TICKS = 8;         // of them, to judge a standstill

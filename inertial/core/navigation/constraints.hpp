@@ -6,6 +6,8 @@
 
 namespace gyrofree::navigation {
 
+constexpr double MOST_MOVED = 3.0;  // of Leg::moved: then it hovers or drifts: quiet, but no standstill
+
 struct Rules {
   double every = 0.0;           // s between two looks; infinite: never
   double sigma_side = 0.0;      // m/s

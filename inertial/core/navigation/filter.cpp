@@ -35,16 +35,16 @@ void say(FixResult& out, const Leg& leg, const Measurement& z, const RowMatrix& 
   out.error_ned[DOWN] = -out.error_ned[DOWN];
 }
 
-void answer(FixResult& out, const Leg& leg, const Covariance& P, Status status) {
+void answer(FixResult& out, const Leg& leg, const Model& model, const Covariance& P, Status status) {
   out.status = status;
   out.x = leg.x;
   out.P = P.topLeftCorner<MOVING, MOVING>();
-  for (int i = 0; i < 3; ++i) out.P(DP + i, DP + i) += leg.receiver.wander(i);
+  tell_what_stays(out.P, model, leg.receiver.wander);
 }
 
 // Quiet readings are a standstill only where the fixes' velocities say so too (E-140).
 void check_standstill(Leg& leg, const Fix& fix) {
-  constexpr double SHARE = 0.2, MOST = 25.0;
+  constexpr double SHARE = 0.2, MOST = 25.0, PLAIN = 6.0;  // PLAIN: one such fix is enough
   if (leg.quiet && fix.has_v) {
     double sum = 0.0;
     int known = 0;
@@ -53,7 +53,14 @@ void check_standstill(Leg& leg, const Fix& fix) {
       ++known;
       sum += fix.v_n(i) * fix.v_n(i) / (leg.receiver.velocity * fix.sigma_v(i) * fix.sigma_v(i));
     }
-    if (known > 0) leg.moved += SHARE * (std::min(sum / known, MOST) - leg.moved);
+    if (known > 0) {
+      const double now = std::min(sum / known, MOST);
+      leg.moved = now > PLAIN ? std::max(leg.moved, now) : leg.moved + SHARE * (now - leg.moved);
+      if (leg.moved > MOST_MOVED) {  // that it stood was wrong, not the biases
+        leg.receiver.lasting.setZero();
+        leg.receiver.disagreement = 1.0;
+      }
+    }
   }
   leg.quiet = false;
 }
@@ -158,7 +165,7 @@ FixResult take(Leg& leg, const Model& model, const Settings& s, Memory& memory, 
   Whitened white = whiten(innovation.S, z.y);
   FixResult out;
   say(out, leg, z, innovation.S, white.nis, rate_b);
-  answer(out, leg, P, Status::WITHHELD);
+  answer(out, leg, model, P, Status::WITHHELD);
   if (fix.withheld) return out;
 
   learn(leg.receiver, z, innovation.S, s.adapt);
@@ -187,7 +194,7 @@ FixResult take(Leg& leg, const Model& model, const Settings& s, Memory& memory, 
   correct(leg, model, memory.estimate);
   remember_wander(leg, model, s, fix);
   out.left = left_after(leg, model, s, fix, rate_b);
-  answer(out, leg, P, status);
+  answer(out, leg, model, P, status);
   return out;
 }
 

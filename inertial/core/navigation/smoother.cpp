@@ -147,7 +147,7 @@ std::vector<Smoothed> smooth(Leg leg, const Model& model, const Settings& settin
     const Event& event = pass.events[at];
     const StateVector error = event.applied + event.error;
     out[j] = {z.y - product(z.H, error), event.x, event.after.topLeftCorner<MOVING, MOVING>()};
-    for (int i = 0; i < 3; ++i) out[j].P(DP + i, DP + i) += event.wander(i);
+    tell_what_stays(out[j].P, model, event.wander);
   }
   return out;
 }

@@ -84,6 +84,7 @@ struct Model {
   StateVector decay = StateVector::Zero(CORE);     // 1/s, of what only decays
   double shake = 1.0;  // share of the readings' shaking that is noise to navigation (E-131)
   double turn = 0.0;   // s, turns' share that gyros tell wrongly, squared, by the length of a turn (E-139)
+  double axes = 0.0;   // rad, of the sensors' axes against one another: no tilt is told better (E-142)
 
   bool has_scale() const { return scale_accel != ABSENT; }
   bool has_lag() const { return lag_position != ABSENT; }
@@ -94,7 +95,7 @@ struct Model {
     v("states", s.states), v("scale_accel", s.scale_accel), v("scale_gyro", s.scale_gyro);
     v("lag_position", s.lag_position), v("lag_velocity", s.lag_velocity);
     v("mount_pitch", s.mount_pitch), v("mount_yaw", s.mount_yaw), v("axle", s.axle);
-    v("density", s.density), v("decay", s.decay), v("shake", s.shake), v("turn", s.turn);
+    v("density", s.density), v("decay", s.decay), v("shake", s.shake), v("turn", s.turn), v("axes", s.axes);
   }
 };
 
@@ -253,5 +254,12 @@ struct Leg {
     v("earth", s.earth), v("shake", s.shake), v("receiver", s.receiver), v("ticks", s.ticks);
   }
 };
+
+// The covariance that is told: with what no number of fixes takes away (E-138, E-142).
+inline void tell_what_stays(Eigen::Matrix<double, MOVING, MOVING, Eigen::RowMajor>& P, const Model& model,
+                            const Vector3& wander) {
+  for (int i = 0; i < DOWN; ++i) P(PSI + i, PSI + i) += model.axes * model.axes;
+  for (int i = 0; i < 3; ++i) P(DP + i, DP + i) += wander(i);
+}
 
 }  // namespace gyrofree::navigation

@@ -24,10 +24,13 @@ constexpr std::int64_t MEMORY = 256;  // samples in the measured noise
 constexpr double CLIP = 6.0;          // of one sample over the mean so far: a jolt is no noise
 constexpr double LEAST_SEEN = 0.05;   // share of an axis' noise that must be in the parity residual
 constexpr double MEDIAN_OF_SQUARES = 0.9;  // median over axes of such means, over their true mean
+constexpr double COARSE = 2.0;  // times the noise: readings stay equal for long where it is rounded to more
 constexpr double SLACK = 0.25;  // by which chance alone exceeds 1 over MEMORY samples
 
-void count_one(Index i, double f, double last, bool known, double limit, Counts& count) {
-  count(SAME, i) = known && f == last ? count(SAME, i) + 1 : 0;
+void count_one(Index i, double f, bool known, double limit, Near& near, Counts& count) {
+  const double change = known ? std::abs(f - near(LAST, i)) : 0.0;
+  count(SAME, i) = known && change == 0.0 ? count(SAME, i) + 1 : 0;
+  if (change > 0.0) near(CHANGE, i) = near(CHANGE, i) > 0.0 ? std::min(near(CHANGE, i), change) : change;
   if (std::abs(f) >= AT_END * limit) {
     count(AT_LIMIT, i) += 1;
     count(LIMIT_AGE, i) = 0;
@@ -102,7 +105,7 @@ Index gather(const Readings& f, Index begin, int per_block, Near near, Marks mar
              Counts count) {
   for (Index k = begin; k < f.rows(); ++k) {
     const parity::Axes now = f.row(k).transpose();
-    for (Index i = 0; i < now.size(); ++i) count_one(i, now(i), near(LAST, i), marks(KNOWN) >= 1, of.limit(i), count);
+    for (Index i = 0; i < now.size(); ++i) count_one(i, now(i), marks(KNOWN) >= 1, of.limit(i), near, count);
     parity::Axes clean = near.row(LAST).transpose();
     if (marks(KNOWN) >= 2) clean = without_spikes(now, near, of.noise, count);
     if (marks(KNOWN) == 3) hear(now, clean, near, marks, of);
@@ -119,11 +122,24 @@ Index gather(const Readings& f, Index begin, int per_block, Near near, Marks mar
   return f.rows();
 }
 
-bool flags(const Counts& count, int stuck, int at_limit, int spikes, Flags out) {
+double resolution(const Near& near, const Axes& noise) {
+  parity::Axes change(near.cols()), sigma(near.cols());
+  Index axes = 0;
+  for (Index i = 0; i < near.cols(); ++i) {
+    if (near(CHANGE, i) == 0.0) continue;
+    change(axes) = near(CHANGE, i);
+    sigma(axes++) = noise(i);
+  }
+  if (2 * axes < near.cols()) return 0.0;
+  const double middle = median(change.head(axes));
+  return middle > COARSE * median(sigma.head(axes)) ? middle : 0.0;
+}
+
+bool flags(const Counts& count, int stuck, int at_limit, int spikes, bool coarse, Flags out) {
   const Index n = count.cols();
   Index standing = 0;
   for (Index i = 0; i < n; ++i) {
-    out(STUCK, i) = count(SAME, i) >= stuck;
+    out(STUCK, i) = !coarse && count(SAME, i) >= stuck;
     out(LIMIT, i) = count(AT_LIMIT, i) >= at_limit;
     out(SPIKING, i) = count(SPIKES, i) >= spikes;
     standing += out(STUCK, i) ? 1 : 0;

@@ -15,8 +15,9 @@ using parity::MOST_AXES;
 enum Counter : int { SAME, AT_LIMIT, LIMIT_AGE, SPIKES, SPIKE_AGE, COUNTERS };
 // What is kept of every axis between samples, spikes removed: the last but two, the last but one, the
 // last as it was read, the sum of the block, how far a sample usually is from the middle of its
-// neighbours, and the running mean of what no motion explains of third differences, over the noise's.
-enum Kept : int { EARLIER, BEFORE, LAST, SUM, USUAL, PARITY, KEPT };
+// neighbours, the running mean of what no motion explains of third differences, over the noise's, and
+// the smallest change from one reading to the next, 0 while there was none.
+enum Kept : int { EARLIER, BEFORE, LAST, SUM, USUAL, PARITY, CHANGE, KEPT };
 // Marks: how many of EARLIER, BEFORE and LAST are known, samples in the block, and in PARITY.
 enum Mark : int { KNOWN, FILLED, HEARD, MARKS };
 enum Flag : int { STUCK, LIMIT, SPIKING, FLAGS };
@@ -44,7 +45,11 @@ Eigen::Index gather(const Readings& f, Eigen::Index begin, int per_block, Near n
 // Variance of the axes' noise over the configured one, by the median axis; 1 where it is not more (H-11).
 double measured_noise(const Near& near, const Marks& marks, const Projection& parity);
 
-// Axes that are stuck, at the end of their range, spiking, by counts; true for any.
-bool flags(const Counts& count, int stuck, int at_limit, int spikes, Flags out);
+// What readings are rounded to, m/s^2, where that hides their noise; 0 where it does not (H-14).
+double resolution(const Near& near, const Axes& noise);
+
+// Axes that are stuck, at the end of their range, spiking, by counts; true for any. coarse: equal
+// readings are usual.
+bool flags(const Counts& count, int stuck, int at_limit, int spikes, bool coarse, Flags out);
 
 }  // namespace gyrofree::axis_samples

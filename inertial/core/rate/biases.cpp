@@ -12,14 +12,15 @@ Vector3 felt(const StateVector& x, bool turning) {
   return f;
 }
 
-// Variance by scale errors of each axis: of what it reads beyond its reading at rest.
-Vector<MOST_AXES> away_from_rest(Filter& f, const Sensor& s, const Tuning& t, bool turning) {
+// Variance by scale errors of each axis, of what it reads beyond its reading at rest, and by rounding, there
+// and now.
+Vector<MOST_AXES> away_from_rest(Filter& f, const Sensor& s, const Tuning& t, bool turning, double rounded) {
   const Vector3 force = felt(f.x, turning);
   Vector<MOST_AXES> reading = product(s.theta_b, force);
   Vector<MOST_AXES> away = Vector<MOST_AXES>::Zero();
   if (turning) {
     reading += product(s.Q, squares(f.omega()));
-    for (int i = 0; i < s.n; ++i) away(i) = square(reading(i) - f.rest_reading(i)) * t.scale;
+    for (int i = 0; i < s.n; ++i) away(i) = square(reading(i) - f.rest_reading(i)) * t.scale + square(rounded) / 6.0;
   } else {
     f.rest_reading = reading;
   }
@@ -83,7 +84,7 @@ void add_to_biases(Covariance& P, const Matrix<MEASURED>& D, double factor) {
 void grow_biases(Filter& f, const Sensor& s, const Tuning& t, const Moment& moment) {
   const double seconds = moment.grow;
   const bool turning = moment.turning;
-  const Vector<MOST_AXES> away = away_from_rest(f, s, t, turning);
+  const Vector<MOST_AXES> away = away_from_rest(f, s, t, turning, moment.rounded);
   if (!turning) {
     for (int k = 0; k < MEASURED; ++k) {
       if (s.drift(k, k) == 0.0) continue;

@@ -151,7 +151,7 @@ std::int64_t gathered(const MatrixIn& f, std::int64_t begin, int per_block, cons
                       const CountsInOut& count) {
   const std::size_t n = f.shape(1);
   want(n >= 1 && n <= MOST_AXES && begin >= 0, "f", "(n, N), N from 1 to 32");
-  want(has_shape(near, samples::KEPT, n), "near", "(6, N)");
+  want(has_shape(near, samples::KEPT, n), "near", "(7, N)");
   want(marks.size() == samples::MARKS, "marks", "(3,)");
   want(noise.size() == n && limit.size() == n, "noise and limit", "(N,)");
   want(has_shape(parity, n, n), "parity", "(N, N)");
@@ -164,17 +164,25 @@ std::int64_t gathered(const MatrixIn& f, std::int64_t begin, int per_block, cons
 
 double measured(const NumbersInOut& near, const MarksInOut& marks, const MatrixIn& parity) {
   const std::size_t n = near.shape(1);
-  want(has_shape(near, samples::KEPT, n) && n <= MOST_AXES, "near", "(6, N)");
+  want(has_shape(near, samples::KEPT, n) && n <= MOST_AXES, "near", "(7, N)");
   want(marks.size() == samples::MARKS && has_shape(parity, n, n), "marks and parity", "(3,) and (N, N)");
   const auto axes = static_cast<Eigen::Index>(n);
   return samples::measured_noise({near.data(), samples::KEPT, axes}, samples::Marks(marks.data()),
                                  {parity.data(), axes, axes});
 }
 
-bool flagged(const CountsInOut& count, int stuck, int at_limit, int spikes, const FlagsOut& out) {
+double rounded_to(const NumbersInOut& near, const VectorIn& noise) {
+  const std::size_t n = near.shape(1);
+  want(has_shape(near, samples::KEPT, n) && n <= MOST_AXES, "near", "(7, N)");
+  want(noise.size() == n, "noise", "(N,)");
+  const auto axes = static_cast<Eigen::Index>(n);
+  return samples::resolution({near.data(), samples::KEPT, axes}, {noise.data(), axes});
+}
+
+bool flagged(const CountsInOut& count, int stuck, int at_limit, int spikes, bool coarse, const FlagsOut& out) {
   const std::size_t n = count.shape(1);
   want(has_shape(out, samples::FLAGS, n), "out", "(3, N)");
-  return samples::flags(counts_of(count, n), stuck, at_limit, spikes,
+  return samples::flags(counts_of(count, n), stuck, at_limit, spikes, coarse,
                         {out.data(), samples::FLAGS, static_cast<Eigen::Index>(n)});
 }
 
@@ -204,8 +212,10 @@ void bind_health(nb::module_& module) {
         "Takes samples until a block is full; the next one's row");
   m.def("measured_noise", &measured, nb::arg("near").noconvert(), nb::arg("marks").noconvert(), nb::arg("parity"),
         "Variance of the axes' noise over the configured one (H-11)");
+  m.def("resolution", &rounded_to, nb::arg("near").noconvert(), nb::arg("noise"),
+        "What readings are rounded to, m/s^2, where that hides their noise; else 0 (H-14)");
   m.def("flags", &flagged, nb::arg("count").noconvert(), nb::arg("stuck"), nb::arg("at_limit"), nb::arg("spikes"),
-        nb::arg("out").noconvert(), "Which axes are stuck, at the end of their range, spiking; true for any");
+        nb::arg("coarse"), nb::arg("out").noconvert(), "Which axes are stuck, at the end of their range, spiking; true for any");
 }
 
 }  // namespace gyrofree

@@ -217,6 +217,7 @@ struct Moment {
   const Vector3* at;   // omega that the products are linear about; null: that of the state
   double forget = 0.0;  // 1/s, by what innovations say (E-59)
   double wander = 0.0;  // (m/s^2)^2 per s, of biases beyond what is configured (E-54)
+  double rounded = 0.0;  // m/s^2, what readings are rounded to where that hides their noise (H-14)
 };
 
 // step.cpp: one sample y = [alpha_m, c_m, p_m].

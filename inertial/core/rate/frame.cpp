@@ -67,6 +67,7 @@ const Constants& Frame::believed(const Constants& c) {
 void Frame::advance(const Constants& configured, double t_s, const double* a) {
   if (passed_over(configured, t_s, a)) return;
   tick(t_s);
+  watch_.noise().rounded(intake_.resolution(configured.sensor), configured.sensor);
   since_rest_.take(configured.sensor, a, dt_, started_ && still_, first_.filter);
   watch_.take(configured.sensor, a, dt_);
   const Constants& c = believed(configured);
@@ -277,7 +278,7 @@ void Frame::run(const Constants& c, long first, long now, bool fixed, const Stat
     Vector3 at;
     if (end != nullptr) at = back(*end, watch_.total(now), watch_.total(sample), now - sample, dt_, c.sensor);
     const Moment moment{watch_.dt(sample), !still_, fixed, eighth ? EVERY * dt_ : 0.0, end == nullptr ? nullptr : &at,
-                        agreement_.forgetting(), watch_.wander()};
+                        agreement_.forgetting(), watch_.wander(), eighth ? intake_.resolution(c.sensor) : 0.0};
     step(first_.filter, c.sensor, c.tuning, watch_.y(sample), moment, said_);
     if (end == nullptr) watch_errors(c, sample, moment);
     if (branches_ == 2) step(second_.filter, c.sensor, c.tuning, watch_.y(sample), moment, other_said_);

@@ -26,13 +26,18 @@ ByErrors<MEASURED> by_errors(const StateVector& x, const Vector3& alpha, const S
   return Y;
 }
 
-// Offsets at rest that no bias has are errors of what gravity reads like: their mean square, of 1.
+// Offsets at rest that no bias has are errors of what gravity reads like: their mean square, of 1. A
+// scale that all axes have in common shows in gravity's size alone.
 double too_large_for_biases(const Filter& f, const Sensor& s, const Tuning& t) {
   const Measurement offsets = biases_of(f.x);
   double sum = 0.0;
   for (int k = 0; k < BIASES; ++k)
     if (s.drift(k, k) > 0.0) sum += square(offsets(k)) / s.drift(k, k);
-  return std::max(0.0, sum / BIASES - BIASES_SURE * t.bias) / square(GRAVITY);
+  const Vector3 up = f.x.segment<3>(LIFT) / GRAVITY;
+  const double size = dot(up, Vector3(offsets.segment<3>(FORCE_M)));
+  const double bias = t.bias * dot(up, Vector3(s.drift.block<3, 3>(FORCE_M, FORCE_M) * up));
+  const double apart = std::max(sum / BIASES - BIASES_SURE * t.bias, square(size) - BIASES_SURE * bias);
+  return std::max(0.0, apart) / square(GRAVITY);
 }
 
 }  // namespace

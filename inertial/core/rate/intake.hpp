@@ -20,6 +20,8 @@ class Intake {
   // Samples passed over in a row, and all of them.
   int missing() const { return missing_; }
   long refused() const { return refused_; }
+  // What readings are rounded to, m/s^2, where that hides their noise; 0 where it does not (H-14).
+  double resolution(const Sensor& s);
 
  private:
   static constexpr double FROZEN_S = 1.0;  // s in which no axis changes
@@ -27,6 +29,10 @@ class Intake {
   bool spikes(const Sensor& s, const double* a);
 
   Vector<MOST_AXES> last_ = Vector<MOST_AXES>::Zero();
+  Vector<MOST_AXES> change_ = Vector<MOST_AXES>::Zero();  // the smallest of each axis, 0: none yet
+  double resolution_ = 0.0;
+  bool changed_ = false;  // change_, since that was found
+  bool heard_ = false;    // a sample
   Vector<MOST_AXES> taken_ = Vector<MOST_AXES>::Zero();  // the newest sample that was no spike
   int calm_ = 0;    // samples without a jump
   int spike_ = 0;   // samples of a jump that may come back

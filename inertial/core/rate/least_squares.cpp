@@ -118,6 +118,7 @@ void LeastSquares::advance(const Sensor& s, const LeastSquaresLimits& c, double 
   } else if (dt > 0.0) {
     dt_ = dt;
   }
+  watch_.noise().rounded(intake_.resolution(s), s);
   watch_.take(s, a, dt_);
   noise_ = std::max(noise_, watch_.noise().quiet());
   const Verdict verdict = watch_.detect(believed(s), c.still, y_.segment<3>(I_OMEGA), P_, dt_);

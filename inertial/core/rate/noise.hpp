@@ -20,8 +20,10 @@ class Noise {
   // y0 - 3 y1 + 3 y2 - y3 of samples in a row, by the configured noise of s.
   void observe(const Sensor& s, const Measurement& third_difference);
   // Variances over the configured ones, at least 1: of omega' and c, and of p.
-  double quiet() const { return quiet_.believed(QUIET_SLACK); }
-  double force() const { return force_.believed(FORCE_SLACK); }
+  double quiet() const { return std::max(least_, quiet_.believed(QUIET_SLACK)); }
+  double force() const { return std::max(least_, force_.believed(FORCE_SLACK)); }
+  // Readings are rounded to so much, m/s^2: equal ones scatter by that all the same (H-14).
+  void rounded(double step, const Sensor& s) { least_ = 1.0 + square(step) / (12.0 * s.axis_variance()); }
   // Variance of what of a turn is not noticed yet, over that of axes as configured: it is seen by omega'
   // and by p, and p may scatter so much that it shows nothing.
   double unnoticed() const { return as_configured() ? 1.0 : quiet() * std::clamp(force() / quiet(), 2.4, 4.0); }
@@ -41,6 +43,7 @@ class Noise {
   };
 
   Mean quiet_, force_;
+  double least_ = 1.0;
 };
 
 // The sensor with the noise that was measured.

@@ -44,6 +44,9 @@ struct Sensor {
   Matrix<9> basis;         // rows turn [alpha_m, c_m] into uncorrelated numbers
   Vector<9> spread;        // their variances
 
+  // of one axis' noise in one sample, (m/s^2)^2
+  double axis_variance() const { return R_alpha(0, 0) / drift(ALPHA_M, ALPHA_M); }
+
   // y = W a of one sample
   Measurement measure(const double* a) const {
     Measurement y = W.col(0) * a[0];

@@ -95,7 +95,7 @@ double Watch::moved(const Sensor& s, const StillLimits& c, int window) const {
   const Measurement all = mean(window) - reference;
   // over the variance of one sample of an axis
   const double since = seconds - settled_s;
-  const double walked = (leant(s, c, all) + walk.variance() * since * since) / axis_noise(s);
+  const double walked = (leant(s, c, all) + walk.variance() * since * since) / s.axis_variance();
   double chi2 = 0.0;
   for (int k = 0; k < s.spread.size(); ++k) {
     double along = 0.0;
@@ -184,7 +184,7 @@ void Watch::learn(const Sensor& s, const StillLimits& c) {
   if (learning < c.window) return;
   if (learning == c.window && learnt > 0) {
     const Measurement d = gathered / learning - reference;
-    walk.moved(s, d, axis_noise(s) * (1.0 / learning + 1.0 / learnt) + leant(s, c, d), seconds - settled_s);
+    walk.moved(s, d, s.axis_variance() * (1.0 / learning + 1.0 / learnt) + leant(s, c, d), seconds - settled_s);
   }
   settled_s = seconds;
   learnt = learning;
@@ -225,7 +225,7 @@ bool Watch::could_stand(const Sensor& s, const StillLimits& c, double bias) {
   if (span > 0 && swung(s, c, span) > c.steady_limit) return false;
   const Measurement all = mean(c.window);
   double chi2 = 0.0;
-  for (int k = 0; k < PRODUCTS_M + s.m; ++k) chi2 += all(k) * all(k) / ((bias + axis_noise(s) / c.window) * s.drift(k, k));
+  for (int k = 0; k < PRODUCTS_M + s.m; ++k) chi2 += all(k) * all(k) / ((bias + s.axis_variance() / c.window) * s.drift(k, k));
   return chi2 < BIASES_EXPLAIN;
 }
 

@@ -70,7 +70,6 @@ class Watch {
   bool stands(const Sensor& s, const StillLimits& c, const Vector3& omega, const Matrix3& P, double dt);
   bool restless();
   double leant(const Sensor& s, const StillLimits& c, const Measurement& d) const;
-  double axis_noise(const Sensor& s) const { return s.R_alpha(0, 0) / s.drift(0, 0); }
   void learn(const Sensor& s, const StillLimits& c);
 
   Matrix<MEASURED, DEPTH> ring_y = Matrix<MEASURED, DEPTH>::Zero();

@@ -9,6 +9,7 @@ import numpy as np
 
 from dashboard.data.alarms import TURNS_RADPS, alarms, bench_alarms, counts, waits
 from dashboard.data.pose import roll_pitch
+from dashboard.data.whereabouts import QUALITIES
 from dashboard.scene.drawing.geometry import MODES
 from dashboard.scene.drawing.page import EMPTY, Markup, alert, bad, joined, note, rows, tag, term
 from dashboard.scene.drawing.palette import (
@@ -20,7 +21,7 @@ from dashboard.scene.drawing.palette import (
     estimator_title,
     number,
 )
-from dashboard.scene.panels.base import DEG, Panel, Snapshot
+from dashboard.scene.panels.base import DEG, Panel, Snapshot, from_zero
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
 
@@ -36,7 +37,8 @@ class Devices(Panel):
     _table = None
 
     def update(self, s: Snapshot) -> None:
-        self._table = self.html(self._content(s), self._table)
+        content = s.once(("summary", self.short), lambda: self._content(s))
+        self._table = self.html(content, self._table)
 
     def waiting(self, text: str) -> None:
         """There is no device yet."""
@@ -118,12 +120,7 @@ class Devices(Panel):
             tiles.append(_tile(s, name, "nav", number(speed, 1), "km/h", sub))
         fix = s.device.get("gnss")
         if fix is not None:
-            quality = (
-                pb.GnssFix.Quality.Name(fix.message.quality)
-                .removeprefix("QUALITY_")
-                .replace("_", " ")
-                .lower()
-            )
+            quality = QUALITIES.get(fix.message.quality, "none")
             if fix.message.quality and math.isnan(fix.message.height_m):
                 quality += " · no height"
             if fix.message.quality and not fix.message.v_n_mps:
@@ -243,7 +240,8 @@ def _said_rate(s: Snapshot, name: str, m: pb.RateEstimate) -> tuple[str, Markup 
         return f"± {number(abs(omega) * DEG, 1)}", joined([term("ambiguous"), ": sign not known"])
     if m.still and abs(omega) > TURNS_RADPS:
         return shown, tag("span", "drifted: the body stands still", class_="gf-bad")
-    return shown, "still" if m.still else f"angle {number(m.angle_z_rad * DEG, 0, '°')}"
+    angle = f"angle {number(m.angle_z_rad * DEG, 0, '°')} {from_zero(s.device, name)}"
+    return shown, "still" if m.still else angle.strip()
 
 
 def _tile(s: Snapshot, name: str, topic: str, value: str, unit: str, sub: str) -> Markup:

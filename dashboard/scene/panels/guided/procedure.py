@@ -63,6 +63,7 @@ class ProcedurePanel(Guided):
     def __init__(self, client: viser.ClientHandle, folder: viser.GuiFolderHandle) -> None:
         super().__init__(client, folder)
         self._names: tuple[str, ...] = ()
+        self._seen = ("", 0)  # run and step on the screen
         with folder:
             gui = client.gui
             self._choice = gui.add_dropdown("Procedure", ("–",), order=0.2, visible=False)
@@ -90,6 +91,7 @@ class ProcedurePanel(Guided):
             return
         m = latest.message
         active = m.state in ACTIVE
+        self._seen = m.run, m.step + 1
         self._offer(tuple(m.offered))
         step = m.steps[m.step] if m.step < len(m.steps) else STEP()
         waits = active and step.kind == "open"
@@ -131,6 +133,8 @@ class ProcedurePanel(Guided):
             command.procedure = self._choice.value
             command.unit = self._unit.value.strip()
             command.own_session = True
+        if action in (ACTION.ACTION_NEXT, ACTION.ACTION_REPEAT):
+            command.run, command.step = self._seen  # another may have answered it meanwhile
         if action == ACTION.ACTION_NEXT:
             command.text = self._read.value.strip()
         try:
@@ -150,6 +154,7 @@ class ProcedurePanel(Guided):
 def content(m: pb.ProcedureStatus, gone: bool, dark: bool, user: str = "") -> Markup:
     """The panel's HTML; `user`: who is signed in, and would be the operator."""
     alarm = alert("the procedures are silent: does `gyrofree procedures` run?") if gone else EMPTY
+    alarm += alert(m.alarm) if m.alarm else EMPTY
     if m.state == M.STATE_IDLE:
         table = f"The table is driven: {m.table}." if m.table else "You turn the table by hand."
         text = (

@@ -1,7 +1,8 @@
 """Specific force of the body's centre in body axes, from the field of all sensors."""
 
 from dashboard.data.device import Device
-from dashboard.scene.drawing.chart import Curve
+from dashboard.scene.drawing.drawn import Curve
+from dashboard.scene.drawing.page import joined, sub
 from dashboard.scene.drawing.palette import AXES, truth_colour
 from dashboard.scene.panels.base import NO_RATE, Panel, Snapshot, estimator_curve
 
@@ -37,7 +38,7 @@ class Acceleration(Panel):
                 curves.append(Curve("truth", truth_colour(s.dark), t, rows["f_b"][:, k], width=1.0))
             self.show(
                 axis,
-                f"Specific force f<sub>{axis}</sub> of the centre",
+                joined(["Specific force ", sub("f", axis), " of the centre"]),
                 "m/s²",
                 curves,
                 s,

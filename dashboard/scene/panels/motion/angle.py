@@ -3,9 +3,16 @@
 import numpy as np
 
 from dashboard.data.device import Device
-from dashboard.scene.drawing.chart import Curve
+from dashboard.scene.drawing.drawn import Curve
 from dashboard.scene.drawing.palette import truth_colour
-from dashboard.scene.panels.base import DEG, NO_RATE, Panel, Snapshot, estimator_curve
+from dashboard.scene.panels.base import (
+    DEG,
+    NO_RATE,
+    Panel,
+    Snapshot,
+    estimator_curve,
+    from_zero,
+)
 
 
 class Angle(Panel):
@@ -41,6 +48,9 @@ class Angle(Panel):
         if len(true_t):
             y = true_rows["angle_z"] * DEG
             angles.append(Curve("truth", truth_colour(s.dark), true_t, y, width=1.0))
-        self.show("angle", "Angle about z", "°", angles, s, height=230)
+        starts = (from_zero(s.device, name) for name in s.device.estimators("rate"))
+        since = ", ".join(dict.fromkeys(start for start in starts if start))
+        title = f"Angle about z, {since}" if since else "Angle about z"
+        self.show("angle", title, "°", angles, s, height=230)
         if errors:
             self.show("error", "Angle error against truth", "°", errors, s, height=190)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from dashboard.data.device import Device
-from dashboard.scene.drawing.chart import Curve
+from dashboard.scene.drawing.drawn import Curve
 from dashboard.scene.drawing.palette import AXES
 from dashboard.scene.panels.base import Panel, Snapshot
 

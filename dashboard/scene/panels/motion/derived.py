@@ -3,12 +3,13 @@ scene.
 """
 
 import time
+from functools import partial
 
 import numpy as np
 
 from dashboard.data.channels import Channel, Drawn, channels, derived, sight
 from dashboard.data.device import Device
-from dashboard.scene.drawing.chart import Curve, Shade
+from dashboard.scene.drawing.drawn import Curve, Shade
 from dashboard.scene.drawing.page import Markup, alert, joined, note, tag
 from dashboard.scene.drawing.palette import VERMILLION, YELLOW
 from dashboard.scene.panels.base import Panel, Snapshot
@@ -58,7 +59,14 @@ class Derived(Panel):
         stale = any(s.stale(one.topic, one.estimator) for one in drawn.of)
         curve = Curve(text, COLOURS[k % len(COLOURS)], drawn.t, drawn.y, stale=stale)
         self.show(
-            f"derived{k}", text, drawn.unit, [curve], s, _shades(s, drawn), height=190, digits=3
+            f"derived{k}",
+            text,
+            drawn.unit,
+            [curve],
+            s,
+            partial(_shades, s, drawn),
+            height=190,
+            digits=3,
         )
 
 

@@ -7,7 +7,7 @@ import viser
 from scipy.stats import chi2
 
 from dashboard.data.device import Device
-from dashboard.scene.drawing.chart import Curve
+from dashboard.scene.drawing.drawn import Curve
 from dashboard.scene.drawing.page import Markup, bad, joined, note, rows, sub, tag, term
 from dashboard.scene.drawing.palette import AXES, GREY, estimator_title, number
 from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve

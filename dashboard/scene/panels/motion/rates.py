@@ -2,10 +2,12 @@
 gyroscope.
 """
 
+from functools import partial
+
 import numpy as np
 
 from dashboard.data.device import Device
-from dashboard.scene.drawing.chart import Curve, Shade
+from dashboard.scene.drawing.drawn import Curve, Shade
 from dashboard.scene.drawing.page import joined, note, sub
 from dashboard.scene.drawing.palette import (
     AXES,
@@ -17,6 +19,8 @@ from dashboard.scene.drawing.palette import (
 )
 from dashboard.scene.panels.base import DEG, NO_RATE, Panel, Snapshot, estimator_curve
 from messages.contract import gyrofree_pb2 as pb
+
+TITLES = {axis: joined([sub("ω", axis), " with 3σ"]) for axis in "xyz"}
 
 
 class Rates(Panel):
@@ -45,31 +49,29 @@ class Rates(Panel):
             return
         self._say_why(s)
         for k, axis in ((2, "z"), (0, "x"), (1, "y")):
-            curves = self._estimates(s, k)
-            if k == 2 and s.device.get("tacho"):
-                t, rows = s.rows("tacho")
-                known = s.device.get("tacho").message.direction_known
-                label = "tachometer" if known else "tachometer |ω|"
-                curves.append(
-                    Curve(
-                        label, REFERENCE, t, rows["omega"] * DEG, stale=s.stale("tacho"), dash=True
-                    )
-                )
-            if s.device.get("truth"):
-                t, rows = s.rows("truth")
-                line = Curve(
-                    "truth", truth_colour(s.dark), t, rows["omega_ib_b"][:, k] * DEG, width=1.0
-                )
-                curves.append(line)
             self.show(
                 f"omega{axis}",
-                joined([sub("ω", axis), " with 3σ"]),
+                TITLES[axis],
                 "°/s",
-                curves,
+                partial(self._curves, s, k),
                 s,
                 height=215 if k == 2 else 150,
-                shades=_sight(s, k),
+                shades=partial(_sight, s, k),
             )
+
+    def _curves(self, s: Snapshot, k: int) -> list[Curve]:
+        curves = self._estimates(s, k)
+        if k == 2 and s.device.get("tacho"):
+            t, rows = s.rows("tacho")
+            known = s.device.get("tacho").message.direction_known
+            label = "tachometer" if known else "tachometer |ω|"
+            stale, omega = s.stale("tacho"), rows["omega"] * DEG
+            curves.append(Curve(label, REFERENCE, t, omega, stale=stale, dash=True))
+        if s.device.get("truth"):
+            t, rows = s.rows("truth")
+            omega = rows["omega_ib_b"][:, k] * DEG
+            curves.append(Curve("truth", truth_colour(s.dark), t, omega, width=1.0))
+        return curves
 
     def _say_why(self, s: Snapshot) -> None:
         """The best filter's reason where it does not vouch for a component."""

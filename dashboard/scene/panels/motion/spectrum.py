@@ -9,24 +9,23 @@ from typing import Any
 import numpy as np
 import viser
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 from dashboard.data.channels import Channel, channels, derived
 from dashboard.data.device import Device
+from dashboard.scene.drawing.chart import AXIS
 from dashboard.scene.drawing.page import Markup, alert, note, tag
 from dashboard.scene.panels.base import Panel, Snapshot
 from logs.figures.expression import read
 from logs.figures.names import BLUE
 from logs.figures.quantity import ExpressionError
+from logs.figures.spectrum import density, unbroken
 from sessions.report.stability import LEAST, allan_of
 
 Array = NDArray[np.float64]
 EVERY_S = 2.0  # between two computations
-SEGMENTS = 8  # of Welch's method, half over one another, at least; more average more
 FIRST = "omega_z"  # what the table turns about, of the leading estimator
 ORDER = {"psd": 2.0, "allan": 4.0}  # of the charts on the page
 NEARLY = 1e-3  # of a decade: a period of 9.9999 ms is one of 10 ms
-HOLE = 1.6  # usual periods; a longer pause ends a stretch
 COLUMNS = ("omega_ib_b", "omega", "f_b", "f", "counts", "roll", "pitch")  # that have a spectrum
 
 
@@ -47,33 +46,6 @@ def symbol(name: str) -> str:
     word, _, part = name.rpartition("_")
     short = word.rsplit("_", 1)[-1]
     return {"omega": "ω", "f": "f"}.get(short, f"{word}_" if word else "") + part
-
-
-def unbroken(t: Array, y: Array) -> tuple[Array, float]:
-    """The longest stretch of y (n,) without a hole, and its period, s; empty where there is none.
-
-    A value that is not finite is a hole. A spectrum over a hole would be one of the hole.
-    """
-    good = np.isfinite(y)
-    t, y = t[good], y[good]
-    if len(t) < 3:
-        return y[:0], 0.0
-    steps = np.diff(t)
-    period = float(np.median(steps))
-    cuts = np.concatenate([[0], np.flatnonzero(steps > HOLE * period) + 1, [len(t)]])
-    longest = int(np.argmax(np.diff(cuts)))
-    at = slice(cuts[longest], cuts[longest + 1])
-    count = len(t[at])
-    return y[at], float(t[at][-1] - t[at][0]) / max(1, count - 1)
-
-
-def density(y: Array, period: float) -> tuple[Array, Array]:
-    """Frequency, Hz, and one-sided power spectral density, unit²/Hz, by Welch's method (Hann, half
-    over one another); without the frequency 0.
-    """
-    length = max(16, 2 * len(y) // (SEGMENTS + 1))
-    f, p = welch(y, fs=1.0 / period, nperseg=min(length, len(y)), detrend="linear")
-    return f[1:], p[1:]
 
 
 def samples(s: Snapshot, signal: Channel | str) -> tuple[Array, Array, str]:
@@ -182,7 +154,7 @@ class Spectrum(Panel):
             data,
             series=({"label": "x"}, line),
             scales=_scales(data[0]),
-            axes=({"size": 26}, {"size": 62, "scale": "level"}),
+            axes=(AXIS | {"size": 26}, AXIS | {"size": 62, "scale": "level"}),
             legend={"show": False},
             height=230,
             padding=(6, 10, 0, 0),

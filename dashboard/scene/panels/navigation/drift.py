@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dashboard.scene.drawing.chart import Curve
+from dashboard.scene.drawing.drawn import Curve
 from dashboard.scene.drawing.page import joined, tag
 from dashboard.scene.drawing.palette import GREY, VERMILLION, number
 from dashboard.scene.panels.base import DEG, Snapshot

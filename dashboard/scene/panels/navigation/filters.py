@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from dashboard.data.device import Device
-from dashboard.scene.drawing.chart import Curve
+from dashboard.scene.drawing.drawn import Curve
 from dashboard.scene.drawing.page import (
     EMPTY,
     Markup,

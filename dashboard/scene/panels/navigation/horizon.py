@@ -5,7 +5,7 @@ that.
 import numpy as np
 
 from dashboard.data.device import Device
-from dashboard.scene.drawing.chart import Curve
+from dashboard.scene.drawing.drawn import Curve
 from dashboard.scene.drawing.page import EMPTY, Markup, note, rows, tag
 from dashboard.scene.drawing.palette import AXES, estimator_title, number
 from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve

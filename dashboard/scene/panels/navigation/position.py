@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from dashboard.data.device import Device
-from dashboard.scene.drawing.chart import Curve
+from dashboard.scene.drawing.drawn import Curve
 from dashboard.scene.drawing.geometry import MODES
 from dashboard.scene.drawing.page import Markup, note, rows
 from dashboard.scene.drawing.palette import FIX, estimator_title, number

@@ -13,10 +13,14 @@ class Record:
 
     def __init__(self, client: viser.ClientHandle) -> None:
         self._state = client.gui.add_html("")
+        self._latest, self._how = None, ()  # what is shown, and how
 
     def update(self, latest, now: float) -> None:
         """Show the recorder's newest status; `latest` is None before it spoke."""
         stale = latest is None or latest.age(now) > 3.0
+        if latest is self._latest and (stale, self.short) == self._how:
+            return  # it speaks once a second
+        self._latest, self._how = latest, (stale, self.short)
         recording = latest is not None and latest.message.recording
         content = self._content(latest, stale, recording)
         if self.short:
@@ -43,10 +47,8 @@ class Record:
             )
             items.append(("size", number(m.bytes / 1e6, 1, "MB")))
         if m.clock_steps:
-            text = (
-                f"set {m.clock_steps} times, {m.clock_offset_s:+,.1f} s in all; times go on without"
-            )
-            items.append(("wall clock", f'<b class="gf-bad">{text}</b>'))
+            steps = f"set {m.clock_steps} times, {m.clock_offset_s:+,.1f} s in all"
+            items.append(("wall clock", bad(f"{steps}; times go on without")))
         lost = sum(m.lost.values())
         if lost:
             items.append(("lost on the bus", bad(f"{number(lost, 0)} messages")))

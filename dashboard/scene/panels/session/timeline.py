@@ -46,6 +46,7 @@ class Timeline:
         self._touched = 0.0
         gui = client.gui
         self._state = gui.add_html("")
+        self._live: tuple = (None, EMPTY)  # what the recorder said last, in words
         self._slider = gui.add_slider(
             "Position, s",
             0.0,
@@ -119,7 +120,12 @@ class Timeline:
         latest = self._store.recorder
         if latest is None or latest.age(now) > 3.0:
             return note(tag("b", "Live"), " · the recorder is not running")
-        m = latest.message
+        if self._live[0] is not latest:  # it speaks once a second
+            self._live = latest, self._recorded_html(latest.message)
+        return self._live[1]
+
+    @staticmethod
+    def _recorded_html(m: pb.RecorderStatus) -> Markup:
         if not m.recording:
             text = " · not being recorded: notes are shown, but not kept"
             return note(tag("b", "Live"), text)

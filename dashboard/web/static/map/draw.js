@@ -63,7 +63,7 @@ function line(c, way, { X, Y, ground }, dots) {
   }
   c.beginPath();
   for (let k = 0; k < way.x.length; k++) c.lineTo(X(way.x[k]), Y(way.y[k]));
-  if (way.now) c.lineTo(X(way.now.x), Y(way.now.y));
+  if (way.now && !way.whole) c.lineTo(X(way.now.x), Y(way.now.y));
   c.strokeStyle = ground;
   c.globalAlpha = 0.6;
   c.lineWidth = 4.5;
@@ -84,19 +84,20 @@ function accuracy(c, fixes, k, { X, Y, east, north }, alpha) {
 }
 
 function fixes(c, told, place) {
-  const last = told.x.length - 1;
-  for (let k = 0; k < last; k++) {
+  const last = told.at ?? told.x.length - 1; // or the one of a chosen moment
+  for (let k = 0; k < told.x.length; k++) {
+    const near = k <= last && k > last - CIRCLES;
     c.strokeStyle = c.fillStyle = QUALITIES[told.quality[k]] ?? QUALITIES.none;
-    if (k > last - CIRCLES) accuracy(c, told, k, place, 0.25);
-    c.globalAlpha = k > last - CIRCLES ? 0.9 : 0.45;
+    if (near && k < last) accuracy(c, told, k, place, 0.25);
+    c.globalAlpha = near ? 0.9 : 0.45;
     c.fillRect(place.X(told.x[k]) - 1.5, place.Y(told.y[k]) - 1.5, 3, 3);
   }
   c.globalAlpha = 1;
 }
 
 function newest(c, told, place) {
-  const k = told.x.length - 1;
-  if (k < 0) return;
+  const k = told.at ?? told.x.length - 1;
+  if (!(k >= 0)) return;
   c.strokeStyle = c.fillStyle = QUALITIES[told.quality[k]] ?? QUALITIES.none;
   accuracy(c, told, k, place, 0.9);
   c.globalAlpha = 1;

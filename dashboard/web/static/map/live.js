@@ -41,7 +41,7 @@ function inWords({ now }) {
 
 function receiverInWords({ quality, satellites, accuracy_m, why }) {
   if (quality === "none") return `no position: ${why}`;
-  return [`${quality}, ${satellites} satellites`, accuracy_m ? `± ${metre(accuracy_m)} (2σ)` : "", why].filter(Boolean).join(" · ");
+  return [satellites ? `${quality}, ${satellites} satellites` : quality, accuracy_m ? `± ${metre(accuracy_m)} (2σ)` : "", why].filter(Boolean).join(" · ");
 }
 
 // The leading filter in a few words, which stand there also while the rest is folded.
@@ -117,7 +117,7 @@ function room() {
 function place() {
   if (host.hidden) return;
   const { left, top, right, bottom } = room();
-  Object.assign(host.style, { left: `${left}px`, top: `${top}px`, width: `${right - left}px`, height: `${bottom - top}px` });
+  Object.assign(host.style, { left: `${frame.offsetLeft + left}px`, top: `${frame.offsetTop + top}px`, width: `${right - left}px`, height: `${bottom - top}px` });
 }
 
 whenStated((now) => {

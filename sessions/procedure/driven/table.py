@@ -1,35 +1,19 @@
-"""Rate tables: what a procedure asks of one, and one over a serial line whose text commands stand
-in a TOML file.
-"""
+"""Rate tables: what a procedure asks of one, and one that takes text commands over a line."""
 
 import math
 import re
 import threading
 import time
-import tomllib
-from pathlib import Path
-from typing import Literal, Protocol
+from typing import Protocol
 
 import serial
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    ValidationError,
-    ValidationInfo,
-    field_validator,
-)
 
-from inertial.toml_file import parsed, text_of
-from sessions.procedure.guard import Guard
+from sessions.procedure.driven.description import Description, TableError
+from sessions.procedure.driven.guard import Guard
 
-DESCRIPTIONS = Path(__file__).parent / "tables"
 LONGEST = 4096  # bytes of one reply
+DRAIN_S = 0.2
 PER_UNIT = {"deg/s": math.pi / 180.0, "rad/s": 1.0, "rpm": 2.0 * math.pi / 60.0}  # rad/s
-
-
-class TableError(RuntimeError):
-    """A table that does not do what it is told; the text says which, what was sent and answered."""
 
 
 class RateTable(Protocol):
@@ -67,90 +51,13 @@ class RateTable(Protocol):
         """Leave it to others, and close the line."""
         ...
 
+    def abandon(self) -> None:
+        """Another process commands it: close the line without a word."""
+        ...
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Limits(_Part):
-    """What the table can; more is not asked of it."""
-
-    rate_dps: float = Field(gt=0)
-    acceleration_dps2: float = Field(gt=0)
-
-
-class Commands(_Part):
-    """Texts that are sent; an empty one is not sent."""
-
-    set_rate: str = Field(min_length=1)
-    read_rate: str
-    stop: str
-    identify: str = ""
-    remote: str = ""
-    local: str = ""
-    set_acceleration: str = ""
-    watchdog: str = ""
-    keep_alive: str = ""
-
-    @field_validator("set_rate", "watchdog")
-    @classmethod
-    def _has_number(cls, text: str, info: ValidationInfo) -> str:
-        number = "{seconds}" if info.field_name == "watchdog" else "{rate}"
-        if text and number not in text:
-            raise ValueError(f"want {number} where the number goes")
-        return text
-
-
-class Replies(_Part):
-    """Regular expressions; of `rate` the first group is the number."""
-
-    rate: str
-    identify: str = ""
-
-    @field_validator("rate", "identify")
-    @classmethod
-    def _is_one(cls, text: str) -> str:
-        try:
-            re.compile(text)
-        except re.error as error:
-            raise ValueError(f"no regular expression: {error}") from None
-        return text
-
-
-class Description(_Part):
-    """The whole file."""
-
-    title: str = Field(min_length=1, max_length=100)
-    unit: Literal["deg/s", "rad/s", "rpm"] = "deg/s"
-    digits: int = Field(default=4, ge=0, le=9)
-    terminator: str = Field(default="\n", min_length=1, max_length=4)
-    answer: str = ""
-    timeout_s: float = Field(default=1.0, gt=0, le=10)
-    watchdog_s: float = Field(default=3.0, ge=1, le=60)
-    baud: int = Field(default=9600, ge=300, le=4_000_000)
-    clockwise_is_positive: bool = False
-    limits: Limits
-    commands: Commands
-    replies: Replies
-
-
-def described(name: str | Path) -> Description:
-    """The description of that file, or the one that comes with gyrofree under the name; raises
-    TableError.
-    """
-    path = DESCRIPTIONS / f"{name}.toml"
-    path = path if path.is_file() else Path(name)
-    try:
-        return Description.model_validate(parsed(text_of(path)))
-    except OSError as error:
-        there = ", ".join(sorted(one.stem for one in DESCRIPTIONS.glob("*.toml")))
-        raise TableError(f"{path}: {error.strerror}; want a file, or one of {there}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise TableError(f"{path}: not TOML: {error}") from None
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise TableError(f"{path}: {where}: {first['msg']}") from None
+    def give_up(self) -> None:
+        """Leave one that does not stand, or does not answer, to its guard; raises nothing."""
+        ...
 
 
 class TextTable:
@@ -162,9 +69,10 @@ class TextTable:
             -1.0 if description.clockwise_is_positive else 1.0
         )
         self._line: serial.SerialBase | None = None
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._guard = Guard(description.model_dump_json(), port)
         self._let_go = threading.Event()  # set: nobody is kept alive
+        self._hurry = threading.Event()  # set: a stop waits, nobody listens to an answer any more
 
     @property
     def name(self) -> str:
@@ -239,8 +147,11 @@ class TextTable:
         return value * self._per_unit
 
     def stop(self) -> None:
-        """See RateTable; waits for nobody longer than one answer."""
-        self._tell(self._said.commands.stop)
+        """See RateTable; what waits for an answer gives way."""
+        self._hurry.set()
+        with self._lock:
+            self._hurry.clear()
+            self._tell(self._said.commands.stop)
         self._guard.end()  # who stopped it sets no rate any more
 
     def release(self) -> None:
@@ -251,6 +162,18 @@ class TextTable:
         finally:
             self._guard.end()
             self.close()
+
+    def abandon(self) -> None:
+        """See RateTable."""
+        self._let_go.set()
+        self._guard.end()
+        self.close()
+
+    def give_up(self) -> None:
+        """See RateTable."""
+        self._let_go.set()
+        self.close()  # the guard opens it
+        self._guard.leave()
 
     def close(self) -> None:
         """Close the line; it is opened again when it is needed."""
@@ -283,13 +206,15 @@ class TextTable:
 
     def _talk(self, command: str, answered: bool) -> str:
         line, end = self._open(), self._said.terminator.encode()
-        line.reset_input_buffer()
+        _drain(line)
         line.write(command.encode() + end)
         if not answered:
             return ""
         until, told = time.monotonic() + self._said.timeout_s, b""
         while not told.endswith(end):
             told += line.read(1) if len(told) < LONGEST else b""
+            if self._hurry.is_set():
+                raise TableError(f"{self.name}: {command!r} was given up for a stop")
             if time.monotonic() > until or len(told) >= LONGEST:
                 heard = repr(told[:80].decode(errors="replace")) if told else "nothing"
                 raise TableError(
@@ -301,10 +226,22 @@ class TextTable:
     def _open(self) -> serial.SerialBase:
         if self._line is None:
             url = self._port.replace("tcp://", "socket://", 1)
-            self._line = serial.serial_for_url(url, baudrate=self._said.baud, timeout=0.1)
+            self._line = serial.serial_for_url(
+                url, baudrate=self._said.baud, timeout=0.1, write_timeout=self._said.timeout_s
+            )
         return self._line
 
     def _close(self) -> None:
         if self._line is not None:
             self._line.close()
             self._line = None
+
+
+def _drain(line: serial.SerialBase) -> None:
+    """Forget what was said before, but not for ever where somebody pours."""
+    if isinstance(line, serial.Serial):
+        line.reset_input_buffer()
+        return
+    until = time.monotonic() + DRAIN_S
+    while line.in_waiting and time.monotonic() < until:
+        line.read(LONGEST)

@@ -5,8 +5,9 @@ import select
 import sys
 import time
 
-from sessions.procedure.guard import ALIVE, HANGS_S, LET_GO
-from sessions.procedure.table import Description, TableError, TextTable
+from sessions.procedure.driven.description import Description, TableError
+from sessions.procedure.driven.guard import ALIVE, HANGS_S, LET_GO
+from sessions.procedure.driven.table import TextTable
 
 TRIES, AGAIN_S = 20, 0.5
 

@@ -10,7 +10,7 @@ import sys
 
 log = logging.getLogger(__name__)
 
-CHILD = "sessions.procedure.left_alone"
+CHILD = "sessions.procedure.driven.left_alone"
 ALIVE, LET_GO = b".", b"q"
 HANGS_S = 20.0  # without a word; a recording that is closed and another begun may take as long
 
@@ -45,6 +45,10 @@ class Guard:
     def end(self) -> None:
         """The table was stopped, or let go; waits for nobody."""
         self._say(LET_GO)
+        self.leave()
+
+    def leave(self) -> None:
+        """As if the driver were gone: the guard stops the table, again and again."""
         if self._process is not None and self._process.stdin is not None:
             self._process.stdin.close()
         self._process = None
