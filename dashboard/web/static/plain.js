@@ -60,9 +60,9 @@ async function poll(list) {
   setTimeout(() => poll(list), EVERY_MS);
 }
 
-if (!hasWebgl()) {
+if (hasWebgl()) document.getElementById("scene").src = "/scene/"; // from here, so that it is not begun in vain
+else {
   const why = document.getElementById("plain");
-  document.getElementById("scene").src = "about:blank";
   document.body.classList.add("no-webgl");
   why.hidden = false;
   standIn(answer);
