@@ -44,6 +44,8 @@ struct Heard {
 // thought to be (E-91).
 class Surprise {
  public:
+  static constexpr double PLAUSIBLE = 0.02 * 0.02;  // of 1, squared: errors of the axes
+
   void observe(const Heard& heard);
   void forget() { *this = Surprise(); }
   bool beyond() const { return worst_ > LIMIT; }
@@ -52,7 +54,6 @@ class Surprise {
 
  private:
   static constexpr int KEPT = 8;  // the longest sum
-  static constexpr double PLAUSIBLE = 0.02 * 0.02;  // of 1, squared
   static constexpr double LIMIT = 45.0;  // chi-square, 6 degrees: by chance once in 2e7
 
   static constexpr double HALF = 20.0;   // the same, by chance once in 400

@@ -291,7 +291,11 @@ void Frame::watch_errors(const Constants& c, long sample, const Moment& moment) 
   if (moment.grow == 0.0) return;
   const Measurement mean = (watch_.total(sample) - watch_.total(sample - EVERY)) / EVERY;
   inexact_.step(first_.filter, c.sensor, c.tuning, {mean, dt_, EVERY, moment.turning, moment.fixed});
-  if (branches_ == 1) surprise_.observe(inexact_.heard());
+  if (branches_ != 1) return;
+  Heard heard = inexact_.heard();
+  const double rounding = square(intake_.resolution(c.sensor)) / 6.0;  // it lasts as long as readings stay equal
+  heard.by_errors += rounding / Surprise::PLAUSIBLE * c.sensor.drift.block<PRODUCTS, PRODUCTS>(PRODUCTS_M, PRODUCTS_M);
+  surprise_.observe(heard);
 }
 
 // The window again, about what its end says, when it is due and all of it was turning (E-49).
