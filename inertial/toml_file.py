@@ -13,6 +13,8 @@ from typing import Any, TypeVar
 
 import tomli_w
 
+from inertial.whole_file import put_in_place
+
 T = TypeVar("T")
 
 LARGEST = 16 * 1024**2  # bytes of a file of settings
@@ -65,7 +67,7 @@ def write_whole(table: dict[str, Any], path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_name(path.name + ".part")
     draft.write_bytes(tomli_w.dumps(table).encode())
-    draft.replace(path)
+    put_in_place(draft, path)
 
 
 def read_versioned(

@@ -61,17 +61,21 @@ class BoardLog:
 
 
 def read_board_log(
-    path: Path, gnss: Path | None = None, units_as_named: bool = False, lsb_mg: float = LSB_MG
+    path: Path,
+    gnss: Path | None = None,
+    units_as_named: bool = False,
+    lsb_mg: float = LSB_MG,
+    tacho: Path | None = None,
 ) -> BoardLog:
     """Read and check a log: a CSV file or a folder with imu.csv. gnss: its epochs; default gnss.csv
-    beside it, if any. Raises LogError, OSError.
+    beside it, if any. tacho: a cube's tachometer in a file of its own. Raises LogError, OSError.
     """
     path = Path(path)
     if path.is_dir():
         path = path / sample_file(path)
     sheet = open_sheet(path)
     if any(f"a11_{unit}" in sheet.header for unit in ("counts", "mps2", "g", "mg")):
-        return _cube(path, units_as_named, lsb_mg)
+        return _cube(path, units_as_named, lsb_mg, tacho)
     beside = path.parent / epoch_file(path.name)
     if gnss is None and beside.is_file():
         gnss = beside
@@ -115,8 +119,8 @@ def _near(fix: Fix, t: Array) -> bool:
     return place and t[0] - NEAR_S <= fix.t <= t[-1] + NEAR_S
 
 
-def _cube(path: Path, as_named: bool, lsb_mg: float) -> BoardLog:
-    log = read_log(path, CUBE_AXES, lsb_mg)
+def _cube(path: Path, as_named: bool, lsb_mg: float, tacho: Path | None) -> BoardLog:
+    log = read_log(path, CUBE_AXES, lsb_mg, tacho)
     counts = log.counts
     if counts is None:
         raise LogError(

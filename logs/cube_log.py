@@ -83,8 +83,11 @@ class CubeLog:
         return float(self.t_s[-1] - self.t_s[0])
 
 
-def read_log(path: Path, names: Sequence[str], lsb_mg: float | None = None) -> CubeLog:
-    """Read and check a log of these axes; lsb_mg scales counts, default 3.9 mg.
+def read_log(
+    path: Path, names: Sequence[str], lsb_mg: float | None = None, tacho: Path | None = None
+) -> CubeLog:
+    """Read and check a log of these axes; lsb_mg scales counts, default 3.9 mg; tacho: the
+    tachometer's reports, where they are in a file of their own.
 
     Raises LogError for what cannot be used and OSError for a file that cannot be read.
     """
@@ -119,7 +122,7 @@ def read_log(path: Path, names: Sequence[str], lsb_mg: float | None = None) -> C
         index=timing.index,
         timing=timing,
         gaps=_gaps(timing, table),
-        tacho=table[TACHO] if TACHO in table else beside(sheet, table["t"]),
+        tacho=table[TACHO] if TACHO in table else beside(sheet, table["t"], tacho),
         omega_b=_columns(table, TRUE_RATE),
         q_nb=_attitude(path, table, _columns(table, TRUE_ATTITUDE)),
         cut_off=table.cut_off,

@@ -1,4 +1,4 @@
-"""The tachometer of an export of ours, which stands in a file beside the samples'."""
+"""The tachometer in a file of its own: beside an export of ours, or one that a person names."""
 
 import csv
 import logging
@@ -18,17 +18,16 @@ TOGETHER = 2e-6  # s; clocks of both files are written alike
 STANDS_S = 0.5  # s without a report: no pulse came
 
 
-def beside(sheet: Sheet, t_s: Array) -> Array | None:
-    """Rate (n,) rad/s at samples t_s (n,) of an export NAME.accel.csv by the reports of
-    NAME.tacho.csv; None where there are none.
+def beside(sheet: Sheet, t_s: Array, named: Path | None = None) -> Array | None:
+    """Rate (n,) rad/s at samples t_s (n,) by the reports of a file that is named, else of an export
+    NAME.accel.csv by those of NAME.tacho.csv; None where there are none.
 
     Each report holds until the next; where none follows, as long as the one before did, and then
     the table stands, as it does before the first. Raises LogError for reports that cannot be read.
     """
-    if not (sheet.head.own and sheet.path.name.endswith(SAMPLES)):
-        return None
-    path = sheet.path.with_name(sheet.path.name.removesuffix(SAMPLES) + REPORTS)
-    if not path.is_file():
+    path = named or sheet.path.with_name(sheet.path.name.removesuffix(SAMPLES) + REPORTS)
+    exported = sheet.head.own and sheet.path.name.endswith(SAMPLES) and path.is_file()
+    if not (named or exported):
         return None
     reports = open_sheet(path).read(["t_s", "tacho_rad_s"])
     if not len(reports):
@@ -47,7 +46,8 @@ def _signed(path: Path) -> bool:
         return True
     place = sheet.header.index("direction_known")
     with path.open(encoding=sheet.encoding, newline="") as lines:
-        return all(row[place : place + 1] != ["False"] for row in csv.reader(lines))
+        rows = csv.reader(lines, delimiter=sheet.separator)
+        return not any(cell.lower() in ("false", "0") for row in rows for cell in row[place:][:1])
 
 
 def _held(t: Array, rate: Array, at: Array) -> Array:

@@ -287,6 +287,8 @@ class Sheet:
     def _comma_hint(self, cell: str) -> str:
         if THOUSANDS.fullmatch(cell):
             return " (write numbers without a separator of thousands)"
+        if self.decimal == "," and is_number(cell, "."):
+            return " (other numbers of the file have a decimal comma)"
         if self.decimal == "." and is_number(cell, ","):
             return " (a decimal comma wants another separator of columns: semicolon or tab)"
         return ""

@@ -137,6 +137,8 @@ def count(line: str, separator: str) -> int:
 
 
 def is_number(cell: str, decimal: str) -> bool:
+    if decimal != "." and "." in cell:
+        return False
     try:
         float(cell.strip().strip('"').replace(decimal, "."))
     except ValueError:

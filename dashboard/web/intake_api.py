@@ -11,8 +11,15 @@ from dashboard.web.api import Operator, SignedIn, file_of, find_session
 from dashboard.web.front import Front, front_of
 from dashboard.web.schemas import Line, Strict
 from dashboard.web.session_api import JobOut, start_job
-from dashboard.web.uploads import FILES, Upload, UploadError, samples_and_fixes
-from logs.sheet import LogError
+from dashboard.web.uploads import (
+    FILES,
+    Upload,
+    UploadError,
+    is_tachometer,
+    samples_and_fixes,
+    samples_and_tacho,
+)
+from logs.sheet import LogError, open_sheet
 from logs.tables.preview import TARGETS, look, rewritten
 from messages import text
 from sessions.report import photo
@@ -140,14 +147,19 @@ def finish_import(request: Request, upload: int, body: ImportOrder, who: Operato
             path = found.folder / text.composed(name)
             if path not in list(found.folder.iterdir()):
                 raise UploadError(f"{text.plain(name, 80)}: no such file was sent")
+            if is_tachometer(open_sheet(path).header):
+                continue  # it says more than its numbers: which direction is known
             mapped = path.with_name(".mapped")
             rewritten(path, columns, mapped)
             mapped.replace(path)
-        samples, fixes = samples_and_fixes(sorted(found.folder.iterdir()))
+        files = sorted(found.folder.iterdir())
+        turned = samples_and_tacho(files)
+        samples, fixes = (turned[0], None) if turned else samples_and_fixes(files)
     except (UploadError, LogError, OSError) as error:
         raise HTTPException(409, _without(found, error)) from None
     order = ["import", str(samples), "--device", body.device, "--name", body.name]
     order += ["--gnss", str(fixes)] if fixes else []
+    order += ["--tacho", str(turned[1])] if turned else []
     order += ["--start", body.start] if body.start else []
     found.reading = True
     end = {

@@ -5,11 +5,15 @@ import re
 import shutil
 import tempfile
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from logs.sheet import open_sheet
+
 HEAD = 8192  # bytes of a file that its header and some rows are in
 LATITUDE = re.compile(r"(?<![a-z])lat(itude)?(?![a-z])")
+SAMPLES = re.compile(r"(f|w)[xyz]_|a\d{2,3}_")
 RECEIVER = re.compile(r"gnss|gps")
 FILES = 4  # of one upload
 AT_ONCE = 4  # uploads that have not been finished; the oldest gives way
@@ -17,6 +21,21 @@ AT_ONCE = 4  # uploads that have not been finished; the oldest gives way
 
 class UploadError(ValueError):
     """Files that no session can be made of; the text says what is wanted."""
+
+
+def samples_and_tacho(files: list[Path]) -> tuple[Path, Path] | None:
+    """A cube's samples and the tachometer's reports of it, by their columns; None for other files.
+    Raises LogError, OSError.
+    """
+    if len(files) != 2:
+        return None
+    reports = [file for file in files if is_tachometer(open_sheet(file).header)]
+    return next((a, b) for a in files for b in reports if a != b) if len(reports) == 1 else None
+
+
+def is_tachometer(header: Sequence[str]) -> bool:
+    """A rate of a table, and no sample of anything."""
+    return "tacho_rad_s" in header and not any(SAMPLES.match(name) for name in header)
 
 
 def samples_and_fixes(files: list[Path]) -> tuple[Path, Path | None]:
@@ -33,7 +52,7 @@ def samples_and_fixes(files: list[Path]) -> tuple[Path, Path | None]:
     names = ", ".join(file.name for file in files) or "no file"
     raise UploadError(
         f"{names}: want one CSV of samples and, for a drive, one of fixes, whose columns have"
-        " latitude and longitude"
+        " latitude and longitude, or for a cube one of its tachometer, with tacho_rad_s"
     )
 
 

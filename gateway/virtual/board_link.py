@@ -15,7 +15,9 @@ WRITE_WAIT_S = 0.2  # a reader that takes nothing for so long costs the frame
 
 
 class PtyLink:
-    """A pty; the gateway opens `path`. symlink: a stable name for it, replaced when it exists."""
+    """A pty; the gateway opens `path`. symlink: a stable name for it; a link of that name is
+    replaced. Raises FileExistsError for anything else that is there.
+    """
 
     def __init__(self, symlink: Path | None = None) -> None:
         self._master, slave = os.openpty()
@@ -23,6 +25,8 @@ class PtyLink:
         self.path = os.ttyname(slave)
         self._symlink = symlink
         if symlink is not None:
+            if symlink.exists() and not symlink.is_symlink():
+                raise FileExistsError(f"{symlink}: there is a file of this name; want a new name")
             symlink.parent.mkdir(parents=True, exist_ok=True)
             symlink.unlink(missing_ok=True)
             symlink.symlink_to(self.path)
@@ -49,8 +53,8 @@ class PtyLink:
 
     def close(self) -> None:
         """Unplug."""
-        if self._symlink is not None:
-            self._symlink.unlink(missing_ok=True)
+        if self._symlink is not None and self._symlink.is_symlink():
+            self._symlink.unlink()
         os.close(self._master)
 
 

@@ -129,6 +129,7 @@ def import_log(
     gnss: Annotated[
         Path | None, typer.Option(help="CSV of GNSS epochs beside a single CSV of samples.")
     ] = None,
+    tacho: Annotated[Path | None, typer.Option(help="CSV of a cube's t_s, tacho_rad_s.")] = None,
     device: Annotated[str, typer.Option(help="Device name for the samples.")] = "log",
     name: Annotated[
         str, typer.Option(help="Added to the session's id.", callback=session_name)
@@ -152,7 +153,7 @@ def import_log(
     try:
         check_name(device)
         start_s = importer.start_of(start)
-        source = read_board_log(log, gnss, units_as_named)
+        source = read_board_log(log, gnss, units_as_named, tacho=tacho)
         for note in source.notes:
             say(f"note: {note}", file=sys.stderr)
         rows = importer.rows_of(source, settings.bus.prefix, device, start_s)
@@ -229,7 +230,7 @@ def rerun(
     from estimator.choice import UnknownEstimator
     from estimator.pipeline import Pipeline
     from gyrofree.running.rerun_settings import from_library, with_changes
-    from sessions.replay.rerun import estimates_again, rerun_id, write_session
+    from sessions.replay.rerun import Damage, estimates_again, note_damage, rerun_id, write_session
 
     settings = settings_of(config)
     path, short = file_of(settings, session), slug(name, 24) or "new"
@@ -243,7 +244,8 @@ def rerun(
         settings = settings.model_copy(update={"estimator": estimator})
         pipeline = Pipeline(estimator)
         with progress_bar() as progress:
-            rows = estimates_again(path, pipeline, short if beside else "", progress)
+            damage = Damage()
+            rows = estimates_again(path, pipeline, short if beside else "", progress, damage)
             what = ", ".join([*sum(changes.values(), []), *(changed or [])]) or "this configuration"
             note = f"{path.parent.name} again: {what}"
             folder = write_session(
@@ -254,6 +256,7 @@ def rerun(
                 settings.model_dump(mode="json"),
             )
         give_title(folder, name)
+        note_damage(folder, damage)
     except (UnknownEstimator, SessionError, ValueError, OSError) as error:
         raise fail(error, EXIT_CONFIG) from None
     say(json.dumps({"session": folder.name}) if as_json else folder.name)

@@ -9,6 +9,7 @@ from pathlib import Path
 from gyrofree.config import Settings, check
 from gyrofree.setup.written import as_toml
 from inertial.layouts.catalogue import LAYOUTS
+from inertial.whole_file import put_in_place
 
 NAMES = {"cube": "cube", "imu": "imu", "analogue": "tilt-board"}
 HEAD = (
@@ -93,7 +94,7 @@ def write(path: Path, settings: Settings) -> Path | None:
         with os.fdopen(handle, "w", encoding="utf-8") as stream:
             stream.write(as_toml(settings, HEAD))
             os.fchmod(stream.fileno(), 0o644)
-        os.replace(name, path)
+        put_in_place(Path(name), path)
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise

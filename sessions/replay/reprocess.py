@@ -17,6 +17,8 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from inertial.whole_file import put_in_place
+
 Row = dict[str, Any]
 Work = Callable[[Path], list[Row]]  # an MCAP file -> its rows
 
@@ -109,4 +111,4 @@ def write_table(out: Path, rows: list[Row]) -> None:
     out.parent.mkdir(parents=True, exist_ok=True)
     new = out.with_name(out.name + ".new")
     pq.write_table(pa.Table.from_pylist(rows, schema=COLUMNS), new, compression="zstd")
-    os.replace(new, out)
+    put_in_place(new, out)

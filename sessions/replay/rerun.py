@@ -11,6 +11,7 @@ from pathlib import Path
 
 from messages.contract.topics import ATTITUDE, AXES, ESTIMATOR, PIPELINE_INPUTS, POSE, parse
 from sessions.export.table import Progress, Selection, messages, silent
+from sessions.library.annotations import SessionNote, add_note
 from sessions.recording.manifest import (
     SESSION_ID,
     Manifest,
@@ -18,6 +19,8 @@ from sessions.recording.manifest import (
     check_id,
     next_number,
 )
+from sessions.recording.mcap_damage import Damage
+from sessions.recording.mcap_log import say
 from sessions.recording.settings import RecorderSettings
 from sessions.recording.store import SessionStore, versions
 from sessions.replay.reproduce import ESTIMATES, Pipeline, give_orders
@@ -26,18 +29,24 @@ COMPUTED = (*ESTIMATES, POSE, ESTIMATOR, ATTITUDE, AXES)  # what a pipeline publ
 
 
 def estimates_again(
-    path: Path, pipeline: Pipeline, name: str = "", progress: Progress = silent
+    path: Path,
+    pipeline: Pipeline,
+    name: str = "",
+    progress: Progress = silent,
+    damage: Damage | None = None,
 ) -> Iterator[tuple[int, str, bytes]]:
     """(receive time ns, bus key, payload) of the inputs as recorded and of the estimates as
     computed now.
 
     `name` is added to the names of the new estimators, and the old estimates stay beside them;
-    without it the new ones take their place. Header sequences count from 1 per key. Raises OSError.
+    without it the new ones take their place. Header sequences count from 1 per key. What cannot be
+    read is counted in `damage`. Raises SessionError for a file without any message, OSError.
     """
+    damage = Damage() if damage is None else damage
     counts: dict[str, int] = {}
     size, seen = max(1, path.stat().st_size), 0
     give_orders(path, pipeline)
-    for row, topic, message in messages(path, Selection()):
+    for row, topic, message in messages(path, Selection(), damage):
         seen += len(row.payload) + 40
         if topic not in COMPUTED or name:
             yield row.log_ns, row.key, row.payload
@@ -57,7 +66,16 @@ def estimates_again(
             yield row.log_ns, key, estimate.SerializeToString()
         if sum(counts.values()) % 1000 < 2:
             progress(min(0.99, seen / (4 * size)), "estimating")
+    say(path, damage)
+    if not seen:
+        raise SessionError(f"{path}: {'; '.join(damage.said()) or 'it has no message'}")
     progress(1.0, "estimated")
+
+
+def note_damage(folder: Path, damage: Damage) -> None:
+    """Say in a session what was wrong with the recording that it is of. Raises as add_note."""
+    for text in damage.said():
+        add_note(folder, SessionNote(text=f"of a recording that is {text}"))
 
 
 def write_session(

@@ -83,6 +83,25 @@ def test_files_are_taken_as_they_are_called(door, form):
             assert client.get(f"/sessions/{job['made']}").status_code == 200
 
 
+def test_a_cube_s_tachometer_may_be_in_a_file_of_its_own(door):
+    """Together with the samples, whatever both are called."""
+    table = b"t_s;tacho_rad_s\n" + b"".join(b"%d,%d;1,5\n" % divmod(k, 10) for k in range(40))
+    with door.client("otto") as client:
+        upload, _ = sent(client, "cube.csv")
+        at = f"/api/imports/{upload}/files/turntable.csv"
+        assert client.post(at, params={"at": 0}, content=table).is_success
+        found = client.get(f"/api/imports/{upload}/look").json()["files"]
+        columns = {
+            name: {c["name"]: c["guess"] for c in one["columns"]} for name, one in found.items()
+        }
+        assert columns["turntable.csv"] == {"t_s": "t_s", "tacho_rad_s": "tacho_rad_s"}
+        order = {"device": "cube", "columns": columns}
+        job = ended(client, client.post(f"/api/imports/{upload}/finish", json=order))
+        assert job["state"] == "done", job
+    recording = door.folder / "sessions" / job["made"] / "session.json"
+    assert "/tacho" in recording.read_text()
+
+
 def test_one_file_in_two_spellings_is_one_file(door):
     with door.client("otto") as client:
         _, (_, again) = sent(client, "Prüf.csv", unicodedata.normalize("NFD", "Prüf.csv"))

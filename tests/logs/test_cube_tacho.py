@@ -42,6 +42,17 @@ def test_no_report_is_heard_before_its_time_nor_half_a_second_after(tmp_path_fac
     assert not found[at < min(times) - 3e-6].any()
 
 
+def test_reports_that_are_named_need_no_export(tmp_path):
+    log, reports = tmp_path / "cube.csv", tmp_path / "turntable.csv"
+    log.write_text("t_s,a11_counts\n0,5\n")
+    reports.write_text("Time (s);tacho_rad_s;direction_known\n0,0;1,5;True\n0,1;-2;True\n")
+    sheet = open_sheet(log)
+    assert beside(sheet, np.zeros(1)) is None
+    np.testing.assert_array_equal(beside(sheet, np.array([0.05, 0.15]), reports), [1.5, -2.0])
+    reports.write_text("t_s;tacho_rad_s;direction_known\n0,0;1,5;false\n")
+    assert beside(sheet, np.zeros(1), reports) is None
+
+
 def test_without_direction_or_file_there_is_none(tmp_path):
     assert beside(files(tmp_path, [(0.0, 1.0)], known=False), np.zeros(1)) is None
     (tmp_path / "cube.tacho.csv").unlink()

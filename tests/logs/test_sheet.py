@@ -267,6 +267,7 @@ def test_a_date_is_a_time(tmp_path, first, second, apart, name):
         ('t_s,a\n0,1\n1,"1,234"\n', "thousands"),
         ("t_s;a\n0;1\n1;1.234,5\n", "thousands"),
         ("t_s,a,a\n0,1,2\n", "column 'a' stands there twice"),
+        ("t_s;a\n0.00;1,5\n", ":2: column 't_s': '0.00' is no finite number (other numbers"),
         ("time (ms),a\n0,1\n", "column 't_s' is missing, found time (ms), a"),
         ("time (furlongs),a\n0,1\n", "column 't_s' is missing"),
     ],

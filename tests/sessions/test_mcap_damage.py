@@ -12,6 +12,8 @@ from mcap.writer import CompressionType, IndexType, Writer
 from support.table_session import table_recording
 from typer.testing import CliRunner
 
+from estimator.pipeline import Pipeline
+from estimator.settings import EstimatorSettings
 from gyrofree.commands.main import app
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ACCEL, BY_NAME
@@ -19,9 +21,11 @@ from sessions.export.export import FORMATS
 from sessions.export.table import survey
 from sessions.library.curves_build import build
 from sessions.library.scan import scan
+from sessions.recording.manifest import SessionError
 from sessions.recording.mcap_append import descriptor_set
 from sessions.recording.mcap_index import summary_of
 from sessions.recording.mcap_log import Damage, _say, read
+from sessions.replay.rerun import estimates_again
 from sessions.replay.source import Source
 
 KEY = "gyrofree/cube/accel"
@@ -114,6 +118,14 @@ def test_what_is_no_recording_is_named(tmp_path):
     ):
         _, damage, _ = all_of(tmp_path, data)
         assert words in str(damage) and not damage.whole, (data[:20], damage)
+
+
+def test_a_recording_without_messages_is_not_estimated_again(tmp_path):
+    path = tmp_path / "recording.mcap"
+    for data, words in ((b"", "it is empty"), (b"\x89MCAP0\r\n", "ends at byte 8")):
+        path.write_bytes(data)
+        with pytest.raises(SessionError, match=words):
+            list(estimates_again(path, Pipeline(EstimatorSettings())))
 
 
 def record_at(data, kind):
