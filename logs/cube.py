@@ -249,6 +249,7 @@ def run_estimator(
             left_out = part.mask
             if (error := leave_out(estimator, left_out)) is not None:
                 refused = f"{name} knew nothing while axes were not good: {error}"
+        estimator.doubt(part.doubted)
         for begin in range(part.begin, part.end, BLOCK):
             rows = slice(begin, min(begin + BLOCK, part.end))
             said.take(rows, estimator.feed(data.t_s[rows], f_axis[rows]))

@@ -25,6 +25,7 @@ class Part:
     end: int
     missing: int  # samples before its first
     mask: int  # bit k: axis k is not believed
+    doubted: bool = False  # the axes do not fit one motion, and nothing explains that yet
 
 
 @dataclass(frozen=True)
@@ -54,8 +55,8 @@ def monitored(data: CubeLog, shape: Layout, f_axis: Array) -> Monitored:
         if missing:
             monitor.skip(missing)
         at = begin
-        for stop, mask in monitor.feed(data.t_s[begin:end], f_axis[begin:end]):
-            parts.append(Part(at, begin + stop, missing if at == begin else 0, mask))
+        for stop, mask, doubted in monitor.feed(data.t_s[begin:end], f_axis[begin:end]):
+            parts.append(Part(at, begin + stop, missing if at == begin else 0, mask, doubted))
             at = begin + stop
     return Monitored(tuple(parts), tuple(monitor.faults), monitor.belief.width.text)
 

@@ -151,8 +151,10 @@ class RateBoard:
         self._watch.feed(t_s, f_axis)
         f_axis = np.ascontiguousarray(f_axis, dtype=np.float64)
         out, begin = [], 0
-        for end, mask in self.health.feed(t_s, f_axis, stale):
+        for end, mask, doubted in self.health.feed(t_s, f_axis, stale):
             self._tell(mask)
+            for estimator in self._estimators.values():
+                estimator.doubt(doubted)
             out += self._run(
                 first_index, begin, t_s[begin:end], f_axis[begin:end], every(period_s, self._limit)
             )

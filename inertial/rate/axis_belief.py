@@ -89,15 +89,19 @@ class Belief:
         return parity.Tuning(c.sigma_alpha, c.sigma_force, max(self._scale, scale), scale)
 
     def credible(self, mean: Array, used: NDArray[np.bool_]) -> bool:
-        """May good axes have the offsets that a standstill of these mean readings (N,) shows? More
-        is believed of axes that were never seen at rest.
+        """May good axes have the offsets that a standstill of these mean readings (N,) shows?"""
+        return self._offsets(mean, used) is not None
+
+    def _offsets(self, mean: Array, used: NDArray[np.bool_]) -> Array | None:
+        """Offsets (N,) that a standstill of these mean readings (N,) shows; None where they are
+        beyond belief. More is believed of axes that were never seen at rest.
         """
         off = parity.offsets_at_rest(self._theta, mean, used)
         allowed = self.constants().offset + self.white + (self.tuning().scale * 9.8) ** 2 * 0.1
         most = 20.0 * allowed
         if not self.learned.any():
             most = np.maximum(most, np.minimum(9.0 * most, FIRST_OFFSET**2))
-        return not np.any((off - self.bias)[used] ** 2 > most[used])
+        return None if np.any((off - self.bias)[used] ** 2 > most[used]) else off
 
     def far_off(self, mean: Array, used: NDArray[np.bool_]) -> dict[int, float]:
         """The used axes whose offset at a first standstill of these mean readings (N,) is beyond
@@ -145,9 +149,9 @@ class Belief:
         """Offsets of the used axes at a standstill of these mean readings (N,); False where they
         are beyond belief.
         """
-        if not self.credible(mean, used):
+        off = self._offsets(mean, used)
+        if off is None:
             return False
-        off = parity.offsets_at_rest(self._theta, mean, used)
         self.bias = np.where(used, off, self.bias)
         self.reference = np.where(used, mean, self.reference)
         self.offset = np.where(used, self.config.offset_left**2, self.offset)

@@ -55,6 +55,10 @@ class RateEstimator(Protocol):
         """Take the samples from here on for none, as when their axes are stale: unknown is said."""
         ...
 
+    def doubt(self, on: bool) -> None:
+        """Take the samples from here on, but nothing is valid: their axes do not fit one motion."""
+        ...
+
     def tacho(self, t_s: float, rate: float, sigma: float, signed: bool = True) -> None:
         """A tachometer's rate (rad/s, with its sigma) up to its newest pulse at t_s (s, the clock
         of the samples).
@@ -128,6 +132,10 @@ class LeastSquaresRate(_Stepping):
         """See RateEstimator.withhold."""
         self._core.native.withhold(on)
 
+    def doubt(self, on: bool) -> None:
+        """See RateEstimator.doubt."""
+        self._core.native.doubt(on)
+
     def tacho(self, t_s: float, rate: float, sigma: float, signed: bool = True) -> None:
         """See RateEstimator.tacho: no aid."""
 
@@ -199,6 +207,10 @@ class ProductsRate(_Stepping):
     def withhold(self, on: bool) -> None:
         """See RateEstimator.withhold."""
         self.core.native.withhold(on)
+
+    def doubt(self, on: bool) -> None:
+        """See RateEstimator.doubt."""
+        self.core.native.doubt(on)
 
     def exclude(self, mask: int) -> None:
         """See RateEstimator.exclude."""

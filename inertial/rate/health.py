@@ -20,7 +20,7 @@ from inertial.rate import axis_samples, parity
 from inertial.rate.axis_belief import Belief
 from inertial.rate.axis_fault import AxisState
 from inertial.rate.axis_verdicts import Verdicts, mute
-from inertial.rate.health_config import STANDSTILL, Config, Counts, Newest
+from inertial.rate.health_config import STANDSTILL, Config, Counts, Newest, Part
 from inertial.rate.hypotheses import Finding, History, Known, explain, start
 from inertial.rate.samples import BRIDGED
 
@@ -61,7 +61,7 @@ class HealthMonitor:
         self.history = History(n)
         self._x: Array | None = None
         self._P = np.eye(parity.STATES)
-        self._sum = 0.0  # of NIS beyond the gate
+        self._sum, self._doubted = 0.0, False  # of NIS beyond the gate; it is so much
         self._asked = 0
         self._t = 0.0
         self._gap_s = 0.0
@@ -74,6 +74,11 @@ class HealthMonitor:
     def mask(self) -> int:
         """Bit k: axis k is excluded; all of them where so many do not fit that none is believed."""
         return (1 << self.layout.axes) - 1 if self._beyond_belief else self._mask
+
+    @property
+    def doubted(self) -> bool:
+        """Readings do not fit one motion: nothing that is made of them is valid (H-15)."""
+        return self._doubted or self._clean_blocks > self.counts.blocks
 
     def _known(self) -> Known:
         belief = self.belief
@@ -89,15 +94,15 @@ class HealthMonitor:
         """
         self.feed(np.array([t_s]), np.asarray(f_axis)[None], stale)
 
-    def feed(self, t_s: Array, f_axis: Array, stale: int = 0) -> list[tuple[int, int]]:
+    def feed(self, t_s: Array, f_axis: Array, stale: int = 0) -> list[Part]:
         """Samples at t_s (n,), s, board's clock, readings (n, N) m/s^2; how they are batched
         changes nothing.
 
-        Returns the batch cut where the mask changed: (end, mask) of each part.
-        A change holds from the very sample that made it.
+        Returns the batch cut where the mask or the doubt changed. A change holds from the very
+        sample that made it.
         """
         f, row, parts = np.ascontiguousarray(f_axis, dtype=np.float64), 0, []
-        mask = self.mask
+        said = self.mask, self.doubted
         near, marks = self._near, self._marks
         while row < len(f):
             row = axis_samples.gather(
@@ -121,10 +126,10 @@ class HealthMonitor:
             near[axis_samples.SUM] = 0.0
             self._block(block, dt)
             self._stale = 0
-            if self.mask != mask:
-                parts.append((row - 1, mask))
-                mask = self.mask
-        return [*(part for part in parts if part[0] > 0), (len(f), mask)]
+            if said != (now := (self.mask, self.doubted)):
+                parts.append(Part(row - 1, *said))
+                said = now
+        return [*(part for part in parts if part.end > 0), Part(len(f), *said)]
 
     def skip(self, samples: int) -> None:
         """Samples are missing before the next one."""
@@ -150,9 +155,8 @@ class HealthMonitor:
 
     def _block(self, block: Array, dt: float) -> None:
         self.counts.blocks += 1
-        coarse = axis_samples.resolution(self._near, self.belief.noise)
         ratio = axis_samples.measured_noise(self._near, self._marks, self.belief.free)
-        self.belief.hear(ratio, coarse)
+        self.belief.hear(ratio, axis_samples.resolution(self._near, self.belief.noise))
         self._single_axes()
         if self._sees and np.count_nonzero(self.used) > 6:
             self._check(block, dt)
@@ -219,11 +223,13 @@ class HealthMonitor:
         expected = c.gate * (degrees - 6) + 6.0
         self._sum = max(0.0, self._sum + min(nis, 4.0 * degrees) - expected)
         self.history.add(block, dt, *before, self._sum == 0.0)
+        self._doubted = bool(self._sum > c.doubt * degrees)
         if self._sum == 0.0:
             self._asked = 0
             self.verdicts.clear_suspects(self._t)
             self._learn(self.history.all_well(STANDSTILL))
         elif self._at_first_rest():  # offsets larger than expected are learned, not blamed
+            self._doubted = False
             self._learn(True)
         elif self._sum > c.alarm * degrees:
             self._asked += 1
@@ -246,6 +252,7 @@ class HealthMonitor:
 
     def _adopt(self, finding: Finding) -> None:
         self._x, self._P, self._sum, self._asked = finding.x, finding.P, 0.0, 0
+        self._doubted = False
         self.history.clear()
         if finding.width is not None:
             self.belief.width = finding.width
@@ -272,8 +279,7 @@ class HealthMonitor:
         """The filter believed the axis until now: run the newest blocks again without it."""
         again = self.history.replay_without(self._known())
         if again is not None:
-            self._x, self._P = again
-            self._sum = 0.0
+            (self._x, self._P), self._sum, self._doubted = again, 0.0, False
 
     def _restart(self) -> None:
         self.counts.restarts += 1
@@ -281,7 +287,7 @@ class HealthMonitor:
             "readings do not fit the motion of one rigid body, and no single axis explains it"
         )
         self._clean_blocks = self.counts.blocks + 25
-        self._x, self._sum, self._asked = None, 0.0, 0
+        self._x, self._sum, self._asked, self._doubted = None, 0.0, 0, False
         self.history.clear()
         self.verdicts.clear_suspects(self._t)
 

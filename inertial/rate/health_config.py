@@ -1,6 +1,7 @@
 """Limits of the axis monitor (health.py), and what it tells."""
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ class Config:
     offset_left: float = 0.03  # m/s^2, after it: drift
     gate: float = 1.5  # of the NIS expected of a block: what lies above it adds up
     alarm: float = 10.0  # times the axes in use: sum at which hypotheses are asked
+    doubt: float = 1.0  # the same: sum at which nothing is valid until it is explained
     decide_s: float = (
         1.3  # s after which the best explanation counts although another axis is nearly as good
     )
@@ -60,3 +62,11 @@ class Newest:
     nis: float = 0.0
     degrees: int = 0
     filled: bool = field(default=False)
+
+
+class Part(NamedTuple):
+    """Samples up to row `end` of a batch, and what was thought of the axes then."""
+
+    end: int
+    mask: int  # bit k: axis k is excluded
+    doubted: bool  # readings do not fit one motion, and nothing explains that yet

@@ -122,7 +122,32 @@ def test_where_many_axes_do_not_fit_none_is_believed():
         readings = block.readings[:, [3, 4, 5, 0, 1, 2, *range(6, 12)]]
         for k in range(0, len(readings), 50):
             part = slice(k, k + 50)
-            for _, mask in monitor.feed(block.t_s[part], readings[part]):
+            for _, mask, _ in monitor.feed(block.t_s[part], readings[part]):
                 error = leave_out(estimator, mask)
     assert monitor.mask == 0xFFF and "none is believed" in monitor.message
     assert error is not None and "wiring" in str(error)
+
+
+def test_until_contradicting_readings_are_explained_nothing_is_valid():
+    """Two axes are exchanged while the table turns: doubted first, then named."""
+    table = TableTest(seed=5)
+    layout, a, b = table.layout, NAMES.index("a11"), NAMES.index("a22")
+    monitor, estimator = HealthMonitor(layout), ESTIMATORS["least-squares"](layout)
+    doubted, named = [], []
+    for block in (table.block(0), table.block(1)):
+        readings = block.readings.copy()
+        turned = block.t_s >= 7.0
+        readings[np.ix_(turned, [a, b])] = readings[np.ix_(turned, [b, a])]
+        begin = 0
+        for end, mask, doubt in monitor.feed(block.t_s, readings):
+            estimator.doubt(doubt)
+            said = estimator.feed(block.t_s[begin:end], readings[begin:end])
+            if doubt:
+                doubted.append(block.t_s[begin])
+                assert (said.sight == sight.BLIND).all()
+                assert "contradict" in said.sight_reason(0)
+            if mask:
+                named.append(block.t_s[begin])
+            begin = end
+    assert 7.0 < doubted[0] < 7.5 and doubted[0] < named[0]
+    assert not monitor.doubted

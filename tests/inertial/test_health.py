@@ -345,6 +345,9 @@ class Told:
     def withhold(self, on):
         pass
 
+    def doubt(self, on):
+        pass
+
     def exclude(self, mask: int) -> None:
         self.masks.append(mask)
 

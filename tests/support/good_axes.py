@@ -60,6 +60,6 @@ def watch(readings: Readings, layout: Layout | None = None) -> tuple[HealthMonit
     for part in np.split(np.arange(len(readings.t_s)), holes):
         if part[0]:
             monitor.skip(int(readings.index[part[0]] - readings.index[part[0] - 1]) - 1)
-        for _, mask in monitor.feed(readings.t_s[part], readings.f_axis[part]):
+        for _, mask, _ in monitor.feed(readings.t_s[part], readings.f_axis[part]):
             out |= mask
     return monitor, {k for k in range(monitor.layout.axes) if out >> k & 1}

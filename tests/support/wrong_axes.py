@@ -143,7 +143,8 @@ def followed(log: Log, name: str = "products-ekf", batch: int = BATCH) -> Run:
     for first in range(0, len(log.t_s), batch):
         t_s, f_axis = (column[first : first + batch] for column in log[:2])
         at = 0
-        for end, mask in monitor.feed(t_s, f_axis):
+        for end, mask, doubted in monitor.feed(t_s, f_axis):
+            estimator.doubt(doubted)
             if mask != left_out:
                 left_out = mask
                 leave_out(estimator, left_out)

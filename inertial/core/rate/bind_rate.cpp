@@ -79,6 +79,7 @@ class ProductsFilter {
 
   void gap() { memory_->frame.gap(); }
   void withhold(bool on) { memory_->frame.intake().withhold(on); }
+  void doubt(bool on) { memory_->frame.intake().doubt(on); }
   long refused() { return memory_->frame.intake().refused(); }
   nb::bytes snapshot() const { return image(*memory_); }
   void restore_from(const nb::bytes& bytes) { restore(*memory_, bytes); }
@@ -121,6 +122,7 @@ class LeastSquaresFilter {
 
   void gap() { memory_->gap(); }
   void withhold(bool on) { memory_->intake().withhold(on); }
+  void doubt(bool on) { memory_->intake().doubt(on); }
   long refused() { return memory_->intake().refused(); }
   nb::bytes snapshot() const { return image(*memory_); }
   void restore_from(const nb::bytes& bytes) { restore(*memory_, bytes); }
@@ -166,6 +168,7 @@ void bind_running(nb::class_<Filter>& c) {
         "Take samples (n, N), m/s^2, at t_s (n,), s; rows (n, bytes of a row) become what is known after each.");
   c.def("gap", &Filter::gap, "Samples are missing before the next one.");
   c.def("withhold", &Filter::withhold, nb::arg("on"), "Take samples for none, as when their axes are stale.");
+  c.def("doubt", &Filter::doubt, nb::arg("on"), "Take samples, but say that nothing is valid.");
   c.def_prop_ro("refused_samples", &Filter::refused, "Samples passed over: at the end of a range, frozen, withheld.");
   c.def("snapshot", &Filter::snapshot, "The memory as bytes, for the same build of the core.");
   c.def("restore", &Filter::restore_from, nb::arg("image"), "Back to a snapshot; ValueError for another version's.");
@@ -184,6 +187,8 @@ void bind_products(nb::module_& m) {
     return nb::make_tuple(inexact.seen(), to_numpy(inexact.unit_of_rate()), to_numpy(Eigen::MatrixXd(inexact.rate())));
   }, "Variance of the axes' errors, of 1, as it is seen; the rate's covariance by errors of variance 1; its "
      "derivative by the errors, three to an axis.");
+  c.def_prop_ro("surprise", [](const ProductsFilter& f) { return f.frame().surprise().worst(); },
+                "The largest chi-square of innovations summed over 8 to 64 samples (E-91).");
   c.def("exclude", &ProductsFilter::exclude, nb::arg("sensor"), nb::arg("T"), nb::arg("unknown"));
   c.def("correct", &ProductsFilter::correct, nb::arg("t_s"), nb::arg("rate"), nb::arg("sigma"), nb::arg("signed"),
         nb::arg("axis_b"), "A tachometer's report (E-50); False where it is not used.");

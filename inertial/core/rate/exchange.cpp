@@ -12,6 +12,8 @@ void Frame::exchange_axes(const Constants& configured, const Axes& axes) {
   watch_.unlearn();
   agreement_.forget();
   inexact_.forget();
+  surprise_.forget();
+  unproven_s_ = std::max(unproven_s_, PROOF_S);
   renewed_ = true;
   kept_.clear();
   arrivals_.clear();
@@ -49,6 +51,7 @@ void Frame::from_rest(const Constants& c) {
   const Measurement mean = c.sensor.measure(Vector<MOST_AXES>(rest.mean()).data());
   const double dt = rest.seconds / rest.samples;
   Filter& f = first_.filter;
+  unproven_s_ = PROOF_S;
   begin_still(f, c.sensor, c.tuning, mean);
   f.q_nb = past.q_nb();
   f.x(ANGLE) = past.angle();
@@ -65,6 +68,8 @@ void Frame::from_rest(const Constants& c) {
     step(f, c.sensor, c.tuning, y, {block.seconds, !still_, false, block.seconds, nullptr}, said_);
     inexact_.observe(said_);
     inexact_.step(f, c.sensor, c.tuning, {y, block.seconds, 1, !still_, false});
+    surprise_.observe(inexact_.heard());
+    trust(block.seconds);
   }
   if (still_ && !moved_) stay();
   diverged();

@@ -34,6 +34,7 @@ void Frame::restart() {
   since_rest_.forget();
   started_ = still_ = moved_ = constant_ = false;
   agreement_.forget();
+  surprise_.forget();
   inexact_.begin_anew();
   perhaps_still_ = false;
   perhaps_for_ = 0;
@@ -96,6 +97,7 @@ void Frame::advance(const Constants& configured, double t_s, const double* a) {
   if (static_cast<Method>(c.tuning.method) == Method::HORIZON && !still_) horizon(c, now, fixed);
   if (branches_ == 2) two_signs(still_);
   if (diverged()) return;
+  trust(dt_);
   if (still_ && !moved_) stay();
   count(c);
   if (contradicted()) restart();
@@ -127,6 +129,17 @@ bool Frame::settle_start(const Constants& c) {
   return true;
 }
 
+// A body that stands is known not to turn. One that turns is believed once its innovations have borne out
+// the axes in use for a while (E-91).
+void Frame::trust(double dt) {
+  if (still_) {
+    unproven_s_ = std::min(unproven_s_, PROOF_S);
+  } else if (branches_ == 1 && surprise_.agrees()) {
+    unproven_s_ = std::max(0.0, unproven_s_ - dt);
+  }
+  if (surprise_.beyond()) unproven_s_ = DISTRUST_S;
+}
+
 // Innovations beyond their size for seconds: what was believed is not worth correcting.
 bool Frame::contradicted() {
   constexpr double FAR = 2.0;       // of NIS per degree of freedom, over a second
@@ -134,6 +147,7 @@ bool Frame::contradicted() {
   constexpr int NOT_DAMAGE = 10;      // samples in a row that the products of omega refuse
   unused_ = said_.used ? 0 : unused_ + 1;
   against_s_ = agreement_.fast() > FAR ? against_s_ + dt_ : 0.0;
+  if (unused_ > BRIDGED_SAMPLES || against_s_ > 0.0) unproven_s_ = DISTRUST_S;
   if (against_s_ < PATIENCE_S && unused_ < NOT_DAMAGE) return false;
   unused_ = 0;
   ++lost_;
@@ -143,7 +157,9 @@ bool Frame::contradicted() {
 Doubt Frame::doubt() const {
   if (intake_.missing() > 0) return Doubt::NO_DATA;
   if (perhaps_still_ || constant_) return Doubt::STANDING;
-  return against_s_ > 0.0 ? Doubt::CONTRADICTED : Doubt::NONE;
+  const bool unproven = unproven_s_ > 0.0 && started_ && !still_;
+  const bool beyond = against_s_ > 0.0 || surprise_.beyond();
+  return unproven || beyond || intake_.doubted() ? Doubt::CONTRADICTED : Doubt::NONE;
 }
 
 void Frame::wait(const Constants& c, bool still) {
@@ -160,6 +176,7 @@ void Frame::wait(const Constants& c, bool still) {
 
 void Frame::begin(const Constants& c) {
   inexact_.begin_anew();
+  surprise_.forget();
   begin_still(first_.filter, c.sensor, c.tuning, watch_.mean_of(c.limits.window));
   started_ = true;
   constant_ = false;
@@ -274,6 +291,11 @@ void Frame::watch_errors(const Constants& c, long sample, const Moment& moment) 
   if (moment.grow == 0.0) return;
   const Measurement mean = (watch_.total(sample) - watch_.total(sample - EVERY)) / EVERY;
   inexact_.step(first_.filter, c.sensor, c.tuning, {mean, dt_, EVERY, moment.turning, moment.fixed});
+  if (branches_ != 1) return;
+  Heard heard = inexact_.heard();
+  const double rounding = square(intake_.resolution(c.sensor)) / 6.0;  // it lasts as long as readings stay equal
+  heard.by_errors += rounding / Surprise::PLAUSIBLE * c.sensor.drift.block<PRODUCTS, PRODUCTS>(PRODUCTS_M, PRODUCTS_M);
+  surprise_.observe(heard);
 }
 
 // The window again, about what its end says, when it is due and all of it was turning (E-49).
@@ -291,6 +313,7 @@ void Frame::horizon(const Constants& c, long now, bool fixed) {
 
 void Frame::swap_signs() {
   std::swap(first_.filter, second_.filter);
+  inexact_.begin_anew();  // what errors of the axes do to one is not what they do to the other
   balance_ = -balance_;
 }
 
@@ -310,6 +333,7 @@ bool Frame::diverged() {
   const Matrix3 P = f.omega_covariance();
   if (f.speed_squared() < FASTEST * FASTEST && P(0, 0) > 0.0 && P(1, 1) > 0.0 && P(2, 2) > 0.0) return false;
   ++lost_;
+  unproven_s_ = DISTRUST_S;
   restart();
   said_ = Said();
   return true;

@@ -18,6 +18,8 @@ namespace gyrofree::rate {
 
 constexpr int EVERY = 8;  // samples between states that are kept
 constexpr double UNKNOWN_RATE = 10.0;  // rad/s, sigma before any standstill
+constexpr double PROOF_S = 0.8;     // s of turning that axes in use must agree before a turn is believed,
+constexpr double DISTRUST_S = 8.0;   // and after a surprise, unless the body stands before
 constexpr double DECIDED = 14.0;  // of the balance of two signs: one wrong in a million
 
 // States before some of the newest samples, by the samples' numbers.
@@ -108,6 +110,7 @@ class Frame {
   bool two_signs() const { return branches_ == 2; }
   const Agreement& agreement() const { return agreement_; }
   const Inexact& inexact() const { return inexact_; }
+  const Surprise& surprise() const { return surprise_; }
   double balance() const { return balance_; }  // log of the likelihood ratio of the two signs
   double last_s() const { return last_s_; }
   double dt() const { return dt_; }
@@ -121,6 +124,7 @@ class Frame {
   bool passed_over(const Constants& c, double t_s, const double* a);
   bool settle_start(const Constants& c);
   bool contradicted();
+  void trust(double dt);
   void tick(double t_s);
   void restart();
   void wait(const Constants& c, bool still);
@@ -154,6 +158,8 @@ class Frame {
   long rest_from_ = -DEPTH;  // sample that one begins with
   Agreement agreement_;
   Inexact inexact_;
+  Surprise surprise_;
+  double unproven_s_ = 0.0;  // s of turning without a surprise until what is said of a turn is valid (E-91)
   Intake intake_;
   SinceRest since_rest_;
   bool perhaps_still_ = false;  // a start while turning that may be a standstill with biases

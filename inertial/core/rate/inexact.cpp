@@ -54,8 +54,8 @@ void Inexact::begin(const Filter& f, const Sensor& s) {
 
 void Inexact::observe(const Said& said) {
   if (!said.used) return;
-  innovations_ += said.innovation;
-  ++heard_;
+  now_.sum += said.innovation;
+  ++now_.samples;
 }
 
 // What the filter scales its biases by (E-37), these follow.
@@ -103,18 +103,18 @@ void Inexact::absorb_errors(const Seen<M>& seen, const ByErrors<M>& E) {
   absorb(x, P_, expected, std::numeric_limits<double>::infinity());
 }
 
-void Inexact::learn(const Seen<6>& seen, const ByErrors<6>& E, const Sensor& s, double share) {
-  if (heard_ == 0) return;
-  const Cholesky<Matrix<6>> factor(Matrix<6>(seen.C + (1.0 - share) * s.R_c));
+void Inexact::learn(const ByErrors<6>& E) {
+  if (now_.samples == 0) return;
+  const Cholesky<Matrix<6>> factor(now_.C);
   if (!factor.positive) return;
   const ByErrors<6> white = factor.whitened(E);
-  const Products said = factor.whitened(innovations_);
+  const Products said = factor.whitened(now_.sum);
   for (Eigen::Index j = 0; j < E.cols(); ++j) {
     told_(j) += dot(white.col(j), said);
-    by_noise_ += heard_ * square_of(white.col(j));
+    by_noise_ += now_.samples * square_of(white.col(j));
   }
   for (Eigen::Index j = 0; j < E.cols(); ++j)
-    for (Eigen::Index i = 0; i < E.cols(); ++i) information_(i, j) += heard_ * dot(white.col(i), white.col(j));
+    for (Eigen::Index i = 0; i < E.cols(); ++i) information_(i, j) += now_.samples * dot(white.col(i), white.col(j));
 }
 
 void Inexact::correct(const Filter& f, const Sensor& s, const Tuning& t, const Stretch& stretch,
@@ -126,15 +126,23 @@ void Inexact::correct(const Filter& f, const Sensor& s, const Tuning& t, const S
     const Matrix<PRODUCTS, 3> H = products_model(f.omega(), s);
     const ByErrors<6> E = Y.middleRows<6>(PRODUCTS_M) - by_.middleRows<6>(BIAS_PRODUCTS) -
                           product(H, ByErrors<3>(by_.middleRows<3>(OMEGA)));
-    if (stretch.turning && settling_ == 0) learn(seen, E, s, share);
+    now_.C = seen.C + (1.0 - share) * s.R_c;
+    now_.by_errors = product_transposed(E, E);
+    if (stretch.turning && settling_ == 0) learn(E);
     absorb_errors<6>(seen, E);
   }
   const Vector3 alpha = stretch.turning ? free_alpha(stretch.mean.segment<3>(ALPHA_M), f.x, s) : Vector3(Vector3::Zero());
   if (t.gravity_aid) {
-    const ForceModel h = force_model(f.x, alpha, s);
-    Seen<3> seen = see_force(f.x, P_, stretch.mean.segment<3>(FORCE_M), alpha, s, share);
-    if (stretch.turning)
-      for (int k = 0; k < 3; ++k) seen.C(k, k) += share * t.centre;
+    // as by_force(): noise of omega' in the Jacobian, which the filter does not follow, makes this diverge
+    Vector3 late = Vector3::Zero();
+    if (stretch.turning) late = f.alpha_late - f.x.segment<3>(BIAS_ALPHA);
+    const ForceModel h = force_model(f.x, late, s);
+    Seen<3> seen = see_force(f.x, P_, stretch.mean.segment<3>(FORCE_M), late, s, share);
+    if (stretch.turning) {
+      const double doubt = trace(P_.block<3, 3>(PIVOT, PIVOT));
+      const double noise = (square_of(Vector3(f.x.segment<3>(PIVOT))) + 4.0 * doubt) * s.R_alpha(0, 0);
+      for (int k = 0; k < 3; ++k) seen.C(k, k) += share * (t.centre + noise) + doubt * square_of(Vector3(alpha - late));
+    }
     const ByErrors<3> omega = by_.middleRows<3>(OMEGA), pivot = by_.middleRows<3>(PIVOT);
     const ByErrors<3> E = Y.middleRows<3>(FORCE_M) - by_.middleRows<3>(LIFT) - by_.middleRows<3>(BIAS_FORCE) -
                           product(h.by_omega, omega) - product(h.by_pivot, pivot);
@@ -151,7 +159,8 @@ void Inexact::step(const Filter& f, const Sensor& s, const Tuning& t, const Stre
   const Vector3 alpha = stretch.turning ? free_alpha(stretch.mean.segment<3>(ALPHA_M), f.x, s) : Vector3(Vector3::Zero());
   const ByErrors<MEASURED> Y = by_errors(f.x, alpha, s);
   carried_ *= std::max(0.0, 1.0 - stretch.dt * stretch.samples / MEMORY_S);
-  if (!stretch.turning && settling_ > 0) --settling_;
+  if (!stretch.turning || f.speed_squared() < t.axis_from)  // a slow body has only gravity to read
+    settling_ = std::max(0, settling_ - (stretch.turning ? 1 : SETTLES / 8));
   if (stretch.turning) {
     const double kept = std::max(0.0, 1.0 - stretch.dt * stretch.samples / MEMORY_S);
     information_ *= kept;
@@ -162,8 +171,8 @@ void Inexact::step(const Filter& f, const Sensor& s, const Tuning& t, const Stre
   follow_biases(f, stretch.turning);
   move(f, s, t, stretch, Y);
   correct(f, s, t, stretch, Y);
-  innovations_.setZero();
-  heard_ = 0;
+  last_ = now_;
+  now_ = Heard();
   P_ = f.P;
 }
 

@@ -8,7 +8,7 @@
 // differences in tests/inertial/test_inexact.py.
 #pragma once
 
-#include "rate/filter.hpp"
+#include "rate/agreement.hpp"
 
 namespace gyrofree::rate {
 
@@ -34,11 +34,17 @@ class Inexact {
   // The state begins anew; how inexact the axes are is still known.
   void begin_anew();
   // Another state than before is gone on with.
-  void jumped(const Filter& f) { P_ = f.P; }
+  void jumped(const Filter& f) {
+    P_ = f.P;
+    level_ = f.level;  // biases do not move by a jump
+  }
   // One sample's correction by products.
   void observe(const Said& said);
   // The state f after some samples.
   void step(const Filter& f, const Sensor& s, const Tuning& t, const Stretch& stretch);
+
+  // Innovations of the samples that the last step stood for.
+  const Heard& heard() const { return last_; }
 
   // Variance of an axis' error, of 1, by the innovations and by the offsets at rest; 0: as configured.
   double seen() const { return std::max({0.0, carried_, by_offsets_, by_innovations(0.0)}); }
@@ -50,7 +56,7 @@ class Inexact {
   ByErrors<3> rate() const { return by_.middleRows<3>(OMEGA); }
 
  private:
-  static constexpr int SETTLES = 8;  // steps at rest
+  static constexpr int SETTLES = 48;  // steps, one at rest counts six times
   double by_innovations(double expected) const;
 
   void begin(const Filter& f, const Sensor& s);
@@ -58,7 +64,7 @@ class Inexact {
   void move(const Filter& f, const Sensor& s, const Tuning& t, const Stretch& stretch, const ByErrors<MEASURED>& Y);
   void correct(const Filter& f, const Sensor& s, const Tuning& t, const Stretch& stretch,
                const ByErrors<MEASURED>& Y);
-  void learn(const Seen<6>& seen, const ByErrors<6>& E, const Sensor& s, double share);
+  void learn(const ByErrors<6>& E);
   template <int M>
   void absorb_errors(const Seen<M>& seen, const ByErrors<M>& E);
 
@@ -68,12 +74,12 @@ class Inexact {
   Covariance P_ = Covariance::Zero();    // of the state before these samples
   UpTo<MOST_ERRORS> information_;        // of the errors by the innovations
   Errors told_;
-  int settling_ = SETTLES;               // steps at rest until the biases know what the errors do at rest
+  int settling_ = SETTLES;               // steps until the biases know what the errors do to gravity
   double carried_ = 0.0;                 // of 1, squared: seen before the state began anew
   double by_offsets_ = 0.0;              // seen at rest
   double by_noise_ = 0.0;                // mean of |told|^2 were there noise only
-  Products innovations_ = Products::Zero();  // summed over samples
-  int heard_ = 0;                            // of them
+  Heard now_;   // since the last step
+  Heard last_;  // of it
 };
 
 }  // namespace gyrofree::rate

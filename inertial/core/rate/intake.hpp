@@ -14,6 +14,9 @@ class Intake {
   // Must this sample of all axes be passed over? noisy: the axes are known to scatter.
   bool refuses(const Sensor& s, const double* a, double dt, bool noisy);
   void withhold(bool on) { withheld_ = on; }
+  // Somebody says that the axes do not fit one motion: samples are taken, what they say is not valid.
+  void doubt(bool on) { doubted_ = on; }
+  bool doubted() const { return doubted_; }
   // Samples passed over in a row, and all of them.
   int missing() const { return missing_; }
   long refused() const { return refused_; }
@@ -37,6 +40,7 @@ class Intake {
   int missing_ = 0;
   long refused_ = 0;
   bool withheld_ = false;
+  bool doubted_ = false;
 };
 
 }  // namespace gyrofree::rate

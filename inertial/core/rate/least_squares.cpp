@@ -158,8 +158,9 @@ void LeastSquares::write(const Sensor& s, Row& row) const {
   const bool waiting = samples_ == 0, moving = moving_s_ > 0.0;
   row.phase = waiting ? WAITING : moving ? INTEGRATING : STILL_AT_START;
   const bool unseen = intake_.missing() > 0;
-  row.doubt = static_cast<std::uint8_t>(unseen ? Doubt::NO_DATA : Doubt::NONE);
-  const bool blind = waiting || unseen || (moving && largest_variance(P_) > BLIND_SIGMA * BLIND_SIGMA);
+  const Doubt doubt = unseen ? Doubt::NO_DATA : intake_.doubted() ? Doubt::CONTRADICTED : Doubt::NONE;
+  row.doubt = static_cast<std::uint8_t>(doubt);
+  const bool blind = waiting || doubt != Doubt::NONE || (moving && largest_variance(P_) > BLIND_SIGMA * BLIND_SIGMA);
   std::fill_n(row.sight, 3, blind ? BLIND : VALID);
 }
 
