@@ -32,4 +32,5 @@ Index, in the order in which the data pass:
     plausible     are the numbers what their units say?
     doubts        is a setting wrong? what rates and gravity say of pulses, sizes, axes
     toml_file     files with a version, read strictly and written whole
+    whole_file    what somebody named is written whole, and a device stays one
 """

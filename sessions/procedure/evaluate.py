@@ -96,8 +96,12 @@ def segments(held: Held, run: Run) -> list[Segment | None]:
     found: list[Segment | None] = []
     before = 0.0
     for step, record in zip(held.plan.steps, held.status.steps, strict=True):
-        begin = (record.from_utc_ns * 1e-9) - run.start_utc_s
-        end = (record.until_utc_ns * 1e-9) - run.start_utc_s
+        if run.start_board_s is not None:
+            begin, end = (us * 1e-6 - run.start_board_s for us in (record.from_us, record.until_us))
+        else:
+            begin, end = (
+                ns * 1e-9 - run.start_utc_s for ns in (record.from_utc_ns, record.until_utc_ns)
+            )
         inside = min(end, run.seconds) - max(begin, 0.0)
         measured = record.state == M.Step.STATE_DONE and end > begin
         if not measured or record.epoch != run.epoch or inside < LEAST_SHARE * (end - begin):

@@ -1,5 +1,5 @@
 """What a report needs of a recording, as arrays. SI, body frame b; times in s from the first sample
-of the run.
+of the run, by the board's clock (times.py).
 """
 
 from dataclasses import dataclass, field, replace
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from messages.contract.topics import ACCEL, GNSS, INNOVATION, LINK, NAV, RATE, TACHO, parse
 from sessions.export.table import Progress, Selection, Table, silent, tables
 from sessions.recording.mcap_damage import Damage
+from sessions.report.times import Times
 
 Array = NDArray[np.float64]
 XYZ = ("x", "y", "z")
@@ -86,6 +87,7 @@ class Run:
     epoch: int  # boot counter of the board
     boots: tuple[int, ...]  # all that the session holds
     start_utc_s: float
+    start_board_s: float | None  # the same by the board's clock; None: times go by UTC
     seconds: float
     accel: Accel | None
     tacho: Tacho | None
@@ -101,10 +103,11 @@ class Run:
 
 
 FIELDS = {  # of long tables: what a report is made of
-    ACCEL.name: ("epoch", "period_s", "f_mps2"),
-    TACHO.name: ("epoch", "omega_radps", "sigma_radps"),
+    ACCEL.name: ("epoch", "device_us", "period_s", "f_mps2"),
+    TACHO.name: ("epoch", "device_us", "omega_radps", "sigma_radps"),
     RATE.name: (
         "epoch",
+        "device_us",
         "omega_ib_b_radps",
         "omega_covariance",
         "alpha_b_radps2",
@@ -116,8 +119,8 @@ FIELDS = {  # of long tables: what a report is made of
         "still",
         "calibration",
     ),
-    NAV.name: ("epoch", "p_ned_m", "v_n_mps", "sigma"),
-    INNOVATION.name: ("epoch", "nis", "dof", "accepted"),
+    NAV.name: ("epoch", "device_us", "p_ned_m", "v_n_mps", "sigma"),
+    INNOVATION.name: ("epoch", "device_us", "nis", "dof", "accepted"),
 }
 WANTED = frozenset(topic.name for topic in (ACCEL, TACHO, RATE, NAV, INNOVATION, GNSS, LINK))
 
@@ -162,31 +165,28 @@ def _boots(timed: list[Table]) -> dict[int, float]:
     lengths: dict[int, float] = {}
     for table in timed:
         for epoch in np.unique(table.data["epoch"]):
-            t = table.data["utc_s"][table.data["epoch"] == epoch]
-            lengths[int(epoch)] = max(lengths.get(int(epoch), 0.0), float(t.max() - t.min()))
+            seconds = Times([_of_boot(table, epoch)]).seconds
+            lengths[int(epoch)] = max(lengths.get(int(epoch), 0.0), seconds)
     return lengths
+
+
+def _of_boot(table: Table, epoch: int) -> Table:
+    """Its rows of one boot; all of a table that tells none."""
+    at = table.data.get("epoch", np.full(len(table), epoch)) == epoch
+    data = table.data if at.all() else {n: column[at] for n, column in table.data.items()}
+    return Table(table.columns, data)
 
 
 def _run(mine: dict[str, Table], device: str, epoch: int, boots: tuple[int, ...]) -> Run:
     by_topic: dict[str, list[tuple[str, Table]]] = {}
     for key, table in sorted(mine.items()):
         address = parse(key)
-        at = table.data.get("epoch", np.zeros(len(table))) == epoch
-        data = table.data if at.all() else {n: column[at] for n, column in table.data.items()}
-        part = Table(table.columns, data)
+        part = _of_boot(table, epoch)
         if len(part):
             by_topic.setdefault(address.topic.name, []).append((address.estimator, part))
-    starts = [
-        part.data["utc_s"].min()
-        for topic in (ACCEL, RATE, NAV)
-        for _, part in by_topic.get(topic.name, [])
-    ]
-    ends = [
-        part.data["utc_s"].max()
-        for topic in (ACCEL, RATE, NAV)
-        for _, part in by_topic.get(topic.name, [])
-    ]
-    t0 = float(min(starts))
+    times = Times(
+        [part for topic in (ACCEL, RATE, NAV) for _, part in by_topic.get(topic.name, [])]
+    )
 
     def only(topic: str) -> Table | None:
         return by_topic[topic][0][1] if topic in by_topic else None
@@ -196,16 +196,17 @@ def _run(mine: dict[str, Table], device: str, epoch: int, boots: tuple[int, ...]
         device=device,
         epoch=epoch,
         boots=boots,
-        start_utc_s=t0,
-        seconds=float(max(ends)) - t0,
-        accel=_accel(only(ACCEL.name), t0),
-        tacho=_tacho(only(TACHO.name), t0),
-        rates=[_rate(name, table, t0) for name, table in by_topic.get(RATE.name, [])],
-        navigation=[_navigation(name, table, t0) for name, table in by_topic.get(NAV.name, [])],
+        start_utc_s=times.first_utc_s,
+        start_board_s=times.first if times.by_board else None,
+        seconds=times.seconds,
+        accel=_accel(only(ACCEL.name), times),
+        tacho=_tacho(only(TACHO.name), times),
+        rates=[_rate(name, table, times) for name, table in by_topic.get(RATE.name, [])],
+        navigation=[_navigation(name, table, times) for name, table in by_topic.get(NAV.name, [])],
         corrections=[
-            _corrections(name, table, t0) for name, table in by_topic.get(INNOVATION.name, [])
+            _corrections(name, table, times) for name, table in by_topic.get(INNOVATION.name, [])
         ],
-        fixes=_fixes(only(GNSS.name), t0),
+        fixes=_fixes(only(GNSS.name), times),
         link={name: float(link.data[name][-1]) for name in LEDGER} if link else {},
     )
 
@@ -223,31 +224,29 @@ LEDGER = (
 )
 
 
-def _accel(table: Table | None, t0: float) -> Accel | None:
+def _accel(table: Table | None, times: Times) -> Accel | None:
     if table is None:
         return None
     names = [column.name for column in table.columns if column.name.endswith("_mps2")]
-    return Accel(
-        table.data["utc_s"] - t0, table.vector(*names), float(np.median(table.data["period_s"]))
-    )
+    return Accel(times.of(table), table.vector(*names), float(np.median(table.data["period_s"])))
 
 
-def _tacho(table: Table | None, t0: float) -> Tacho | None:
+def _tacho(table: Table | None, times: Times) -> Tacho | None:
     if table is None or len(table) < 2:
         return None
-    return Tacho(table.data["utc_s"] - t0, table.data["omega_radps"], table.data["sigma_radps"])
+    return Tacho(times.of(table), table.data["omega_radps"], table.data["sigma_radps"])
 
 
 def _xyz(table: Table, name: str, ends: tuple[str, ...] = XYZ) -> Array:
     return table.vector(*(f"{name}_{end}" for end in ends))
 
 
-def _rate(name: str, table: Table, t0: float) -> Rate:
+def _rate(name: str, table: Table, times: Times) -> Rate:
     diagonal = table.vector("omega_covariance_0", "omega_covariance_4", "omega_covariance_8")
     cards = table.data.get("calibration")
     return Rate(
         name=name,
-        t=table.data["utc_s"] - t0,
+        t=times.of(table),
         omega_b=_xyz(table, "omega_ib_b_radps"),
         sigma=np.sqrt(np.maximum(diagonal, 0.0)),
         alpha_b=_xyz(table, "alpha_b_radps2"),
@@ -263,7 +262,7 @@ def _rate(name: str, table: Table, t0: float) -> Rate:
     )
 
 
-def _navigation(name: str, table: Table, t0: float) -> Navigation:
+def _navigation(name: str, table: Table, times: Times) -> Navigation:
     sigma = [column.name for column in table.columns if column.name.startswith("sigma_")]
     at = (
         np.isfinite(table.data["p_ned_m_n"])
@@ -273,21 +272,21 @@ def _navigation(name: str, table: Table, t0: float) -> Navigation:
     position = _xyz(table, "p_ned_m", ("n", "e", "d"))[at] if at.any() else np.zeros((0, 3))
     velocity = _xyz(table, "v_n_mps", ("n", "e", "d"))[at] if at.any() else np.zeros((0, 3))
     spread = table.vector(*sigma)[at] if sigma and at.any() else np.zeros((int(at.sum()), 15))
-    return Navigation(name, (table.data["utc_s"] - t0)[at], position, velocity, spread)
+    return Navigation(name, (times.of(table))[at], position, velocity, spread)
 
 
-def _corrections(name: str, table: Table, t0: float) -> Corrections:
+def _corrections(name: str, table: Table, times: Times) -> Corrections:
     data = table.data
-    return Corrections(name, data["utc_s"] - t0, data["nis"], data["dof"], data["accepted"] > 0)
+    return Corrections(name, times.of(table), data["nis"], data["dof"], data["accepted"] > 0)
 
 
-def _fixes(table: Table | None, t0: float) -> Array:
+def _fixes(table: Table | None, times: Times) -> Array:
     if table is None:
         return np.zeros((0, 4))
     data = table.data
     at = data["quality"] > 0
     columns = (
-        data["utc_s"] - t0,
+        times.of(table),
         np.radians(data["latitude_deg"]),
         np.radians(data["longitude_deg"]),
         data["height_m"],
