@@ -1,6 +1,6 @@
 // Sessions over one another on one axis of time; also the plots of a single session.
 import { Group, Plot } from "/static/chart.js";
-import { SHADES } from "/static/figure.js";
+import { SHADES as UNSURE } from "/static/figure.js";
 import { call } from "/static/rest.js";
 import { Tracks } from "/static/tracks.js";
 
@@ -151,7 +151,7 @@ export class Overlay {
     return [...new Set(said.map(([, , word]) => word))].map((word) => {
       const link = document.createElement("a"), sample = document.createElement("i");
       Object.assign(link, { className: "shade", href: `/words#${word}`, title: "What the leading filter says of itself" });
-      sample.style.background = SHADES[word];
+      sample.style.background = UNSURE[word];
       link.append(sample, word);
       return link;
     });
