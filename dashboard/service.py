@@ -128,12 +128,14 @@ def run(
     replay: Replay | None = None,
     jobs: Jobs | None = None,
     first_run: FirstRun | None = None,
+    watching: str = "",
 ) -> None:
     """The dashboard until `stop` is set.
 
     `replay` starts replays for the sessions page (control.ProcessReplay); without it the page has
     no such button. `jobs` makes reports and exports in the background; `first_run` asks an
-    administrator for the first board. Raises PortTaken when the
+    administrator for the first board. `watching`: why nobody here may give orders. Raises
+    PortTaken when the
     port or viser's is in use, UsersError for a damaged users file, BusUnavailable when it is
     stopped before a router answers.
     """
@@ -155,7 +157,7 @@ def run(
         _look_at_map(settings)
         with open_client(bus, stop) as session:
             store = Store(settings.devices, settings.history_bytes)
-            desk, watched = Desk(session, bus.prefix), threading.Event()
+            desk, watched = Desk(session, bus.prefix, watching), threading.Event()
             try:
                 handle = scene.start(settings, store, desk, watched)
             except scene.SceneError as error:

@@ -12,8 +12,10 @@ from sites.place import Peer, Place
 from sites.roles import (
     Rights,
     claim_keys,
+    join_key,
     listening,
     order_keys,
+    renew_key,
     rights,
     topic_keys,
 )
@@ -44,10 +46,11 @@ class Rules:
             ("ingress", ("query",), said.ask),
             ("egress", ("query",), said.answer),
             ("egress", ("reply", "declare_queryable"), said.ask),
-            ("ingress", HEAR[:1] + HEAR[2:], hears),
+            ("ingress", HEAR[:1], [f"{key.split('/')[0]}/**" for key in hears]),
+            ("ingress", HEAR[2:], hears),
             ("egress", SAY, hears),
             # what the holder says is wanted elsewhere: he may know by whom
-            ("egress", ("declare_subscriber",), said.put),
+            ("egress", ("declare_subscriber",), [f"{key.split('/')[0]}/**" for key in said.put]),
             ("egress", ("liveliness_query", "declare_liveliness_subscriber"), said.token),
         ]
         ids = []
@@ -103,7 +106,10 @@ def _local(rules: Rules, place: Place, holder: Issued, devices: Iterable[str]) -
     """A process of this place."""
     said = rights(holder.role, place.site, devices)
     if place.seat == "viewer":
-        said = Rights(ask=tuple(key for key in said.ask if key in listening(place.site)))
+        watching = (*listening(place.site), renew_key(place.site))
+        said = Rights(ask=tuple(key for key in said.ask if key in watching))
+    elif holder.role == "authority" and place.at_home:
+        said += Rights(answer=(join_key(place.site), renew_key(place.site)))
     rules.allow([holder.common_name], said, [f"{place.site}/**"])
 
 
@@ -113,7 +119,7 @@ def _between(rules: Rules, place: Place, peer: Peer, router: str) -> None:
     """
     site = place.site
     seat = peer.seat if place.at_home else place.seat
-    asks = listening(site) + (order_keys(site) if seat == "operator" else ())
+    asks = (*listening(site), renew_key(site), *(order_keys(site) if seat == "operator" else ()))
     notes = Rights(put=(f"{site}/*/note",)) if seat == "operator" else Rights()
     heard = (*topic_keys(site), *claim_keys(site))
     if place.at_home:

@@ -64,7 +64,7 @@ class Authority:
                 " `gyrofree site init` was run"
             ) from None
         except (OSError, ValueError, TypeError) as error:
-            raise SiteError(f"{folder / KEY}, {folder / TRUSTED}: cannot be read: {error}") from None
+            raise SiteError(f"{folder / KEY} or {TRUSTED} cannot be read: {error}") from None
         if self._key.public_key() != self.certificate.public_key():
             raise SiteError(f"{folder}: {KEY} is not the key of {TRUSTED}: restore both together")
 
@@ -93,20 +93,23 @@ class Authority:
         role: str,
         place: str,
         *,
+        name: str = "",
         devices: tuple[str, ...] = (),
         hosts: tuple[str, ...] = (),
         life: dt.timedelta = dt.timedelta(days=DAYS),
     ) -> x509.Certificate:
         """A certificate for the key of a request, which must be signed by that key. What else the
-        request wishes does not count: name, hosts and end are decided here. Raises SiteError.
+        request wishes does not count: name, hosts and end are decided here. name: of the machine,
+        where a place has several; else the place's. Raises SiteError.
         """
         _checked(request)
         if role not in ROLES:
             raise SiteError(f"no role {role!r}: want one of {', '.join(ROLES)}")
-        if not NAME.fullmatch(place):
-            raise SiteError(f"name {place[:40]!r}: want a-z, 0-9, _ and - after a first letter")
+        for text in (place, name or place):
+            if not NAME.fullmatch(text):
+                raise SiteError(f"name {text[:40]!r}: want a-z, 0-9, _ and - after a first letter")
         now, register = dt.datetime.now(dt.UTC), self.register()
-        common_name = _free_name(f"{role}.{place}", register)
+        common_name = _free_name(f"{role}.{name or place}", register)
         names = [_host(host) for host in dict.fromkeys((*HOSTS, *hosts))]
         key_id = x509.AuthorityKeyIdentifier.from_issuer_public_key(self._key.public_key())
         usages = [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]

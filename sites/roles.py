@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from messages.bus import orders
 from messages.contract import topics as tp
-from messages.contract.topics import GATEWAY, RECORDER, TOPICS
+from messages.contract.topics import GATEWAY, RECORDER, TOPICS, check_name
 
 ROLES = (
     "router",
@@ -22,9 +22,19 @@ ROLES = (
     "operator",
     "simulator",
     "viewer",
+    "authority",
     "join",
 )
-SERVICES = ("router", "gateway", "estimator", "recorder", "procedures", "dashboard", "operator")
+SERVICES = (
+    "router",
+    "gateway",
+    "estimator",
+    "recorder",
+    "procedures",
+    "dashboard",
+    "operator",
+    "authority",
+)
 KINDS = (orders.RECORDER, orders.ESTIMATOR, orders.BOARD, orders.PROCEDURES, orders.REPLAY)
 REPLAYED = f"$*{tp.REPLAY_SUFFIX}"  # of a device's name: any device that is a replay
 
@@ -60,9 +70,20 @@ def rights(role: str, site: str, devices: Iterable[str] = ()) -> Rights:
         "operator": lambda: _listener(site) + _orders(site) + _replay(site),
         "simulator": lambda: _listener(site) + Rights(put=_of(site, "*", "simulator")),
         "viewer": lambda: _listener(site),
-        "join": lambda: Rights(ask=(f"{site}/site/join",)),
+        "authority": lambda: _listener(site) + Rights(ask=(renew_key(site),)),
+        "join": lambda: Rights(ask=(join_key(site),)),
     }
     return made.get(role, Rights)()
+
+
+def join_key(site: str) -> str:
+    """Where a place asks to join."""
+    return f"{check_name(site)}/site/join"
+
+
+def renew_key(site: str) -> str:
+    """Where a certificate is renewed."""
+    return f"{check_name(site)}/site/renew"
 
 
 def listening(site: str) -> tuple[str, ...]:

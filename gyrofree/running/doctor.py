@@ -21,7 +21,8 @@ from queue import Empty, Queue
 from urllib.parse import urlsplit
 
 from gyrofree.config import Settings
-from messages.bus.session import BusUnavailable, open_client, subscribe
+from messages.bus.faults import BusUnavailable
+from messages.bus.session import open_client, subscribe
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ESTIMATOR, LINK, PROCEDURE, STATUS
 from messages.text import plain
@@ -71,7 +72,7 @@ def _settings(settings: Settings) -> list[Finding]:
     """What running estimators say of settings that their data contradict; nothing where no bus
     runs.
     """
-    host, _, port = settings.bus.listen[0].removeprefix("tcp/").rpartition(":")
+    host, _, port = settings.bus.listen[0].partition("/")[2].rpartition(":")
     if not port_taken(host.strip("[]"), int(port)):
         return []
     try:

@@ -18,7 +18,7 @@ import typer
 import zenoh
 
 from gyrofree.config import ConfigError
-from messages.bus.session import BusUnavailable
+from messages.bus.faults import BusUnavailable, IdentityError
 from messages.text import plain, printed, reason
 
 EXIT_FAILED = 1
@@ -115,6 +115,8 @@ def run_service(body: Callable[[threading.Event], None], verbose: bool = False) 
     try:
         body(stop)
     except ConfigError as error:
+        raise fail(error, EXIT_CONFIG) from None
+    except IdentityError as error:
         raise fail(error, EXIT_CONFIG) from None
     except BusUnavailable as error:
         if not stop.is_set():
