@@ -17,6 +17,7 @@ from sites.roles import (
     order_keys,
     renew_key,
     rights,
+    segment_key,
     topic_keys,
 )
 
@@ -109,7 +110,8 @@ def _local(rules: Rules, place: Place, holder: Issued, devices: Iterable[str]) -
         watching = (*listening(place.site), renew_key(place.site))
         said = Rights(ask=tuple(key for key in said.ask if key in watching))
     elif holder.role == "authority" and place.at_home:
-        said += Rights(answer=(join_key(place.site), renew_key(place.site)))
+        home = (join_key(place.site), renew_key(place.site), f"{segment_key(place.site)}/**")
+        said += Rights(answer=home)
     rules.allow([holder.common_name], said, [f"{place.site}/**"])
 
 

@@ -86,14 +86,19 @@ def renew_key(site: str) -> str:
     return f"{check_name(site)}/site/renew"
 
 
+def segment_key(site: str) -> str:
+    """Below which home answers about its recordings."""
+    return f"{check_name(site)}/{RECORDER}/segment"
+
+
 def listening(site: str) -> tuple[str, ...]:
-    """What whoever listens may ask: for what he missed, and which numbers were heard."""
-    devices = (
+    """What whoever listens may ask: for what he missed, which numbers were heard, recordings."""
+    return (
         tp.history_key(site, "any").replace("/any/", "/*/"),
         tp.published_key(site, "*", "*"),
         f"{site}/*/fence",
+        f"{segment_key(site)}/**",
     )
-    return devices
 
 
 def order_keys(site: str) -> tuple[str, ...]:

@@ -16,29 +16,68 @@ from cryptography import x509
 
 from messages.bus.session import BusSettings, open_client
 from sites.authority import DAYS
+from sites.copying.fetching import Copies
+from sites.copying.serving import Serving
 from sites.enrolment import Registrar, keep, renewal
 from sites.place import TRUSTED, Place, SiteError, load_place
-from sites.roles import join_key, renew_key
+from sites.roles import join_key, renew_key, segment_key
 
 LOOK_S = 3600.0  # between two looks at the certificates
 AGAIN_S = 60.0  # after a renewal that did not succeed
 LEFT = dt.timedelta(days=DAYS / 3)  # of a certificate's life; less is renewed
 ASK_S = 10.0
+SEGMENT_S = 60.0  # for a segment over a slow link
+ROUND_S = 2.0  # between two looks at what home has recorded
 
 log = logging.getLogger(__name__)
 
 
-def run(folder: Path, bus: BusSettings, stop: threading.Event) -> None:
-    """Until `stop`; raises SiteError where the folder has no place."""
+def run(folder: Path, sessions: Path, bus: BusSettings, stop: threading.Event) -> None:
+    """Until `stop`; raises SiteError where the folder has no place. sessions: the folder of the
+    recordings, which home shows and others fill.
+    """
     place = load_place(folder)
     with open_client(bus, stop) as session:
-        declared = _declare(session, place, Registrar(folder)) if place.at_home else []
         log.info("place %s of site %s%s", place.place, place.site, ", its home" * place.at_home)
-        pause = AGAIN_S / 10
-        while not stop.wait(pause):
-            pause = LOOK_S if look(folder, place, _asker(folder, place, session)) else AGAIN_S
-        for one in declared:
-            one.undeclare()
+        keeping = threading.Thread(
+            target=_keep_certificates, args=(folder, place, session, stop), daemon=True
+        )
+        keeping.start()
+        if place.at_home:
+            declared = declare(session, place, Registrar(folder))
+            serving = Serving(session, place.site, sessions)
+            stop.wait()
+            serving.close()
+            for one in declared:
+                one.undeclare()
+        else:
+            copy(Copies(sessions, folder), place.site, session, stop)
+        keeping.join(ASK_S + 1.0)
+
+
+def copy(copies: Copies, site: str, session: zenoh.Session, stop: threading.Event) -> None:
+    """Bring home's recordings here, round after round, until `stop`."""
+
+    def ask(what: str) -> bytes:
+        return asked(session, f"{segment_key(site)}/{what}", b"", SEGMENT_S)
+
+    said = ""
+    while not stop.wait(ROUND_S):
+        try:
+            copies.round(ask, stop.is_set)
+            said = ""
+        except (SiteError, OSError) as error:
+            if str(error) != said:
+                log.warning("recordings are not copied: %s", error)
+            said = str(error)
+
+
+def _keep_certificates(
+    folder: Path, place: Place, session: zenoh.Session, stop: threading.Event
+) -> None:
+    ask, pause = _asker(folder, place, session), AGAIN_S / 10
+    while not stop.wait(pause):
+        pause = LOOK_S if look(folder, place, ask) else AGAIN_S
 
 
 def look(folder: Path, place: Place, ask: Callable[[bytes], bytes]) -> bool:
@@ -100,9 +139,12 @@ def _asker(folder: Path, place: Place, session: zenoh.Session) -> Callable[[byte
     return ask
 
 
-def asked(session: zenoh.Session, key: str, question: bytes) -> bytes:
+def asked(session: zenoh.Session, key: str, question: bytes, patience_s: float = ASK_S) -> bytes:
     """Home's answer; raises SiteError with its reason, or where it does not answer."""
-    for reply in session.get(key, payload=question, timeout=ASK_S):
+    # behind everything that is live: who fetches the past must not hold up the present
+    for reply in session.get(
+        key, payload=question, timeout=patience_s, priority=zenoh.Priority.BACKGROUND
+    ):
         if reply.ok is not None:
             return reply.ok.payload.to_bytes()
         said = reply.err.payload.to_bytes().decode(errors="replace")[:500]
@@ -111,7 +153,7 @@ def asked(session: zenoh.Session, key: str, question: bytes) -> bytes:
     raise SiteError("the site's home does not answer")
 
 
-def _declare(session: zenoh.Session, place: Place, registrar: Registrar) -> list[zenoh.Queryable]:
+def declare(session: zenoh.Session, place: Place, registrar: Registrar) -> list[zenoh.Queryable]:
     def taking(answer: Callable[[bytes], bytes], what: str) -> Callable[[zenoh.Query], None]:
         def on_query(query: zenoh.Query) -> None:
             question = query.payload.to_bytes() if query.payload is not None else b""

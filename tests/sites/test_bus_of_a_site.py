@@ -19,14 +19,13 @@ from messages.contract import topics as tp
 from sites.access import rules_of
 from sites.authority import Authority, pem
 from sites.check import try_all
-from sites.enrolment import known_here, load_request, new_requests
+from sites.enrolment import Registrar, known_here, load_request, new_requests
 from sites.handing_out import hand_out
 from sites.invitation import invite
 from sites.joining import join, make_site
 from sites.place import TRUSTED, SiteError, load_place, write
 from sites.removal import remove
-from sites.service import Registrar as AtHome
-from sites.service import _declare, own_certificates
+from sites.service import declare, own_certificates
 
 BOARD = "cube"
 FLOOD = 10_000
@@ -143,7 +142,7 @@ def test_an_office_joins_hears_everything_may_order_nothing_and_can_be_sent_away
     with ExitStack() as running:
         running.enter_context(router(home, at_home, (at_office,)))
         server = running.enter_context(open_client(bus(home, at_home, "authority"), timeout_s=10))
-        declared = _declare(server, load_place(home), AtHome(home))
+        declared = declare(server, load_place(home), Registrar(home))
         waiting.join(60.0)
         assert joined and (office / "place.json").exists()
         assert not (office / "joining").exists()

@@ -153,6 +153,22 @@ def site_show(as_json: AsJson = False, config: Config = None) -> None:
         say(f"  certificate of {role} until {end:%Y-%m-%d %H:%M UTC}")
 
 
+@app.command("copies")
+def site_copies(as_json: AsJson = False, config: Config = None) -> None:
+    """Home's recordings that are here, with the sha256 of both."""
+    from sites.copying.fetching import load_copies
+
+    found = load_copies(_folder(settings_of(config)))
+    if as_json:
+        return say(json.dumps(found, indent=1))
+    if not found:
+        say("no copies yet: at home there is nothing to copy, elsewhere `gyrofree up` makes them")
+    for session, copy in sorted(found.items()):
+        for name, both in copy.get("files", {}).items():
+            equal = "equal" if both["home_sha256"] == both["here_sha256"] else "DIFFERENT"
+            say(f"{session}  {name:<16} {equal}  {both['here_sha256']}  {copy['equal_since']}")
+
+
 @app.command("remove")
 def site_remove(
     place: Annotated[str, typer.Argument(help="Name of the place.")], config: Config = None
@@ -207,7 +223,7 @@ def site_check(as_json: AsJson = False, config: Config = None) -> None:
 
 @app.command("serve")
 def site_serve(config: Config = None, verbose: Verbose = False) -> None:
-    """Let invited places join, and renew certificates in time; `gyrofree up` runs it."""
+    """Let invited places join, renew certificates in time, copy recordings; `up` runs it."""
     settings = settings_of(config)
     folder = _folder(settings)
 
@@ -215,7 +231,8 @@ def site_serve(config: Config = None, verbose: Verbose = False) -> None:
         from sites import service
 
         try:
-            service.run(folder, settings.bus.acting_as("authority"), stop)
+            sessions = Path(settings.recorder.root)
+            service.run(folder, sessions, settings.bus.acting_as("authority"), stop)
         except SiteError as error:
             raise ConfigError(str(error)) from None
 
