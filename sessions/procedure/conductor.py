@@ -4,6 +4,7 @@ any.
 """
 
 import logging
+import math
 import time
 from collections.abc import Callable
 
@@ -11,13 +12,16 @@ from sessions.procedure.driven.description import TableError
 from sessions.procedure.driven.drive import Drive
 from sessions.procedure.driven.table import RateTable
 from sessions.procedure.model import Step
+from sessions.procedure.recorded import Recorded
 from sessions.procedure.run import ABORTED, DONE, HELD, RUNNING, STOPPED, Journal
-from sessions.procedure.seen import Line, Samples, Seen, TableSays
+from sessions.procedure.seen import Samples, Seen, TableSays, Trouble
 from sessions.procedure.watch import State, Watch
 
 log = logging.getLogger(__name__)
 
 SILENT_S = 5.0  # s without a sample: a driven table is stopped
+UNRECORDED_S = 6.0  # s that nothing is recorded: the table is stopped
+ENDING_S = 60.0  # s that the end waits for a recorder to come back
 PATIENCE_S = 20.0  # s beyond the ramp that a driven table may need to get there
 
 Say = Callable[[str, int, float], None]  # remark, its moment by the data's clock, its length in s
@@ -32,15 +36,20 @@ class Conductor:
         table: RateTable | None,
         say: Say,
         record: Callable[[bool], str],
+        silence: Callable[[], str] = lambda: "",
     ) -> None:
-        """record(on): begin or end the recording of this run; what could not be done, or empty."""
+        """record(on): begin or end the recording of this run; what could not be done, or empty.
+        silence(): why no samples come, as far as it is known.
+        """
         self.journal, self.run = journal, journal.run
         self.drive = Drive(table)
-        self._say, self._record = say, record
+        self.recorded = Recorded()
+        self._say, self._record, self._silence = say, record, silence
         first = self.run.plan.steps[0]
         self.watch = Watch(first, 0.0, self.run.plan.vibration_max)
         self._heard = time.monotonic()
         self._closing_since: float | None = None
+        self._unrecorded_at = -math.inf  # while it is being ended
 
     # --- orders
 
@@ -56,8 +65,9 @@ class Conductor:
             return
         if self.run.at < 0:
             self._go(0)
+        elif self._watched and self.run.steps[self.run.at].state == "active":
+            self._spoilt("the procedures service was cut off and started again")
         else:
-            self._say("the service was restarted: the step begins anew", 0, 0.0)
             self._go(self.run.at)
 
     def next(self, by: str, text: str) -> str:
@@ -85,7 +95,7 @@ class Conductor:
         """Begin the present step anew; empty, or why not."""
         if self.run.over:
             return "the run has ended"
-        if problem := self.drive.take():
+        if problem := self.drive.take() or self._record_again():
             return problem
         self._say(f"step {self.run.at + 1} is repeated by {by or 'somebody'}", 0, 0.0)
         self._go(max(self.run.at, 0))
@@ -143,13 +153,27 @@ class Conductor:
         except TableError as error:
             if self.run.state == RUNNING:
                 self._hold(str(error))
-        if self._watched and now - self._heard > SILENT_S and self.run.state == RUNNING:
-            why = f"no samples for {now - self._heard:.0f} s"
-            self.watch.take(Line(False, why))
-            if self.watch.over:
-                self._judge()
-            elif self.drive.turns:
-                self._hold(f"{why}: the table is stopped")
+        if self._watched and self.run.state == RUNNING:
+            self._look_around(now)
+
+    def _look_around(self, now: float) -> None:
+        """Samples that do not come, and a recording that does not go on, spoil what is measured;
+        where that lasts, the table is stopped and a person asked.
+        """
+        self._follow_recording()
+        why, since = self.recorded.trouble(self.run, now), self.recorded.since
+        lasts = since is not None and now - since > UNRECORDED_S
+        if self.silent_s > SILENT_S:
+            why, lasts = f"no samples for {self.silent_s:.0f} s", self.drive.turns
+            if known := self._silence():
+                why += f": {known}"
+        if not why:
+            return
+        self.watch.take(Trouble(why))
+        if self.watch.over:
+            self._spoilt(self.watch.reason, lasts)
+        elif lasts:
+            self._hold(why)
 
     @property
     def silent_s(self) -> float:
@@ -181,7 +205,7 @@ class Conductor:
         step = steps[k]
         self.journal.add("step", k=k)
         procedure, plan = self.run.plan.procedure, self.run.plan
-        patience = float("inf")
+        patience = math.inf
         if self.drive.table is not None and step.kind in ("rate", "still"):
             patience = step.ramp_s + procedure.settle_s + PATIENCE_S
         before = self.watch
@@ -214,11 +238,17 @@ class Conductor:
             self._say(f"step {k + 1}, {step.name}: measured", begin, step.dwell_s)
             self._go(k + 1)
             return
-        self.journal.add("spoilt", k=k, reason=watch.reason)
-        self._say(f"step {k + 1}, {step.name}: spoilt: {watch.reason}", 0, 0.0)
-        record = self.run.steps[k]
-        if record.spoilt > self.run.plan.procedure.repeats:
-            self._hold(watch.reason)
+        self._spoilt(watch.reason)
+
+    def _spoilt(self, why: str, lasts: bool = False) -> None:
+        """The attempt is void, and the step begins anew; a person is asked where what spoils it
+        lasts, or comes too often.
+        """
+        k = self.run.at
+        self.journal.add("spoilt", k=k, reason=why)
+        self._say(f"step {k + 1}, {self.run.plan.steps[k].name}: spoilt: {why}", 0, 0.0)
+        if lasts or self.run.steps[k].spoilt > self.run.plan.procedure.repeats:
+            self._hold(why)
         else:
             self._go(k)
 
@@ -247,10 +277,48 @@ class Conductor:
             return
         if not self.drive.let_go(now, self._closing_since) or self.journal.fault:
             return
-        problem = self._record(False)
+        problem = self._end_recording(now)
+        if problem and now - self._closing_since < ENDING_S:
+            return
         if problem:
             log.error("%s", problem)
-        self.journal.add("closed")
+            problem = f"the end of the run is not in its recording: {problem}"
+        self.journal.add("closed", problem=problem)
+
+    def _end_recording(self, now: float) -> str:
+        """What could not be done, or empty. A recorder that is away just now is waited for, until
+        it has written how the run ended.
+        """
+        self._follow_recording()
+        if trouble := self.recorded.trouble(self.run, now):
+            self._unrecorded_at = now
+            return trouble
+        if now - self._unrecorded_at < 1.0:
+            return "how it ended is being written"
+        return self._record(False) if self.run.own_session else ""
+
+    def _follow_recording(self) -> None:
+        if session := self.recorded.goes_on_in(self.run):
+            self._recorded_in(session, self.run.was_recording)
+
+    def _recorded_in(self, session: str, was_recording: bool) -> None:
+        self.journal.add("session", id=session, was_recording=was_recording)
+
+    def _record_again(self) -> str:
+        """Where nothing is recorded: a recording anew; what could not be done, or empty."""
+        said = self.recorded
+        self._follow_recording()
+        trouble = said.trouble(self.run, time.monotonic())
+        if said.since is None:
+            return ""
+        if not said.ended:
+            return trouble
+        if self.run.own_session:
+            return self._record(True)
+        if not said.session:
+            return "nothing is recorded: begin a recording first"
+        self._recorded_in(said.session, True)
+        return ""
 
 
 def _known(value: float) -> float | None:

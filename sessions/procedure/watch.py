@@ -17,7 +17,16 @@ from inertial.constants import GRAVITY, MILLI_G
 from sessions.procedure.evidence import TABLE_FRESH, Evidence, Reference
 from sessions.procedure.live import Live
 from sessions.procedure.model import DEG, Step
-from sessions.procedure.seen import Axes, Line, Pulse, Samples, Seen, TableSays, Turned
+from sessions.procedure.seen import (
+    Axes,
+    Line,
+    Pulse,
+    Samples,
+    Seen,
+    TableSays,
+    Trouble,
+    Turned,
+)
 
 TICK = 0.05  # s, of the board's clock
 LAG = 0.15  # s, pulses wait for company and estimates are computed
@@ -108,6 +117,8 @@ class Watch:
                 self.evidence.table = self.now, seen.omega
             case Line() if not seen.connected:
                 self._broken(f"the line to the board is down: {seen.text}".rstrip(": "))
+            case Trouble():
+                self._broken(seen.text)
 
     def _take_samples(self, seen: Samples) -> None:
         first = float(seen.t[0])
