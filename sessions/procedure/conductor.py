@@ -14,14 +14,14 @@ from sessions.procedure.driven.table import RateTable
 from sessions.procedure.model import Step
 from sessions.procedure.recorded import Recorded
 from sessions.procedure.run import ABORTED, DONE, HELD, RUNNING, STOPPED, Journal
-from sessions.procedure.seen import Samples, Seen, TableSays, Trouble
+from sessions.procedure.seen import Axes, Samples, Seen, TableSays, Trouble
 from sessions.procedure.watch import State, Watch
 
 log = logging.getLogger(__name__)
 
 SILENT_S = 5.0  # s without a sample: a driven table is stopped
-UNRECORDED_S = 6.0  # s that nothing is recorded: the table is stopped
 ENDING_S = 60.0  # s that the end waits for a recorder to come back
+NAMED_S = 2.0  # s until an axis that goes wrong is named
 PATIENCE_S = 20.0  # s beyond the ramp that a driven table may need to get there
 
 Say = Callable[[str, int, float], None]  # remark, its moment by the data's clock, its length in s
@@ -43,13 +43,12 @@ class Conductor:
         """
         self.journal, self.run = journal, journal.run
         self.drive = Drive(table)
-        self.recorded = Recorded()
+        self.recorded = Recorded(journal, record)
         self._say, self._record, self._silence = say, record, silence
         first = self.run.plan.steps[0]
         self.watch = Watch(first, 0.0, self.run.plan.vibration_max)
         self._heard = time.monotonic()
         self._closing_since: float | None = None
-        self._unrecorded_at = -math.inf  # while it is being ended
 
     # --- orders
 
@@ -95,7 +94,7 @@ class Conductor:
         """Begin the present step anew; empty, or why not."""
         if self.run.over:
             return "the run has ended"
-        if problem := self.drive.take() or self._record_again():
+        if problem := self.drive.take() or self.recorded.again():
             return problem
         self._say(f"step {self.run.at + 1} is repeated by {by or 'somebody'}", 0, 0.0)
         self._go(max(self.run.at, 0))
@@ -129,6 +128,8 @@ class Conductor:
 
     def take(self, seen: Seen) -> None:
         """Something was seen on the bus."""
+        if isinstance(seen, Axes) and seen.unfit and self.run.state == RUNNING:
+            self._doubt(seen)
         if isinstance(seen, Samples):
             self._heard = time.monotonic()
             if not self.run.started_utc_ns:
@@ -136,6 +137,15 @@ class Conductor:
         self.watch.take(seen)
         if self.watch.over and self.run.state == RUNNING and self._watched:
             self._judge()
+
+    def _doubt(self, seen: Axes) -> None:
+        """An axis is called unfit soon after a dwell: it may have been so within it."""
+        k = self.run.at - 1
+        window = self.run.steps[k].window if k >= 0 else {}
+        if not window or window["epoch"] != seen.epoch:
+            return
+        if seen.t - window["until_us"] * 1e-6 <= NAMED_S:
+            self._spoilt("; ".join(text for _, text in seen.unfit), k=k)
 
     def tick(self) -> None:
         """A few times a second: ask the table, notice silence, close what has ended."""
@@ -160,9 +170,7 @@ class Conductor:
         """Samples that do not come, and a recording that does not go on, spoil what is measured;
         where that lasts, the table is stopped and a person asked.
         """
-        self._follow_recording()
-        why, since = self.recorded.trouble(self.run, now), self.recorded.since
-        lasts = since is not None and now - since > UNRECORDED_S
+        why, lasts = self.recorded.trouble(now), self.recorded.lasts(now)
         if self.silent_s > SILENT_S:
             why, lasts = f"no samples for {self.silent_s:.0f} s", self.drive.turns
             if known := self._silence():
@@ -193,8 +201,16 @@ class Conductor:
     # --- the way
 
     def _go(self, k: int) -> None:
-        """Begin step k, or end after the last."""
+        """Begin step k, or end after the last; all of it anew where the board has begun anew."""
         steps = self.run.plan.steps
+        if why := self._other_boot():
+            k = 0
+            self.journal.add("anew", reason=why)
+            self._say(f"begun anew: {why}", 0, 0.0)
+            if max(one.spoilt for one in self.run.steps) > self.run.plan.procedure.repeats:
+                self.journal.add("step", k=k)
+                self._hold(why)
+                return
         while k < len(steps) and steps[k].kind == "record":
             self.journal.add("step", k=k)
             self.journal.add("done", k=k, text=self._record(steps[k].on))
@@ -215,6 +231,15 @@ class Conductor:
             self.drive.turn(target, step.ramp_s)
         except TableError as error:
             self._hold(str(error))
+
+    def _other_boot(self) -> str:
+        """Why what was measured cannot be judged with what comes: a report is of one boot of a
+        board; empty where it can.
+        """
+        boots = {one.window["epoch"] for one in self.run.steps if one.window}
+        if self.watch.epoch < 0 or not boots - {self.watch.epoch}:
+            return ""
+        return "measured before the board restarted: a report is of one boot"
 
     def _judge(self) -> None:
         """What the watch came to."""
@@ -240,11 +265,11 @@ class Conductor:
             return
         self._spoilt(watch.reason)
 
-    def _spoilt(self, why: str, lasts: bool = False) -> None:
-        """The attempt is void, and the step begins anew; a person is asked where what spoils it
-        lasts, or comes too often.
+    def _spoilt(self, why: str, lasts: bool = False, k: int | None = None) -> None:
+        """The last attempt at step k (the present one) is void, and it begins anew; a person is
+        asked where what spoils it lasts, or comes too often.
         """
-        k = self.run.at
+        k = self.run.at if k is None else k
         self.journal.add("spoilt", k=k, reason=why)
         self._say(f"step {k + 1}, {self.run.plan.steps[k].name}: spoilt: {why}", 0, 0.0)
         if lasts or self.run.steps[k].spoilt > self.run.plan.procedure.repeats:
@@ -277,48 +302,13 @@ class Conductor:
             return
         if not self.drive.let_go(now, self._closing_since) or self.journal.fault:
             return
-        problem = self._end_recording(now)
+        problem = self.recorded.end(now)
         if problem and now - self._closing_since < ENDING_S:
             return
         if problem:
             log.error("%s", problem)
             problem = f"the end of the run is not in its recording: {problem}"
         self.journal.add("closed", problem=problem)
-
-    def _end_recording(self, now: float) -> str:
-        """What could not be done, or empty. A recorder that is away just now is waited for, until
-        it has written how the run ended.
-        """
-        self._follow_recording()
-        if trouble := self.recorded.trouble(self.run, now):
-            self._unrecorded_at = now
-            return trouble
-        if now - self._unrecorded_at < 1.0:
-            return "how it ended is being written"
-        return self._record(False) if self.run.own_session else ""
-
-    def _follow_recording(self) -> None:
-        if session := self.recorded.goes_on_in(self.run):
-            self._recorded_in(session, self.run.was_recording)
-
-    def _recorded_in(self, session: str, was_recording: bool) -> None:
-        self.journal.add("session", id=session, was_recording=was_recording)
-
-    def _record_again(self) -> str:
-        """Where nothing is recorded: a recording anew; what could not be done, or empty."""
-        said = self.recorded
-        self._follow_recording()
-        trouble = said.trouble(self.run, time.monotonic())
-        if said.since is None:
-            return ""
-        if not said.ended:
-            return trouble
-        if self.run.own_session:
-            return self._record(True)
-        if not said.session:
-            return "nothing is recorded: begin a recording first"
-        self._recorded_in(said.session, True)
-        return ""
 
 
 def _known(value: float) -> float | None:

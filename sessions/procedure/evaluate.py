@@ -13,6 +13,7 @@ from inertial.constants import GRAVITY, MILLI_G
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import PROCEDURE
 from sessions.export.table import Selection, messages
+from sessions.procedure.conductor import NAMED_S
 from sessions.procedure.evidence import WINDOW, shaking
 from sessions.procedure.library import ProcedureError, of_text
 from sessions.procedure.model import DEG, Plan, Step
@@ -30,7 +31,6 @@ from sessions.report.verdict import Check
 Array = NDArray[np.float64]
 M = pb.ProcedureStatus
 LEAST_SHARE = 0.95  # of a dwell that must be in the recording
-NAMED_S = 2.0  # s until an axis that goes wrong is named
 
 
 @dataclass(frozen=True)

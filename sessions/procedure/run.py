@@ -85,6 +85,12 @@ class Run:
                 step.spoilt, step.reason = step.spoilt + 1, event["reason"]
                 step.went_wrong(event["reason"])
                 self.message = f"{self.plan.steps[k].name}: spoilt: {event['reason']}"
+            case "anew":
+                for one in self.steps:
+                    if one.state == "done" and one.window:
+                        one.state, one.window, one.figures = "todo", {}, []
+                        one.spoilt, one.reference = one.spoilt + 1, ""
+                        one.went_wrong(event["reason"])
             case "failed":
                 step.state, step.reason, self.state = "failed", event["reason"], HELD
                 step.went_wrong(event["reason"])

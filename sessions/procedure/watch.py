@@ -14,7 +14,7 @@ from enum import Enum
 import numpy as np
 
 from inertial.constants import GRAVITY, MILLI_G
-from sessions.procedure.evidence import TABLE_FRESH, Evidence, Reference
+from sessions.procedure.evidence import Evidence, Reference
 from sessions.procedure.live import Live
 from sessions.procedure.model import DEG, Step
 from sessions.procedure.seen import (
@@ -114,7 +114,7 @@ class Watch:
             case Axes() if seen.epoch == self.epoch:
                 self.evidence.health.append(seen)
             case TableSays() if np.isfinite(self.now):
-                self.evidence.table = self.now, seen.omega
+                self.evidence.table_says(self.now, seen.omega)
             case Line() if not seen.connected:
                 self._broken(f"the line to the board is down: {seen.text}".rstrip(": "))
             case Trouble():
@@ -191,7 +191,7 @@ class Watch:
         axes = self.evidence.axes(t)
         if axes is not None and axes.unfit:
             return "; ".join(text for _, text in axes.unfit)
-        wrong = self._not_posed(t) if self.step.kind == "pose" else self._not_turning_so()
+        wrong = self._not_posed(t) if self.step.kind == "pose" else self._not_turning_so(t)
         if wrong:
             return wrong
         if shaking is None:
@@ -201,10 +201,12 @@ class Watch:
             return f"too much vibration: {found:.0f} mg RMS, at most {most:.0f}"
         return ""
 
-    def _not_turning_so(self) -> str:
+    def _not_turning_so(self, t: float) -> str:
         found, want = self.reference, self.step.target
         if found is None:
             return "the rate is not known: no tachometer has pulsed and no estimator is sure"
+        if contradicted := self._contradicted(t, found):
+            return contradicted
         omega, target = found.omega, want
         if not found.signed:
             omega, target = abs(omega), abs(want)
@@ -219,12 +221,39 @@ class Watch:
 
     def _table_differs(self, found: Reference) -> str:
         """A table that takes itself for right: its unit or sign may be described wrongly."""
-        said = self.evidence.table
-        if found.source == "table" or said is None or self.now - said[0] > TABLE_FRESH:
+        said = self.evidence.steady(self.now)
+        if found.source == "table" or said is None:
             return ""
-        if abs(said[1] - self.step.target) > self.step.tolerance:
+        if abs(said - self.step.target) > self.step.tolerance:
             return ""
-        return f"; the table says {said[1] / DEG:+.1f}: look at unit and sign in its description"
+        return f"; the table says {said / DEG:+.1f}: look at unit and sign in its description"
+
+    def _contradicted(self, t: float, found: Reference) -> str:
+        """Who else says something that the tachometer cannot be right with; or empty."""
+        if found.source != "tachometer":
+            return ""
+        allowed = max(self.step.tolerance, 0.1 * abs(found.omega), 2.0 * DEG)
+
+        def off(omega: float) -> float:
+            return abs(omega - found.omega) if found.signed else abs(abs(omega) - abs(found.omega))
+
+        votes, table = self.evidence.votes(t), self.evidence.steady(self.now)
+        if any(off(0.0 if v.still else v.omega) <= allowed + 5.0 * v.sigma for v in votes):
+            return ""
+        if table is not None and off(table) > allowed:
+            other, omega = "the table", table
+        elif table is None and votes and found.omega == 0.0:
+            other, omega = votes[0].estimator, votes[0].omega
+        else:
+            return ""
+        if found.omega == 0.0:
+            return (
+                f"the tachometer is silent, {other} says {omega / DEG:+.1f} °/s: see to its cable"
+            )
+        return (
+            f"the tachometer says {found.omega / DEG:+.1f} °/s, {other} {omega / DEG:+.1f}: look at"
+            " its pulses per revolution, and at unit and sign in the table's description"
+        )
 
     def _not_posed(self, t: float) -> str:
         if self.reference is not None and abs(self.reference.omega) > 2.0 * DEG:
