@@ -135,8 +135,12 @@ class Conductor:
             if not self.run.started_utc_ns:
                 self.journal.add("began", utc_ns=seen.utc_ns)
         self.watch.take(seen)
-        if self.watch.over and self.run.state == RUNNING and self._watched:
+        if self.run.state != RUNNING or not self._watched:
+            return
+        if self.watch.over:
             self._judge()
+        elif isinstance(seen, Samples) and self._other_boot():
+            self._spoilt("the board has restarted")
 
     def _doubt(self, seen: Axes) -> None:
         """An axis is called unfit soon after a dwell: it may have been so within it."""
@@ -207,10 +211,6 @@ class Conductor:
             k = 0
             self.journal.add("anew", reason=why)
             self._say(f"begun anew: {why}", 0, 0.0)
-            if max(one.spoilt for one in self.run.steps) > self.run.plan.procedure.repeats:
-                self.journal.add("step", k=k)
-                self._hold(why)
-                return
         while k < len(steps) and steps[k].kind == "record":
             self.journal.add("step", k=k)
             self.journal.add("done", k=k, text=self._record(steps[k].on))

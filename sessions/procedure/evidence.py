@@ -138,6 +138,10 @@ class Evidence:
                 return Reference(0.0 if one.still else one.omega, True, one.estimator)
         return None
 
+    def overdue(self, t: float) -> bool:
+        """Pulses should have come."""
+        return self._slowed(t) < 1.0 or not any(t - SILENCE < p.t <= t for p in self.pulses)
+
     def _slowed(self, t: float) -> float:
         """At most this share of the rate is left where pulses are overdue: 0 to 1."""
         times = [p.t for p in self.pulses if p.t <= t][-6:]

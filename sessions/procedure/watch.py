@@ -32,6 +32,7 @@ TICK = 0.05  # s, of the board's clock
 LAG = 0.15  # s, pulses wait for company and estimates are computed
 HOLE = 0.25  # s without samples that spoil a dwell
 FACE = 20.0 * DEG  # rad, between a face and the vertical
+AGAINST_S = 1.5  # s that others may contradict it: its first pulse is late, a table's word is old
 GRAVITY_OFF = 0.15  # of 1, of the specific force of a body at rest
 
 
@@ -65,6 +66,7 @@ class Watch:
     _tick: float = np.nan  # the next look
     _first: float = np.nan  # the first look of this attempt
     _since: float = 0.0  # s, settled
+    _against: float = np.nan  # s, since then the tachometer is contradicted
     _utc: tuple[float, int] = (0.0, 0)  # a moment on both clocks
 
     def then(
@@ -125,7 +127,7 @@ class Watch:
         if self.epoch >= 0 and seen.epoch != self.epoch:
             self._broken("the board has restarted")
             self.evidence.forget()
-            self.now, self._tick = -np.inf, np.nan
+            self.epoch, self.now, self._tick = seen.epoch, -np.inf, np.nan
         elif first > self.now + HOLE and np.isfinite(self.now):
             self._broken(f"data lost: {first - self.now:.2f} s without samples")
             self.evidence.samples.clear()
@@ -206,7 +208,11 @@ class Watch:
         if found is None:
             return "the rate is not known: no tachometer has pulsed and no estimator is sure"
         if contradicted := self._contradicted(t, found):
-            return contradicted
+            self._against = t if np.isnan(self._against) else self._against
+            if self.state is State.DWELL or t - self._against > AGAINST_S:
+                return contradicted
+        else:
+            self._against = np.nan
         omega, target = found.omega, want
         if not found.signed:
             omega, target = abs(omega), abs(want)
@@ -242,11 +248,11 @@ class Watch:
             return ""
         if table is not None and off(table) > allowed:
             other, omega = "the table", table
-        elif table is None and votes and found.omega == 0.0:
+        elif table is None and votes and self.evidence.overdue(t):
             other, omega = votes[0].estimator, votes[0].omega
         else:
             return ""
-        if found.omega == 0.0:
+        if self.evidence.overdue(t):
             return (
                 f"the tachometer is silent, {other} says {omega / DEG:+.1f} °/s: see to its cable"
             )
