@@ -29,7 +29,7 @@ def axes(
     out: Annotated[
         Path | None,
         typer.Option(
-            callback=output_file(),
+            callback=output_file(makes=True),
             help="Write the axis map to this TOML file.",
         ),
     ] = None,

@@ -98,7 +98,7 @@ def fit(
     out: Annotated[
         Path,
         typer.Option(
-            callback=output_file(),
+            callback=output_file(makes=True),
             help="The card, a TOML file.",
         ),
     ] = Path("card.toml"),

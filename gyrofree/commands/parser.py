@@ -44,12 +44,14 @@ def output_file(*endings: str, makes: bool = False) -> Look:
 
 
 def output_link() -> Look:
-    """For the callback of an option: a name at which a pseudo-terminal is to be found."""
+    """For the callback of an option: a name at which a pseudo-terminal is to be found, in a
+    folder that is made where it is absent.
+    """
 
     def fault(path: Path) -> str:
         if path.is_dir():
             return f"{path} is a folder: name a link in it"
-        return _fault_of_folder(path.parent) or _fault_of_name(path)
+        return _fault_of_new_folder(path.parent) or _fault_of_name(path)
 
     return _look(fault, "link")
 
