@@ -44,14 +44,15 @@ const overTime = (chart) => chart.scales.x.distr !== 3; // a spectrum has logari
 const upright = (chart) => (overTime(chart) ? "y" : "level");
 
 function describe(chart) {
-  const { title = "", unit = "", origin = "", across = "", ranges = [], measured = null } = told(chart), high = upright(chart);
+  const { title = "", unit = "", origin = "", across = "", ranges = [], shades = [], unsure = {}, measured = null } = told(chart), high = upright(chart);
   const [x, ...data] = chart.data;
   const lines = () => chart.series.slice(1).map((series, k) => ({ series, k })).filter(({ series }) => series.scale === high && series.show && series.label && series.label !== NAMELESS && !EDGE.test(series.label))
     .map(({ series, k }) => ({
       label: overTime(chart) ? series.label : "", color: series._stroke ?? series.stroke, dash: series.dash, width: 1.4, x, low: data[k], high: data[k],
+      unsure: unsure[series.label],
       half: EDGE.test(chart.series[k + 2]?.label ?? "") ? [data[k + 1], data[k + 2]] : null,
     })).map((line) => ({ ...line, color: typeof line.color === "function" ? line.color(chart, 0) : line.color }));
-  return { title, unit, origin, across, ranges, lines, high, measured: measured && asked(measured) ? measured : null };
+  return { title, unit, origin, across, ranges, shades, lines, high, measured: measured && asked(measured) ? measured : null };
 }
 
 // A zoom is the view's, so that its charts are drawn anew from every sample, stay while data come in, and are the same

@@ -45,7 +45,8 @@ class Position(Panel):
                     curves.append(estimator_curve(s, "nav", name, t, r["p_n"][:, k], half))
                 else:
                     t, r = s.rows("rate", name)
-                    curves.append(estimator_curve(s, "rate", name, t, r["p_n"][:, k]))
+                    sight = r["sight"].max(axis=1)  # the way is no better known than the turns
+                    curves.append(estimator_curve(s, "rate", name, t, r["p_n"][:, k], sight=sight))
             if vehicle and s.device.get("gnss"):
                 t, r = s.rows("gnss")
                 curves.append(
