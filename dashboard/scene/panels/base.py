@@ -1,6 +1,7 @@
 """What every panel gets and must do."""
 
 import logging
+import math
 import re
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
@@ -235,7 +236,7 @@ def rms_text(error: np.ndarray, sight: np.ndarray, unit: str = "") -> str:
     if unsure and not share:
         return unsure
     shown = number(rms(error, sight), 2, unit)
-    return f"{shown}, of the {100 * share:.0f} % that are not {unsure}" if unsure else shown
+    return f"{shown} · {math.floor(100 * share)} % valid" if unsure else shown
 
 
 def ranges(device: Device) -> list[Range]:

@@ -28,7 +28,7 @@ const AGAINST = { tacho: "tachometer" };
 // How much of it counts: what an estimator does not vouch for is not measured.
 const valid = (shares) => {
   const least = Math.min(...Object.values(shares));
-  return least > 0.9995 ? "" : `, of the ${(100 * least).toFixed(0)} % that are valid`;
+  return least > 0.9995 ? "" : `, of the ${Math.floor(100 * least)} % that are valid`;
 };
 const HOW = { reference: "the others are moved", clock: "one board's clock", tacho: "tachometer", rate: "rate of turn", start: "by their starts", given: "by hand" };
 

@@ -180,9 +180,8 @@ class Devices(Panel):
                 items.append((estimator_title(name), bad("silent")))
                 continue
             state = _state_of(s, name)
-            items.append(
-                (estimator_title(name), f"{state} · {number(m.us_per_sample, 0, 'µs a step')}")
-            )
+            cost = tag("span", number(m.us_per_sample, 0, "µs"), title="computing, for each sample")
+            items.append((estimator_title(name), joined([f"{state} · ", cost])))
             if m.behind_s > BEHIND_SHOWN_S:
                 items.append(("", bad(f"{m.behind_s:.1f} s behind")))
             if m.skipped_s:

@@ -21,8 +21,8 @@ NOTE = joined(
     [
         "RMS of ",
         sub("ω", "z"),
-        " against the tachometer over the window shown; NIS over its degrees of freedom is 1 for a"
-        " filter whose innovations are as large as it says.",
+        " against the tachometer over the window shown, of what is valid; NIS over its degrees of"
+        " freedom is 1 for a filter whose innovations are as large as it says.",
     ]
 )
 
