@@ -13,7 +13,7 @@ from playwright.sync_api import expect
 from support.browser import visit as opened
 from support.feeder import UTC0_NS, Feeder
 from support.front_door import open_door, wait_for
-from support.table_session import SESSION, table_root
+from support.table_session import SESSION, table_recording, table_root
 
 from dashboard.data.store import Store
 from dashboard.desk import Desk
@@ -21,6 +21,8 @@ from dashboard.scene.panels import PAGES
 from dashboard.scene.service import OWN_INPUTS, start
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
+from sessions.recording.mcap_log import read
+from sessions.replay.rerun import write_session
 
 axe_of = pytest.importorskip("axe_playwright_python.sync_playwright")
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
@@ -90,8 +92,9 @@ def door(tmp_path_factory):
     store, desk = Store(), Desk(None, "gyrofree")
     handle = start(SimpleNamespace(viser_port=0), store, desk)
     folder = tmp_path_factory.mktemp("door")
-    for name in (SESSION, AGAIN):
-        shutil.copytree(table_root() / SESSION, folder / "sessions" / name)
+    shutil.copytree(table_root() / SESSION, folder / "sessions" / SESSION)
+    rows = ((row.log_ns, row.key, row.payload) for row in read(table_recording()))
+    write_session(folder / "sessions", AGAIN, rows, "", {})
     try:
         with (
             fed(store),

@@ -37,7 +37,7 @@ def test_a_figure_with_one_limit_or_none():
     one = M.Figure(name="vibration_mg", value=3.0, sigma=float("nan"), max=5.0)
     assert "✓ vibration 3 mg (≤ 5)" in figure(one)
     free = M.Figure(name="force_error_mg", value=3.0, sigma=1.0)
-    assert "✓" not in figure(free) and "± 2 mg" in figure(free)
+    assert "✓" not in figure(free) and "3.0 ± 2.0 mg" in figure(free)
 
 
 def test_orders_follow_the_state_and_the_stop_is_always_there(free_port):

@@ -5,7 +5,7 @@ step costs.
 import numpy as np
 
 from dashboard.data.device import Device
-from dashboard.scene.drawing.page import Markup, explained, joined, note, sub, tag
+from dashboard.scene.drawing.page import Markup, explained, joined, note, sub, tag, term
 from dashboard.scene.drawing.palette import estimator_colour, estimator_title, number
 from dashboard.scene.panels.base import DEG, NO_RATE, Panel, Snapshot, rms, rms_text
 from dashboard.scene.panels.motion.innovations import verdict
@@ -21,8 +21,11 @@ NOTE = joined(
     [
         "RMS of ",
         sub("ω", "z"),
-        " against the tachometer over the window shown, of what is valid; NIS over its degrees of"
-        " freedom is 1 for a filter whose innovations are as large as it says.",
+        " against the tachometer over the window shown, of what is ",
+        term("valid"),
+        "; ",
+        term("NIS"),
+        " over its degrees of freedom is 1 for a filter whose innovations are as large as it says.",
     ]
 )
 
@@ -101,5 +104,5 @@ def _row(s: Snapshot, name: str, score: str) -> Markup:
     honest = "–"
     if len(nis):
         honest = joined([number(float(np.mean(nis / dof)), 2), " · ", verdict(nis, dof)])
-    cells = (tag("td", cell) for cell in (title, score, honest, number(cost, 0), state))
+    cells = (tag("td", cell) for cell in (title, explained(score), honest, number(cost, 0), state))
     return tag("tr", *cells, class_="gf-stale" if s.stale("rate", name) else "")
