@@ -5,6 +5,7 @@ and tabs that work, one switch for dark and light.
 import contextlib
 import re
 import shutil
+import sys
 import threading
 from types import SimpleNamespace
 
@@ -19,6 +20,7 @@ from dashboard.data.store import Store
 from dashboard.desk import Desk
 from dashboard.scene.panels import PAGES
 from dashboard.scene.service import OWN_INPUTS, start
+from dashboard.web.jobs import Jobs
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 from sessions.recording.mcap_log import read
@@ -92,6 +94,7 @@ def door(tmp_path_factory):
     store, desk = Store(), Desk(None, "gyrofree")
     handle = start(SimpleNamespace(viser_port=0), store, desk)
     folder = tmp_path_factory.mktemp("door")
+    jobs = Jobs([sys.executable, "-m", "gyrofree"], [])  # there is an import, but none is made
     shutil.copytree(table_root() / SESSION, folder / "sessions" / SESSION)
     rows = ((row.log_ns, row.key, row.payload) for row in read(table_recording()))
     write_session(folder / "sessions", AGAIN, rows, "", {})
@@ -104,12 +107,14 @@ def door(tmp_path_factory):
                 scene_at=handle.port,
                 store=store,
                 desk=desk,
+                jobs=jobs,
                 open_labels=OWN_INPUTS,
             ) as opened,
         ):
             yield opened
     finally:
         handle.stop()
+        jobs.close()
 
 
 @contextlib.contextmanager
