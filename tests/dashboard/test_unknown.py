@@ -117,3 +117,25 @@ def test_a_filter_that_runs_away_blindly_does_not_flatten_the_others():
     away = Curve("least squares", "#D55E00", t, np.where(t > 50, 1e4, np.sin(t)), sight=sight)
     data = drawn(Name("rate", "°/s"), [good, away], 0.0, 99.0, True).data
     assert max(float(one.max()) for one in data[1:3]) < 12.0
+
+
+@given(st.integers(5, 40), st.integers(7, 40))
+def test_a_curve_that_ends_has_no_newest_value_and_its_pauses_are_told(begin, long):
+    """Innovations of an axis that is left out, for one: the others go on."""
+    t = np.arange(100) * 0.1
+    other = Curve("others", "#0072B2", t, np.sin(t))
+    gone = np.where((np.arange(100) >= begin) & (np.arange(100) < begin + long), np.nan, 1.0)
+    chart = drawn(
+        Name("innovation", ""), [other, Curve("left out", "#D55E00", t, gone)], 0, 9.9, True
+    )
+    told = json.loads(html.unescape(re.search(r'data-chart="([^"]*)"', chart.heading)[1]))
+    ((first, last),) = told["holes"]["left out"]
+    assert first == round(t[begin - 1], 3) and last == round(t[begin + long], 3)
+    ended = drawn(
+        Name("innovation", ""),
+        [Curve("left out", "#D55E00", t[: begin + long], gone[: begin + long])],
+        0,
+        9.9,
+        True,
+    )
+    assert "<b>–</b>" in ended.heading

@@ -120,6 +120,7 @@ def drawn(
         "ranges": [[one.t0, one.t1, one.text, one.kind] for one in inside],
         "measured": _measured(curves, *cursors) if cursors else None,
         "shades": [piece for shade in shades for piece in _pieces(shade, t0, t1)],
+        "holes": {str(c.label): holes for c in curves if (holes := _holes(c, t0, t1))},
         "unsure": {str(c.label): said for c in curves if (said := worst(c.sight))},
     }
     heading = _heading(name, curves, shades, told)
@@ -171,6 +172,19 @@ def _heading(
     return str(tag("div", title, legend, class_="gf-chart", data_chart=data))
 
 
+def _holes(curve: Curve, t0: float, t1: float) -> list[list[float]]:
+    """Where a curve within [t0, t1] has samples but no values, [from, until]; those of the first
+    curve cover all others anyway.
+    """
+    known = np.isfinite(curve.y)
+    if known.all():
+        return []
+    t = curve.t[known]
+    ends = np.concatenate([[t0], t, [t1]]).clip(t0, t1)
+    wide = np.flatnonzero(np.diff(ends) > gap_limit(t))[-MOST_RANGES:]
+    return np.column_stack([ends[wide], ends[wide + 1]]).round(3).tolist()
+
+
 def _pieces(shade: Shade, t0: float, t1: float) -> list[tuple[float, float, str, str]]:
     """A shade within [t0, t1] as ranges, for a picture; the longest of them."""
     edges = np.flatnonzero(np.diff(shade.on.astype(np.int8), prepend=0, append=0))
@@ -183,8 +197,8 @@ def _pieces(shade: Shade, t0: float, t1: float) -> list[tuple[float, float, str,
 def _newest(curve: Curve, digits: int) -> Markup | str:
     """The newest value, or the word of an estimator that does not vouch for it."""
     good = np.flatnonzero(np.isfinite(curve.y))
-    if not len(good):
-        return "–"
+    if not len(good) or curve.t[-1] - curve.t[good[-1]] > gap_limit(curve.t[good]):
+        return "–"  # or not known any more
     unsure = "" if curve.sight is None else word(curve.sight[good[-1]])
     return explained(unsure) if unsure else number(float(curve.y[good[-1]]), digits)
 

@@ -43,6 +43,15 @@ const asked = (measured) => Object.values(measured ?? {}).every(({ at }) => `${a
 const overTime = (chart) => chart.scales.x.distr !== 3; // a spectrum has logarithmic axes
 const upright = (chart) => (overTime(chart) ? "y" : "level");
 
+// A line that is not known for a while is no line there, though the points that were sent go on.
+function holed(chart) {
+  chart.series.forEach((series, k) => {
+    if (!k) return;
+    const mine = EDGE.test(series.label ?? "") ? series.label.replace(EDGE, "").trim() : series.label;
+    series.gaps = (u, ...found) => [...(found.at(-1) ?? []), ...(told(u).holes?.[mine] ?? []).map((ends) => ends.map((t) => u.valToPos(t, "x", true)))];
+  });
+}
+
 function describe(chart) {
   const { title = "", unit = "", origin = "", across = "", ranges = [], shades = [], unsure = {}, measured = null } = told(chart), high = upright(chart);
   const [x, ...data] = chart.data;
@@ -91,6 +100,7 @@ function look() {
     const t = chart.data?.[0];
     if (!t?.length) continue;
     if (!known.has(chart)) equip(chart);
+    if (overTime(chart)) holed(chart); // series may be new ones
     // The scene keeps a chart's zoom as a share of its time axis, and reads that from a chart just made before the axis
     // has its limits: one second of thirty is then shown for good. Over time, what is sent is what is to be seen.
     const { min, max } = chart.scales.x, off = min !== t[0] || max !== t[t.length - 1];
