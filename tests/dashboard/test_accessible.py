@@ -37,20 +37,27 @@ FOREIGN = {  # as a German spreadsheet saves a log
     + b"".join(b"%d,0;0,01;0,02;1,00\n" % k for k in range(40)),
 }
 SIZES = {"desk": (1440, 900), "tablet": (1024, 768), "narrow": (768, 1024), "phone": (390, 844)}
-# elements that hide a part of their own text, or have it outside of the window; those that scroll
-# are meant to
+# elements that hide a part of their own text; those that scroll are meant to
 CLIPPED = """() => [...document.querySelectorAll('body *')].filter((e) => {
   const style = getComputedStyle(e), own = [...e.childNodes].some((n) => n.nodeType === 3 && n.data.trim());
   const hidden = style.visibility === 'hidden' || style.display === 'none' || !e.getClientRects().length;
   if (hidden || !own || e.closest('.hidden, [inert], [aria-hidden=true], details:not([open]) > :not(summary)') || style.display === 'inline') return false;
   if (e.closest('#webgl-software-rendering') || style.clipPath !== 'none') return false;
-  for (let one = e; one; one = one.parentElement) if (['auto', 'scroll'].includes(getComputedStyle(one).overflowX)) return false;
-  if (e.closest('[role=tablist]')) return false;
+  return e.scrollWidth > e.clientWidth + 1 && !['auto', 'scroll'].includes(style.overflowX);
+}).map((e) => `${e.tagName} ${e.id} ${e.className}: ${e.textContent.slice(0, 60)}`)"""  # noqa: E501
+
+# elements of a plain page with text outside of the window, where nothing scrolls
+OUTSIDE = """() => [...document.querySelectorAll('main *')].filter((e) => {
+  if (![...e.childNodes].some((n) => n.nodeType === 3 && n.data.trim()) || !e.getClientRects().length) return false;
+  for (let one = e; one; one = one.parentElement) {
+    const style = getComputedStyle(one);
+    if (['auto', 'scroll'].includes(style.overflowX) || style.clipPath !== 'none') return false;
+  }
   const words = document.createRange();
   words.selectNodeContents(e);
-  const { left, right } = words.getBoundingClientRect(), wide = document.documentElement.clientWidth;
-  return e.scrollWidth > e.clientWidth + 1 || left < -1 || right > wide + 1;
-}).map((e) => `${e.tagName} ${e.id} ${e.className}: ${e.textContent.slice(0, 60)}`)"""  # noqa: E501
+  const { left, right } = words.getBoundingClientRect();
+  return left < -1 || right > document.documentElement.clientWidth + 1;
+}).map((e) => `${e.tagName} outside: ${e.textContent.slice(0, 60)}`)"""  # noqa: E501
 
 
 class Into:
@@ -152,7 +159,8 @@ def serious(where, rules=None):
 def looked_at(page, size):
     """What is wrong with a plain page."""
     wide = page.evaluate("document.documentElement.scrollWidth") > SIZES[size][0]
-    return serious(page) + page.evaluate(CLIPPED) + ["wider than the window"] * wide
+    found = serious(page) + page.evaluate(CLIPPED) + page.evaluate(OUTSIDE)
+    return found + ["wider than the window"] * wide
 
 
 @pytest.mark.parametrize("scheme, size", [("dark", "desk"), ("light", "phone")])
