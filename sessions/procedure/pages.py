@@ -6,6 +6,7 @@ from logs.figures.numbers import with_half_width
 from messages.contract import gyrofree_pb2 as pb
 from sessions.procedure.evaluate import Outcome, StepResult
 from sessions.procedure.model import DEG
+from sessions.procedure.run import TROUBLE
 from sessions.report.grids import Grid, deg, number
 
 M = pb.ProcedureStatus
@@ -66,6 +67,17 @@ def steps(outcome: Outcome) -> Grid:
         " the dwell that counts. Attempts: all, and of them spoilt."
     )
     return Grid("Steps of the procedure", head, rows, remark)
+
+
+def troubles(outcome: Outcome) -> Grid:
+    """Why attempts were spoilt or held, step by step; no rows where nothing was."""
+    rows = [
+        (str(k), one.step.name, why)
+        for k, one in enumerate(outcome.steps, 1)
+        for why in one.record.trouble
+    ]
+    remark = f"In the order they came; of each step the last {TROUBLE} that differ."
+    return Grid("What spoilt or held attempts", ("step", "name", "reason"), rows, remark)
 
 
 def _row(k: int, one: StepResult) -> tuple[str, ...]:

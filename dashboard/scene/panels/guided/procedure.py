@@ -4,6 +4,7 @@ for operators.
 """
 
 import logging
+import textwrap
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ ACTION = pb.ProcedureCommand
 M = pb.ProcedureStatus
 STEP = M.Step
 ACTIVE = (M.STATE_RUNNING, M.STATE_HELD)
+SHORT = 60  # characters of a reason; all of it is in the tooltip
 STATES = {
     M.STATE_IDLE: "no test runs",
     M.STATE_RUNNING: "running",
@@ -203,8 +205,11 @@ def steps_of(m: pb.ProcedureStatus) -> Markup:
         sign = tag("b", mark, style=f"color:{colour}", title=word)
         name = joined([sign, tag("b" if now else "span", step.name)], " ")
         parts: list[object] = [figure(one) for one in step.figures]
-        if step.spoilt:
-            parts.append(tag("span", f"{step.spoilt}× spoilt", title=step.reason))
+        if step.spoilt or step.trouble:
+            often = f"{step.spoilt}× spoilt" if step.spoilt else "held"
+            last = textwrap.shorten("".join(step.trouble[-1:]), SHORT, placeholder=" …")
+            text = f"{often}: {last}".rstrip(": ")
+            parts.append(tag("span", text, title="; ".join(step.trouble)))
         if step.kind == "open" and step.reason:
             parts.append(step.reason)
         items.append((name, joined(parts, " · ") if parts else html(word)))
