@@ -27,6 +27,7 @@ from messages.contract.topics import REPLAY_SUFFIX, Topic
 from messages.history.spool import Spool
 from messages.setting import setting
 
+PATIENCE_S = 3.0  # for a router that starts together with its clients
 CLOSING_S = 5.0
 LARGEST = 16 << 20  # bytes; messages have at most 1 MB, answers to questions 8
 
@@ -143,22 +144,28 @@ def open_client(
     """
     stop = stop or threading.Event()
     end = None if timeout_s is None else time.monotonic() + timeout_s
-    said = False
+    start, said = time.monotonic(), False
     while True:
         try:
             return zenoh.open(_config(settings, "client"))
         except zenoh.ZError:
             if stop.is_set() or (end is not None and time.monotonic() > end):
                 raise BusUnavailable(
-                    f"[bus] router {settings.router}: nobody answers; start one with `gyrofree"
-                    " router`"
+                    f"[bus] router {settings.router}: nobody answers{_why(settings)}; start one with"
+                    " `gyrofree router`"
                 ) from None
-        if not said:
-            wrong = tls.trouble(settings.tls, settings.role) if settings.tls is not None else ""
-            about = f": {wrong}" if wrong else ""
-            log.warning("router %s does not answer yet: trying on%s", settings.router, about)
+        if not said and time.monotonic() - start > PATIENCE_S:
+            log.warning(
+                "router %s does not answer yet: trying on%s", settings.router, _why(settings)
+            )
             said = True
         stop.wait(0.25)
+
+
+def _why(settings: BusSettings) -> str:
+    """What is wrong with this process's certificate, where that may be why nobody answers."""
+    wrong = tls.trouble(settings.tls, settings.role) if settings.tls is not None else ""
+    return f" ({wrong})" if wrong else ""
 
 
 def connected(session: zenoh.Session) -> bool:
