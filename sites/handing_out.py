@@ -5,7 +5,7 @@ from pathlib import Path
 
 from sites.authority import Authority, Issued, pem
 from sites.enrolment import load_request, new_requests
-from sites.place import TRUSTED, SiteError, load_place, write
+from sites.place import TRUSTED, SiteError, load_place, new_folder, write
 from sites.roles import ROLES
 
 
@@ -24,16 +24,15 @@ def hand_out(
         raise SiteError(f"no certificate of role {role!r} is handed out: want {', '.join(wanted)}")
     if bool(devices) != (role == "gateway"):
         raise SiteError("a gateway's certificate names its boards (--board), others none")
-    if (out / f"{role}.pem").exists():
-        raise SiteError(f"{out} has a certificate of a {role} already: choose another folder")
     ((key, request),) = new_requests((role,)).values()
     here = load_place(folder).place
     if any(each.common_name == f"{role}.{name}" for each in authority.register()):
         raise SiteError(f"{role}.{name} was issued already: choose another name for the machine")
-    certificate = authority.issue(
-        load_request(request), role, here, name=name, devices=devices, life=life
-    )
-    write(out / f"{role}.key", key)
-    write(out / f"{role}.pem", pem(certificate), 0o644)
-    write(out / TRUSTED, (folder / TRUSTED).read_bytes(), 0o644)
+    with new_folder(out) as draft:
+        write(draft / f"{role}.key", key)
+        write(draft / TRUSTED, (folder / TRUSTED).read_bytes(), 0o644)
+        certificate = authority.issue(
+            load_request(request), role, here, name=name, devices=devices, life=life
+        )
+        write(draft / f"{role}.pem", pem(certificate), 0o644)
     return authority.register()[-1]

@@ -13,7 +13,7 @@ from messages.bus.session import BusSettings, open_router
 from sites.authority import Authority, pem
 from sites.enrolment import JoinRequest, keep, new_requests
 from sites.invitation import Invitation
-from sites.place import PLACE, TRUSTED, Place, SiteError, load_place, save_place, write
+from sites.place import PLACE, TRUSTED, Place, SiteError, load_place, new_folder, save_place, write
 from sites.roles import SERVICES, join_key
 from sites.service import asked
 
@@ -27,10 +27,10 @@ def make_site(folder: Path, name: str, extra: tuple[str, ...] = ()) -> Place:
     """
     if (folder / PLACE).exists():
         raise SiteError(f"{folder} is a place of {load_place(folder).site} already")
-    authority = Authority.create(folder, name)
     place = Place(site=name, place=name, home=name)
-    issue_here(folder, authority, place, (*SERVICES, *extra))
-    save_place(folder, place)
+    with new_folder(folder) as draft:
+        issue_here(draft, Authority.create(draft, name), place, (*SERVICES, *extra))
+        save_place(draft, place)
     return place
 
 

@@ -4,8 +4,11 @@ A place is one installation of a site: the lab with the boards, which is the sit
 its authority, or an office that watches. All files of keys are readable by their owner alone.
 """
 
+import contextlib
 import json
 import os
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
 
@@ -78,13 +81,33 @@ def save_place(folder: Path, place: Place) -> None:
     write(folder / PLACE, text.encode(), 0o644)
 
 
+@contextlib.contextmanager
+def new_folder(folder: Path) -> Iterator[Path]:
+    """A folder to be filled, which takes its place when it is whole, and not at all when that
+    fails. Raises SiteError where there is something already.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise SiteError(f"{folder} has something in it: choose another folder")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    draft = folder.with_name(f"{folder.name}.{os.getpid()}.draft")
+    draft.mkdir(mode=0o700)
+    try:
+        yield draft
+        os.rename(draft, folder)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
 def write(path: Path, content: bytes, mode: int = 0o600) -> None:
     """Write a file as a whole: it is the old one or the new one, whatever happens meanwhile."""
     path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     draft = path.with_name(path.name + ".draft")
     draft.unlink(missing_ok=True)
-    with os.fdopen(os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as stream:
-        stream.write(content)
-        stream.flush()
-        os.fsync(stream.fileno())
-    put_in_place(draft, path)
+    try:
+        with os.fdopen(os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        put_in_place(draft, path)
+    finally:
+        draft.unlink(missing_ok=True)

@@ -17,7 +17,8 @@ from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
 from messages.text import reason
 
 ROOMS = frozenset(  # an error of theirs is a sentence for people
-    "dashboard estimator firmware_protocol gateway gyrofree inertial logs messages sessions".split()
+    "dashboard estimator firmware_protocol gateway gyrofree inertial logs messages sessions"
+    " sites".split()
 )
 PICTURES = (".png", ".svg", ".pdf")
 Look = Callable[[Path | None], Path | None]

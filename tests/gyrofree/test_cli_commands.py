@@ -23,6 +23,7 @@ SERVICES = {
     "simulate",
     "play",
     "procedures",
+    "site serve",
 }
 ORDERS = {
     "users add",

@@ -10,10 +10,11 @@ from rich.table import Table
 
 from gyrofree.commands.installation.site import _folder, _named
 from gyrofree.commands.options import AsJson, Config, say, settings_of, show_table
+from gyrofree.commands.parser import Commands, output_folder
 from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
 from sites.place import SiteError, load_place
 
-app = typer.Typer(
+app = Commands(
     no_args_is_help=True,
     rich_markup_mode=None,
     help="Certificates of a site: list, issue for another machine, renew, revoke.",
@@ -46,11 +47,14 @@ def certs_list(as_json: AsJson = False, config: Config = None) -> None:
 def certs_issue(
     role: Annotated[str, typer.Argument(help="gateway, viewer, operator, simulator ...")],
     name: Annotated[str, typer.Argument(help="Name of the machine.", callback=_named)],
-    out: Annotated[Path, typer.Option(help="Folder for its files; carry it there.")],
+    out: Annotated[
+        Path, typer.Option(callback=output_folder(), help="Folder for its files; carry it there.")
+    ],
     board: Annotated[
         list[str] | None, typer.Option(help="A gateway's board; may stand often.")
     ] = None,
     days: Annotated[float, typer.Option(min=0.001, max=3650.0, help="Until it ends.")] = 90.0,
+    as_json: AsJson = False,
     config: Config = None,
 ) -> None:
     """Key and certificate for a process on another machine of this place."""
@@ -64,6 +68,8 @@ def certs_issue(
         )
     except (SiteError, OSError) as error:
         raise fail(error, EXIT_FAILED) from None
+    if as_json:
+        return say(issued.model_dump_json())
     say(f"{issued.common_name} until {issued.ends:%Y-%m-%d %H:%M UTC} in {out}")
 
 
@@ -97,6 +103,7 @@ def certs_renew(
 @app.command("revoke")
 def certs_revoke(
     common_name: Annotated[str, typer.Argument(help="As `gyrofree certs list` shows it.")],
+    as_json: AsJson = False,
     config: Config = None,
 ) -> None:
     """Take every right from a certificate; its name is never given again."""
@@ -106,6 +113,8 @@ def certs_revoke(
         count = Authority(_folder(settings_of(config))).revoke(common_name)
     except (SiteError, OSError) as error:
         raise fail(error, EXIT_FAILED) from None
+    if as_json:
+        return say(json.dumps({"common_name": common_name, "revoked": count}))
     say(f"{common_name}: {count} revoked; a running `gyrofree up` shuts it out at once")
 
 

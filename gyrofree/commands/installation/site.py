@@ -12,6 +12,7 @@ import zenoh
 from rich.table import Table
 
 from gyrofree.commands.options import AsJson, Config, Verbose, say, settings_of, show_table
+from gyrofree.commands.parser import Commands, output_folder
 from gyrofree.config import DEFAULT_PATH, ConfigError, Settings
 from gyrofree.running.process import (
     EXIT_CONFIG,
@@ -28,13 +29,16 @@ from sites.place import SiteError, load_place
 FOLDER = Path("var/site")
 PORT = 7447
 
-app = typer.Typer(
+app = Commands(
     no_args_is_help=True,
     rich_markup_mode=None,
     help="Several places as one site: make it, invite, join, prove who may do what.",
 )
 
-Folder = Annotated[Path, typer.Option(help="Folder of this place's certificates and keys.")]
+Folder = Annotated[
+    Path,
+    typer.Option(callback=output_folder(), help="Folder of this place's certificates and keys."),
+]
 File = Annotated[Path, typer.Option("--config", "-c", help="Configuration to be written.")]
 
 
@@ -54,6 +58,7 @@ def site_init(
     simulator: Annotated[
         bool, typer.Option("--simulator", help="Also a certificate for a simulated board.")
     ] = False,
+    as_json: AsJson = False,
     config: File = DEFAULT_PATH,
 ) -> None:
     """Make a site whose home is here: its authority, certificates, and the configuration."""
@@ -64,6 +69,8 @@ def site_init(
         _configure(config, place.site, folder, f"tls/127.0.0.1:{port}", port)
     except (SiteError, ConfigError, OSError) as error:
         raise fail(error, EXIT_CONFIG) from None
+    if as_json:
+        return say(json.dumps({"site": name, "folder": str(folder), "config": str(config)}))
     say(f"site {name}: authority and certificates in {folder}; {config} written")
     say("keep a copy of that folder in a safe place: who has authority/ca.key can let anybody in")
     say("next: `gyrofree up`; `gyrofree site invite PLACE --address HOST` lets others watch")
@@ -109,6 +116,7 @@ def site_join(
         str, typer.Option(help="Where the home may call: ADDRESS or ADDRESS:PORT.")
     ] = "0.0.0.0",
     folder: Folder = FOLDER,
+    as_json: AsJson = False,
     config: File = DEFAULT_PATH,
 ) -> None:
     """Join a site by an invitation: waits for its home to call, then writes the configuration."""
@@ -129,6 +137,8 @@ def site_join(
         raise fail(error, EXIT_CONFIG) from None
     except zenoh.ZError as error:
         raise fail(f"{listen}: {str(error).split(' at /')[0]}", EXIT_TAKEN) from None
+    if as_json:
+        return say(place.model_dump_json())
     say(f"{place.place} has joined {place.site}, its people as {place.seat}; {config} written")
     say("next: `gyrofree up`")
 
@@ -171,7 +181,9 @@ def site_copies(as_json: AsJson = False, config: Config = None) -> None:
 
 @app.command("remove")
 def site_remove(
-    place: Annotated[str, typer.Argument(help="Name of the place.")], config: Config = None
+    place: Annotated[str, typer.Argument(help="Name of the place.")],
+    as_json: AsJson = False,
+    config: Config = None,
 ) -> None:
     """Send a place away: its certificates lose every right, and it is not called any more."""
     from sites.removal import remove
@@ -180,6 +192,8 @@ def site_remove(
         count = remove(_folder(settings_of(config)), place)
     except (SiteError, OSError) as error:
         raise fail(error) from None
+    if as_json:
+        return say(json.dumps({"place": place, "revoked": count}))
     say(f"{place} is removed, {count} certificates revoked; `gyrofree up` lets it in no more")
 
 
