@@ -3,7 +3,7 @@
 import ipaddress
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, field_validator
+from pydantic import BaseModel, ConfigDict, field_validator, model_validator
 
 from messages.setting import setting
 
@@ -40,7 +40,16 @@ class DashboardSettings(BaseModel):
     demo: bool = setting(False, "says so on the pages; the demo's link signs in without a password")
 
     allowed_hosts: list[str] = setting([], "names besides localhost that people type to get here")
-    secure_cookies: bool = setting(False, "true behind TLS: `__Host-` cookie, Secure, HSTS")
+    tls_certificate: Path | None = setting(
+        None,
+        "PEM file of the certificate and its chain: the port speaks TLS by itself; other files are"
+        " taken when they change",
+        shown=True,
+    )
+    tls_key: Path | None = setting(None, "PEM file of its private key", shown=True)
+    secure_cookies: bool = setting(
+        False, "true behind a proxy with TLS: `__Host-` cookie, Secure, HSTS"
+    )
     trusted_proxies: list[str] = setting([], "addresses whose X-Forwarded-For is believed")
 
     session_hours: float = setting(12.0, "longest sign-in", unit="h", gt=0, le=720)
@@ -103,12 +112,23 @@ class DashboardSettings(BaseModel):
                 )
         return [host.lower() for host in value]
 
+    @model_validator(mode="after")
+    def _both_files_of_tls(self) -> "DashboardSettings":
+        if (self.tls_certificate is None) != (self.tls_key is None):
+            raise ValueError("tls_certificate and tls_key: want both, or none")
+        return self
+
+    @property
+    def secure(self) -> bool:
+        """Browsers reach it by https, ours or a proxy's."""
+        return self.secure_cookies or self.tls_certificate is not None
+
     @property
     def cookie(self) -> str:
         """Name of the cookie. Cookies do not know ports, so the port is in the name where __Host-
         is not possible.
         """
-        return "__Host-gyrofree" if self.secure_cookies else f"gyrofree-{self.port}"
+        return "__Host-gyrofree" if self.secure else f"gyrofree-{self.port}"
 
     @property
     def url(self) -> str:
@@ -125,4 +145,4 @@ class DashboardSettings(BaseModel):
             )
         except ValueError:
             pass
-        return f"{'https' if self.secure_cookies else 'http'}://{host}:{self.port}"
+        return f"{'https' if self.secure else 'http'}://{host}:{self.port}"

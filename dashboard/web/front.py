@@ -16,6 +16,7 @@ from dashboard.web.control import Replay
 from dashboard.web.first.control import FirstRun
 from dashboard.web.jobs import Jobs
 from dashboard.web.readings import Readings
+from dashboard.web.tls.certificate import Certificate
 from dashboard.web.uploads import Uploads
 from dashboard.web.views import Views
 from sessions.library.catalogue import Catalogue
@@ -40,6 +41,7 @@ class Front:
     first_run: FirstRun | None = None  # while there is no board, and where one can be configured
     readings: Readings = field(default_factory=Readings)
     uploads: Uploads = field(default_factory=Uploads)
+    certificate: Certificate | None = None  # of the port, where it speaks TLS by itself
     open_labels: Collection[str] = ()  # of the scene's inputs that concern nobody else
     ended: Counter[str] = field(default_factory=Counter)  # why -> connections that were ended
     views: Views = field(init=False)

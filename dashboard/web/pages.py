@@ -154,7 +154,7 @@ def _enter(request: Request, token: str, wanted: str = "/") -> RedirectResponse:
         token,
         max_age=int(settings.session_hours * 3600),
         path="/",
-        secure=settings.secure_cookies,
+        secure=settings.secure,
         httponly=True,
         samesite="strict",
     )
@@ -245,7 +245,7 @@ async def logout(request: Request) -> Response:
     answer.delete_cookie(
         front.settings.cookie,
         path="/",
-        secure=front.settings.secure_cookies,
+        secure=front.settings.secure,
         httponly=True,
         samesite="strict",
     )

@@ -111,12 +111,17 @@ def dashboard(
         from dashboard.web.control import ProcessReplay
         from dashboard.web.first.control import FirstRun
         from dashboard.web.jobs import Jobs
+        from dashboard.web.tls.certificate import CertificateError
+        from dashboard.web.users import UsersError
 
         options = ["--config", str(config)] if config else []
         replayer = command("replay", "--stay", *options)
         jobs = Jobs(command(), options)
         first = FirstRun(command("setup", *options)) if setup else None
         replay = ProcessReplay(replayer)
-        service.run(settings.dashboard, settings.bus, stop, replay, jobs, first)
+        try:
+            service.run(settings.dashboard, settings.bus, stop, replay, jobs, first)
+        except (CertificateError, UsersError) as error:
+            raise ConfigError(str(error)) from None
 
     run_service(body, verbose)

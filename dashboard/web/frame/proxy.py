@@ -74,7 +74,7 @@ def router(
         if clean != query:
             return RedirectResponse("/scene/" + (f"?{urlencode(clean)}" if clean else ""), 303)
         headers = {
-            "content-security-policy": policy(request.headers["host"]),
+            "content-security-policy": policy(request.headers["host"], settings.secure),
             "x-frame-options": "SAMEORIGIN",
             "cache-control": "private, max-age=3600",
             "etag": f'"viser-{version}"',
