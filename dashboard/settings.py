@@ -53,7 +53,12 @@ class DashboardSettings(BaseModel):
     trusted_proxies: list[str] = setting([], "addresses whose X-Forwarded-For is believed")
 
     session_hours: float = setting(12.0, "longest sign-in", unit="h", gt=0, le=720)
-    idle_hours: float = setting(2.0, "a sign-in unused for so long ends", unit="h", gt=0, le=720)
+    idle_hours: float = setting(
+        2.0, "a sign-in unused for so long ends; to look on is no use", unit="h", gt=0, le=720
+    )
+    sign_ins_per_user: int = setting(
+        10, "of one user at a time; a new one ends the oldest", ge=1, le=1000
+    )
     link_minutes: float = setting(
         15.0, "life of a one-time sign-in link", unit="min", gt=0, le=1440
     )

@@ -145,7 +145,12 @@ def own_path(path: str) -> str:
     return path if pages else "/"
 
 
-def _enter(request: Request, token: str, wanted: str = "/") -> RedirectResponse:
+def caller(request: Request) -> tuple[str, str]:
+    """Address, and what the browser calls itself."""
+    return address_of(request), request.headers.get("user-agent", "")
+
+
+def enter(request: Request, token: str, wanted: str = "/") -> RedirectResponse:
     """Set the cookie and go to the page that was asked for."""
     settings = front_of(request).settings
     answer = RedirectResponse(own_path(wanted), 303)
@@ -187,9 +192,9 @@ async def login(request: Request) -> Response:
     gate, fields = front_of(request).gate, await _form(request)
     name, status, headers = fields.get("name", ""), 401, {}
     try:
-        token = await gate.sign_in(name, fields.get("password", ""), address_of(request))
+        token = await gate.sign_in(name, fields.get("password", ""), *caller(request))
         if token is not None:
-            return _enter(request, token, fields.get("next", "/"))
+            return enter(request, token, fields.get("next", "/"))
         fault = "Name or password is wrong."
     except WaitError as wait:
         seconds = max(1, round(wait.seconds))
@@ -223,7 +228,7 @@ def link_page(request: Request, token: Annotated[str, Query(max_length=200)] = "
 async def link(request: Request) -> Response:
     fields = await _form(request)
     try:
-        token = front_of(request).gate.redeem(fields.get("token", ""), address_of(request))
+        token = front_of(request).gate.redeem(fields.get("token", ""), *caller(request))
     except WaitError as wait:
         raise HTTPException(
             429, str(wait), {"retry-after": str(max(1, round(wait.seconds)))}
@@ -233,7 +238,7 @@ async def link(request: Request) -> Response:
             403,
             "this sign-in link was used already, is too old, or is not complete: ask for a new one",
         )
-    return _enter(request, token)
+    return enter(request, token)
 
 
 @routes.post("/logout")

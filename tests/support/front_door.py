@@ -26,7 +26,7 @@ from dashboard.web.tls.certificate import open_certificate
 from dashboard.web.users import issue_link_token, write_private
 from sessions.library.catalogue import Catalogue
 
-PASSWORDS = {"vera": "looks only 1", "otto": "operates 22", "anna": "administers 3"}
+PASSWORDS = {"vera": "looks only 1", "otto": "operates 222", "anna": "administers 3"}
 SERVICES = ("store", "desk", "replay", "jobs", "first_run", "open_labels")
 ROLES = {"vera": "viewer", "otto": "operator", "anna": "admin"}
 
