@@ -92,6 +92,9 @@ class DashboardSettings(BaseModel):
     body_limit: int = setting(
         65536, "largest body of a request", unit="bytes", ge=1024, le=10_000_000
     )
+    upload_bytes_per_user: int = setting(
+        2 << 30, "logs and photos of one user that are being sent", unit="bytes", ge=1 << 20
+    )
     body_timeout_s: float = setting(10.0, "to receive that body", unit="s", gt=0, le=300)
     message_limit: int = setting(
         65536, "largest message from a browser's scene", unit="bytes", ge=1024, le=10_000_000

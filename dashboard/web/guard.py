@@ -20,6 +20,15 @@ PAGE_CSP = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src"
     " 'self'; frame-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
 )
+# What a page of ours might be asked for by a script and needs none of.
+PERMISSIONS = ", ".join(
+    f"{name}=()"
+    for name in (
+        "accelerometer ambient-light-sensor bluetooth browsing-topics camera display-capture"
+        " geolocation gyroscope hid idle-detection local-fonts magnetometer microphone midi payment"
+        " serial storage-access usb window-management xr-spatial-tracking"
+    ).split()
+)
 
 
 class Refused(Exception):
@@ -155,7 +164,9 @@ def security_headers(lasting: bool) -> Iterator[tuple[str, str]]:
     )  # not no-referrer: that would make the Origin of our own forms "null"
     yield "cross-origin-opener-policy", "same-origin"
     yield "cross-origin-resource-policy", "same-origin"
-    yield "permissions-policy", "camera=(), microphone=(), geolocation=(), payment=(), usb=()"
+    yield "permissions-policy", PERMISSIONS
+    yield "origin-agent-cluster", "?1"
+    yield "x-permitted-cross-domain-policies", "none"
     yield "cache-control", "no-store"
     if lasting:
         yield "strict-transport-security", "max-age=31536000"
