@@ -52,6 +52,23 @@ class DashboardSettings(BaseModel):
     )
     trusted_proxies: list[str] = setting([], "addresses whose X-Forwarded-For is believed")
 
+    oidc_issuer: str = setting(
+        "", "identity provider of the lab (OpenID Connect), as https://id.example.org/lab"
+    )
+    oidc_client: str = setting("", "what this dashboard is called there")
+    oidc_secret: Path | None = setting(None, "file of its secret there; none: a public client")
+    oidc_address: str = setting(
+        "", "this page as browsers see it, as https://bench.example.org; they come back there"
+    )
+    oidc_suffix: str = setting("lab", "its people are called NAME@suffix here")
+    oidc_scope: str = setting("openid profile", "what is asked for")
+    oidc_name_claim: str = setting("preferred_username", "their name; absent: `sub`")
+    oidc_role_claim: str = setting("groups", "says what they may do")
+    oidc_admins: list[str] = setting([], "values of it that make an admin")
+    oidc_operators: list[str] = setting([], "values of it that make an operator")
+    oidc_viewers: list[str] = setting([], 'values of it that make a viewer; `["*"]`: everybody')
+    oidc_ca: Path | None = setting(None, "PEM file of who vouches for the provider's certificate")
+
     session_hours: float = setting(12.0, "longest sign-in", unit="h", gt=0, le=720)
     idle_hours: float = setting(
         2.0, "a sign-in unused for so long ends; to look on is no use", unit="h", gt=0, le=720
@@ -124,6 +141,20 @@ class DashboardSettings(BaseModel):
     def _both_files_of_tls(self) -> "DashboardSettings":
         if (self.tls_certificate is None) != (self.tls_key is None):
             raise ValueError("tls_certificate and tls_key: want both, or none")
+        return self
+
+    @model_validator(mode="after")
+    def _whole_provider(self) -> "DashboardSettings":
+        if not self.oidc_issuer:
+            return self
+        if not self.oidc_client or not self.oidc_address:
+            raise ValueError("oidc_issuer: want oidc_client and oidc_address, too")
+        if not (self.oidc_admins or self.oidc_operators or self.oidc_viewers):
+            raise ValueError("oidc_issuer: nobody gets a role; want oidc_viewers or others")
+        for url in (self.oidc_issuer, self.oidc_address):
+            local = url.startswith(("http://127.0.0.1", "http://localhost", "http://[::1]"))
+            if not url.startswith("https://") and not local:
+                raise ValueError(f"{url!r}: want https://")
         return self
 
     @property

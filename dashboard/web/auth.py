@@ -67,6 +67,7 @@ class SignIn:
     address: str = ""  # it came from
     means: str = ""  # password, one-time link ...
     agent: str = ""  # what the browser calls itself
+    external: bool = False  # an identity provider vouched for him; no user of our file
 
 
 class Gate:
@@ -137,13 +138,18 @@ class Gate:
         session, now = self._sessions.get(key), self._clock()
         if session is None:
             return None
-        user = self.users.get(session.user)
+        user = self._user_of(session)
         if why := self._over(session, user, now):
             self.end(key, why)
             return None
         if used:
             session.seen = now
         return None if user is None else (session, user)
+
+    def _user_of(self, session: SignIn) -> User | None:
+        if session.external:  # his name ends in the provider's suffix; a user made since is another
+            return User(session.user, Role[session.role], "", session.created)
+        return self.users.get(session.user)
 
     def _over(self, session: SignIn, user: User | None, now: float) -> str:
         """Why it is; empty when it is not."""
@@ -155,7 +161,7 @@ class Gate:
             return "its age is not known any more"
         if user is None:
             return "no such user any more"
-        if not _same_password(user, session):
+        if not session.external and not _same_password(user, session):
             return "another password"
         return "another role" if session.role not in ("", user.role.name) else ""
 
@@ -169,14 +175,23 @@ class Gate:
         good = [(key, session) for key, session in mine if self.look_up(key) is not None]
         return dict(sorted(good, key=lambda pair: -pair[1].created))
 
-    def begin(self, name: str, address: str, means: str, agent: str = "") -> str:
-        """The id of a new session of a user who has shown who he is."""
+    def external(self) -> dict[str, Role]:
+        """Who is signed in by an identity provider."""
+        return {s.user: Role[s.role] for s in list(self._sessions.values()) if s.external}
+
+    def begin(
+        self, name: str, address: str, means: str, agent: str = "", role: Role | None = None
+    ) -> str:
+        """The id of a new session of a user who has shown who he is. role: given by an identity
+        provider, whose people are not in the users file.
+        """
         token, now = secrets.token_urlsafe(32), self._clock()
         for key in list(self.sign_ins(name))[self.settings.sign_ins_per_user - 1 :]:
             self.end(key, "one sign-in too many")
         with self._lock:
-            user = self.users.get(name)
-            mark, role = ("", "") if user is None else (_mark(user), user.role.name)
+            user = None if role is not None else self.users.get(name)
+            mark = "" if user is None else _mark(user)
+            rank = user.role.name if user is not None else role.name if role is not None else ""
             self._sessions[_digest(token)] = SignIn(
                 name,
                 secrets.token_urlsafe(24),
@@ -184,10 +199,11 @@ class Gate:
                 now,
                 mark,
                 list(Moment.now()),
-                role,
+                rank,
                 address,
                 means,
                 plain(agent, AGENT),
+                role is not None,
             )
             while len(self._sessions) > SESSIONS:
                 self._sessions.pop(next(iter(self._sessions)))
@@ -231,7 +247,8 @@ class Gate:
         try:
             write_private(
                 self._file,
-                json.dumps({key: asdict(session) for key, session in self._sessions.items()}),
+                # not who came by a provider: what it gives him may be another by the next start
+                json.dumps({k: asdict(s) for k, s in self._sessions.items() if not s.external}),
             )
         except OSError as error:
             log.warning("%s: %s: a restart will sign everybody out", self._file, error.strerror)

@@ -12,6 +12,7 @@ import jinja2
 from fastapi import APIRouter, Depends, HTTPException, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 
+from dashboard.settings import DashboardSettings
 from dashboard.web import api
 from dashboard.web.auth import Role, WaitError, same_token
 from dashboard.web.front import Asker, address_of, asker, front_of
@@ -78,6 +79,7 @@ def render(
         "Role": Role,
         "demo": front.settings.demo,
         "version": version(),
+        "provider": front.settings.oidc_suffix if front.settings.oidc_issuer else "",
         "path": request.url.path,
     }
     return HTMLResponse(_templates.get_template(template).render(common | values), status)
@@ -152,8 +154,13 @@ def caller(request: Request) -> tuple[str, str]:
 
 def enter(request: Request, token: str, wanted: str = "/") -> RedirectResponse:
     """Set the cookie and go to the page that was asked for."""
-    settings = front_of(request).settings
     answer = RedirectResponse(own_path(wanted), 303)
+    set_cookie(front_of(request).settings, answer, token)
+    return answer
+
+
+def set_cookie(settings: DashboardSettings, answer: Response, token: str) -> None:
+    """The cookie of a sign-in."""
     answer.set_cookie(
         settings.cookie,
         token,
@@ -163,7 +170,6 @@ def enter(request: Request, token: str, wanted: str = "/") -> RedirectResponse:
         httponly=True,
         samesite="strict",
     )
-    return answer
 
 
 @routes.get("/")

@@ -41,6 +41,7 @@ def _users(
         ended=front_of(request).ended.most_common(),
         sign_ins={user.name: len(gate.sign_ins(user.name)) for user in users},
         certificate=front_of(request).certificate,
+        external=sorted(gate.external().items()),
     )
 
 
