@@ -116,6 +116,8 @@ def dashboard(
         from dashboard.web.control import ProcessReplay
         from dashboard.web.first.control import FirstRun
         from dashboard.web.jobs import Jobs
+        from dashboard.web.tls.certificate import CertificateError
+        from dashboard.web.users import UsersError
         from gyrofree.setup.site import only_watching
 
         options = ["--config", str(config)] if config else []
@@ -125,6 +127,9 @@ def dashboard(
         replay = ProcessReplay(replayer)
         bus = settings.bus.acting_as("dashboard")
         watching = only_watching(settings)
-        service.run(settings.dashboard, bus, stop, replay, jobs, first, watching)
+        try:
+            service.run(settings.dashboard, bus, stop, replay, jobs, first, watching)
+        except (CertificateError, UsersError) as error:
+            raise ConfigError(str(error)) from None
 
     run_service(body, verbose)
