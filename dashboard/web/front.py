@@ -141,9 +141,10 @@ def check_role(who: Asker, role: Role, request: Request) -> None:
     audit, where = audit_of(request), address_of(request)
     by = f"as {who.role.name}" + (f" by token {who.token}" if who.token else "")
     if who.role < role:
-<<<<<<< HEAD
         audit.refused(_act(request), who.name, where, f"{by}, takes {role.name}")
-        raise HTTPException(403, f"{who.name} is {who.role.name}; this takes {role.name}")
+        raise HTTPException(
+            403, f"{who.name} is signed in as {who.role.name}; this takes the role {role.name}"
+        )
     if request.method not in ("GET", "HEAD"):
         audit.done(_act(request), who.name, where, by)
 
@@ -155,10 +156,3 @@ def audit_of(request: Request) -> Audit:
 
 def _act(request: Request) -> str:
     return f"{request.method} {request.url.path}"
-=======
-        audit.warning("%s (%s) refused: %s", who.name, who.role.name, act)
-        raise HTTPException(
-            403, f"{who.name} is signed in as {who.role.name}; this takes the role {role.name}"
-        )
-    audit.info("%s (%s): %s", who.name, who.role.name, act)
->>>>>>> main
