@@ -49,6 +49,12 @@ class Alarm:
     title: str  # in a few words
     text: str  # what was found and what to do
     page: str  # key of the page that shows it; "" for none
+    about: str = ""  # which axis, filter or fault it is
+
+    @property
+    def id(self) -> str:
+        """Stays while what is said of it changes."""
+        return f"{self.kind}-{self.about}" if self.about else self.kind
 
 
 def words(alarm: Alarm) -> dict[str, str]:
@@ -81,12 +87,15 @@ def alarms(store: Store, device: Device, now: float | None = None) -> list[Alarm
     """What is wrong with a device, the worst first. Call under the store's lock; now:
     time.monotonic(), s, of a replay that is paused, when it was.
     """
-    now = time.monotonic() if now is None else now
     if store.replay.state(device.name, time.monotonic()) == "ended":
         return []
+    return faults(device, time.monotonic() if now is None else now)[:MOST]
+
+
+def faults(device: Device, now: float) -> list[Alarm]:
+    """All of them. Call under the store's lock."""
     found = [*_table(device, now), *_link(device, now), *_board(device, now), *_axes(device, now)]
-    found += [*_estimators(device, now), *_sight(device, now)]
-    return found[:MOST]
+    return [*found, *_estimators(device, now), *_sight(device, now)]
 
 
 def bench_alarms(store: Store, now: float | None = None) -> list[Alarm]:
@@ -119,9 +128,9 @@ def _table(device: Device, now: float) -> Iterator[Alarm]:
             f"the procedures have been silent for {heard.age(now):.0f} s and"
             f" {plain(heard.message.table, 60)} may still turn: stop it at the table"
         )
-        yield Alarm("table", "the table is left alone", text, "procedure")
+        yield Alarm("table", "the table is left alone", text, "procedure", "alone")
     if heard is not None and heard.message.alarm:
-        yield Alarm("table", "the table may turn", plain(heard.message.alarm), "procedure")
+        yield Alarm("table", "the table may turn", plain(heard.message.alarm), "procedure", "turns")
 
 
 def _link(device: Device, now: float) -> Iterator[Alarm]:
@@ -148,7 +157,8 @@ def _board(device: Device, now: float) -> Iterator[Alarm]:
         if fault.name == "reboot" and simulated:
             continue
         if fault.active or fault.name == "reboot":  # over as soon as it is known
-            yield Alarm("board", plain(fault.name), plain(fault.text), "board")
+            name = plain(fault.name)
+            yield Alarm("board", name, plain(fault.text), "board", name)
 
 
 def _axes(device: Device, now: float) -> Iterator[Alarm]:
@@ -158,9 +168,10 @@ def _axes(device: Device, now: float) -> Iterator[Alarm]:
     for axis in heard.message.axes:
         if axis_good(axis):
             continue
-        title = f"axis {plain(axis.name, 16)} {AXIS_WORDS.get(axis.state, 'unknown')}"
+        name = plain(axis.name, 16)
+        title = f"axis {name} {AXIS_WORDS.get(axis.state, 'unknown')}"
         text = plain(axis.text) or "it does not fit the other axes"
-        yield Alarm("axis", title, text + (", not used" if axis.excluded else ""), "health")
+        yield Alarm("axis", title, text + (", not used" if axis.excluded else ""), "health", name)
 
 
 def _estimators(device: Device, now: float) -> Iterator[Alarm]:
@@ -170,12 +181,13 @@ def _estimators(device: Device, now: float) -> Iterator[Alarm]:
         m, called = heard.message, plain(name, 40)
         if device.stale("estimator", name, now):
             text = f"nothing from it for {heard.age(now):.0f} s: does its process still run?"
-            yield Alarm("estimator", f"{called} silent", text, page)
+            yield Alarm("estimator", f"{called} silent", text, page, called)
             continue
         if m.message and counts(m.message) is None:
             doubted = m.message.startswith("settings: ")
             title = "is a setting wrong?" if doubted else called
-            yield Alarm("settings" if doubted else "estimator", title, plain(m.message), page)
+            kind = "settings" if doubted else "estimator"
+            yield Alarm(kind, title, plain(m.message), page, called)
     yield from _late(device, page)
 
 
@@ -184,7 +196,7 @@ def _late(device: Device, page: str) -> Iterator[Alarm]:
     said = [device.get("estimator", name).message for name in device.estimators("estimator")]
     trouble = next((plain(m.trouble) for m in said if m.trouble), "")
     if trouble:
-        yield Alarm("disk", "state not saved", trouble, page)
+        yield Alarm("disk", "state not saved", trouble, page, "state")
     behind_s = max((m.behind_s for m in said), default=0.0)
     limit_hz = max((m.limit_hz for m in said), default=0.0)
     if behind_s <= BEHIND_STALE_S and not limit_hz:
@@ -215,11 +227,12 @@ def _sight(device: Device, now: float) -> Iterator[Alarm]:
         return
     reason, called = plain(m.sight_reason), plain(name, 40)
     if "contradict" in reason:
-        yield Alarm("contradicted", f"{called} contradicted", reason, "nis")
+        yield Alarm("contradicted", f"{called} contradicted", reason, "nis", called)
     blind = len(m.sight) == 3 and all(s == pb.RateEstimate.SIGHT_BLIND for s in m.sight)
     if blind and not m.still:
-        yield Alarm("blind", f"{called} blind", reason or "no component is seen now", "rates")
+        text = reason or "no component is seen now"
+        yield Alarm("blind", f"{called} blind", text, "rates", called)
     omega = m.omega_ib_b_radps
     if m.still and len(omega) == 3 and max(map(abs, omega)) > TURNS_RADPS:
         text = "the accelerometers say that it stands still, the filter says that it turns"
-        yield Alarm("contradicted", f"{called} contradicted", text, "rates")
+        yield Alarm("contradicted", f"{called} contradicted", text, "rates", f"{called}-still")

@@ -23,7 +23,7 @@ from urllib.parse import urlsplit
 from gyrofree.config import Settings
 from messages.bus.session import BusUnavailable, open_client, subscribe
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import ESTIMATOR, LINK, PROCEDURE, STATUS
+from messages.contract.topics import ALARM, ESTIMATOR, LINK, PROCEDURE, STATUS
 from messages.text import plain
 
 LEAST_FREE = 1 << 30  # bytes of disk below which recording is at risk
@@ -36,6 +36,7 @@ SIGN_OF_LIFE = {
     "estimator": ESTIMATOR,
     "recorder": STATUS,
     "procedures": PROCEDURE,
+    "alarms": ALARM,
 }
 
 
