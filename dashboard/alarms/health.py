@@ -22,6 +22,7 @@ from messages.text import plain
 from sessions.report.nis import TOO_FEW, TOO_SURE, nis_verdict
 
 SETTING_KINDS = ("settings", "estimator", "late", "disk")  # said by an estimator's status
+SPECIAL = {"link-said": "line"}  # ids with a level of their own
 NIS_S = 30.0  # of corrections that a verdict is taken on
 GIB = 1 << 30
 
@@ -79,7 +80,7 @@ def free_bytes(folder: Path) -> int | None:
 def _causes(found: list[Alarm], settings: AlarmSettings) -> dict[str, Cause]:
     causes: dict[str, Cause] = {}
     for one in found:
-        level = getattr(settings.health, one.kind, "warning")
+        level = getattr(settings.health, SPECIAL.get(one.id, one.kind), "warning")
         if level != OFF:
             causes.setdefault(one.id, Cause(one.kind, one.title, one.text, level, one.page))
     return causes

@@ -82,6 +82,9 @@ class HealthSettings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     link: LevelOrOff = setting("critical", "the board is not connected, or its gateway is silent")
+    line: LevelOrOff = setting(
+        "watch", "the gateway has something to say of the board, as that its receiver has no place"
+    )
     table: LevelOrOff = setting("critical", "a driven table may turn and nobody holds it")
     recorder: LevelOrOff = setting(
         "critical", "the recording failed, the recorder is silent, or a procedure is not recorded"

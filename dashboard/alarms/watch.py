@@ -145,7 +145,7 @@ class Watch:
         self._health("", bench, now)
         for device, id in [key for key in self.book.points if key[0] and key[0] not in names]:
             self.book.unknown(device, id)
-        for (name, device), eye in self.eyes.items():
+        for (_, device), eye in self.eyes.items():
             if device not in names:
                 eye.why = f"{device} has not been heard"
         self.book.tick(now)

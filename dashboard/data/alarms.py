@@ -144,7 +144,7 @@ def _link(device: Device, now: float) -> Iterator[Alarm]:
     elif not m.connected:
         yield Alarm("link", "link lost", plain(m.message) or "the board is not connected", "link")
     elif m.message:
-        yield Alarm("link", "link", plain(m.message), "link")
+        yield Alarm("link", "link", plain(m.message), "link", "said")
 
 
 def _board(device: Device, now: float) -> Iterator[Alarm]:

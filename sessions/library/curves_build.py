@@ -16,7 +16,21 @@ from numpy.typing import NDArray
 
 from inertial.rate.names import LEADER
 from logs.figures.names import axis_channel
-from messages.contract.topics import ACCEL, GNSS, IMU, NAV, NOTE, RATE, TACHO, TRUTH, Topic, parse
+from messages.contract.topics import (
+    ACCEL,
+    ALARM,
+    ALARMS,
+    GNSS,
+    IMU,
+    NAV,
+    NOTE,
+    RATE,
+    TACHO,
+    TRUTH,
+    Topic,
+    parse,
+)
+from sessions.library.alarmed import Episodes
 from sessions.library.curves import Curves, Line, Mark, bin_for, bins_of, load, save
 from sessions.library.curves_bins import UNTOLD, Binner, PulseLine, TrackLine
 from sessions.library.scan import Block, Extent, Progress, extent, scan
@@ -57,7 +71,7 @@ def build(path: Path, coarse: bool = False, on_progress: Progress = lambda _: No
     stride = max(1, found.chunks // COARSE_CHUNKS) if coarse else 1
     reading = _Reading(path, found, stride)
     damage = Damage()
-    for block in scan(path, tuple(WANTED), stride, on_progress, damage):
+    for block in scan(path, (*WANTED, ALARM), stride, on_progress, damage):
         reading.take(
             block
             if stride == 1
@@ -93,6 +107,7 @@ class _Reading:
         self._axes: dict[str, tuple[Binner, tuple[str, ...]]] = {}
         self._tracks: dict[str, TrackLine] = {}
         self._marks: list[Mark] = []
+        self._alarms = Episodes()
         self._clocks: set[str] = set()
         self._take: dict[str, Callable[[str, Samples, Array], None]] = {
             RATE.name: self._rate,
@@ -112,6 +127,10 @@ class _Reading:
         if not decoded:
             return
         topic, (log_ns, found) = address.topic, zip(*decoded, strict=True)
+        if topic is ALARM:
+            for status in found:
+                self._alarms.take(status)
+            return
         read = samples(topic, found, log_ns, (*WANTED[topic], "run", "epoch"))
         name = f"{address.device}/{topic.name}" + (
             f"/{address.estimator}" if address.estimator else ""
@@ -140,7 +159,7 @@ class _Reading:
             width,
             dict(sorted(lines.items())),
             dict(sorted(tracks.items())),
-            tuple(sorted(self._marks, key=lambda mark: mark.t)),
+            tuple(sorted([*self._marks, *self._alarmed()], key=lambda mark: mark.t)),
             tuple(sorted(self._clocks)),
             self._coarse,
             leader_of(self._path),
@@ -231,6 +250,20 @@ class _Reading:
             moment = (at_utc_ns - self._extent.first_ns) / 1e9 if at_utc_ns else float(t[k])
             text, author = fields["text"][k] or "mark", fields["author"][k]
             self._marks.append(Mark(moment, text, author, float(fields["seconds"][k])))
+
+    def _alarmed(self) -> Iterator[Mark]:
+        """Alarms as ranges; one of the bench stands in every device's status, and once here."""
+        seen = set()
+        for one in self._alarms.result():
+            about = one.id if one.of_bench else f"{one.device}/{one.id}"
+            if (about, one.begin_ns) in seen:
+                continue
+            seen.add((about, one.begin_ns))
+            end_ns = one.end_ns or self._extent.last_ns
+            begin_ns = max(one.begin_ns, self._extent.first_ns)
+            t, seconds = (begin_ns - self._extent.first_ns) / 1e9, (end_ns - begin_ns) / 1e9
+            if 0.0 <= t <= self._extent.seconds and seconds >= 0.0:
+                yield Mark(t, f"{one.level}: {one.title}", ALARMS, max(seconds, 1e-3))
 
 
 def _means(binner: Binner, names: tuple[str, ...], n: int) -> Line:

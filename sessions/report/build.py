@@ -5,7 +5,7 @@ same bytes.
 import hashlib
 import json
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +13,11 @@ import numpy as np
 
 from messages.contract import gyrofree_pb2 as pb
 from sessions.export.table import Progress, silent
+from sessions.library.alarmed import Episode, episodes
 from sessions.procedure.evaluate import Held, Outcome, StepResult, evaluate, held_by, segments
 from sessions.procedure.pages import facts, provenance, steps
 from sessions.recording.manifest import Manifest, SessionError, read_manifest
+from sessions.report import alarms
 from sessions.report.analysis import Analysis, analyse
 from sessions.report.data import Run, load_run
 from sessions.report.document import Extra, compose
@@ -59,6 +61,7 @@ class Judged:
     checks: list[Check]
     held: Held | None
     outcome: Outcome | None
+    episodes: list[Episode] = field(default_factory=list)  # alarms of its run
 
 
 def judged(
@@ -78,7 +81,8 @@ def judged(
     if held is not None:
         outcome = evaluate(held, found, figures)
         figures, checks = [*figures, *outcome.figures], outcome.checks + checks
-    return Judged(manifest, found, spec, figures, checks, held, outcome)
+    there = alarms.of_run(episodes(path, manifest.keys if manifest else None), run)
+    return Judged(manifest, found, spec, figures, checks, held, outcome, there)
 
 
 def build(
@@ -99,6 +103,8 @@ def build(
             provenance(one.outcome),
             one.outcome.held.status.operator,
         )
+    grid = alarms.alarms(one.episodes, one.found.run)
+    extra.grids.extend([grid] if grid is not None else [])
     photo = read_photo(path.parent)
     if photo is not None:
         extra.provenance.append(("SHA-256 of the photo", photo.sha256))
@@ -153,6 +159,7 @@ def _json(one: Judged, sha256: str, photo: Photo | None) -> str:
         "navigation": {nav.name: asdict(nav) for nav in found.navigation},
         "link": found.run.link,
         "damage": list(found.run.said),
+        "alarms": alarms.as_json(one.episodes, found.run),
     }
     if outcome is not None:
         status = outcome.held.status
