@@ -13,7 +13,7 @@ import numpy as np
 
 from dashboard.alarms.machine import Cause
 from dashboard.alarms.settings import OFF, AlarmSettings
-from dashboard.data.alarms import RECORDER_STALE_S, Alarm, bench_alarms, faults, waits
+from dashboard.data.alarms import RECORDER_STALE_S, Alarm, bench_faults, faults, waits
 from dashboard.data.device import Device
 from dashboard.data.store import Store
 from messages.clock import STEP_NS
@@ -53,7 +53,7 @@ def of_device(store: Store, device: Device, settings: AlarmSettings, now: float)
 
 def of_bench(store: Store, settings: AlarmSettings, recordings: Path, now: float) -> Found:
     """Of the recorder and the disk it writes to. Call under the store's lock."""
-    found = bench_alarms(store, now)
+    found = bench_faults(store, now)
     kinds = {"recorder"} if store.recorder is not None else set()
     free = free_bytes(recordings)
     if free is not None:

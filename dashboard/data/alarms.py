@@ -5,7 +5,8 @@ the summary and the REST interface, so that all three say the same.
 import re
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from dashboard.data.device import BEHIND_STALE_S, Device
 from dashboard.data.store import Store
@@ -34,6 +35,9 @@ AXIS_MEANINGS = {  # of what is wrong with an axis, for people
     "biased": "It is off by a constant that the others do not share.",
     "not fresh": "Its values are repeated: no new reading comes.",
 }
+LEVELS = {"critical": 3, "warning": 2, "watch": 1}
+SHOWN = (pb.Alarm.STATE_UNACKNOWLEDGED, pb.Alarm.STATE_ACKNOWLEDGED)
+ALONE = ("clock", "disk", "inconsistent", "recorder")  # that the alarms' service finds, and we not
 MOST = 12  # of one device
 TURNS_RADPS = 0.035  # 2 deg/s: beyond it a rate is no standstill
 PROCEDURES_SILENT_S = 3.0  # s without a word of who drives a table
@@ -50,6 +54,9 @@ class Alarm:
     text: str  # what was found and what to do
     page: str  # key of the page that shows it; "" for none
     about: str = ""  # which axis, filter or fault it is
+    level: str = ""  # watch, warning or critical, where the service has said so
+    state: str = ""  # unacknowledged or acknowledged, likewise
+    raised_s: float = 0.0  # s since 1970, likewise
 
     @property
     def id(self) -> str:
@@ -59,9 +66,14 @@ class Alarm:
 
 def words(alarm: Alarm) -> dict[str, str]:
     """Words of the trade that stand in an alarm, with their meanings."""
-    of_axes = AXIS_MEANINGS if alarm.kind == "axis" else {}
-    shown = {word: means for word, means in of_axes.items() if word in alarm.title}
-    return shown | words_of([alarm.title, alarm.text])
+    return words_in(alarm.kind, alarm.title, alarm.text)
+
+
+def words_in(kind: str, title: str, text: str) -> dict[str, str]:
+    """Likewise of one that came over the bus."""
+    of_axes = AXIS_MEANINGS if kind == "axis" else {}
+    shown = {word: means for word, means in of_axes.items() if word in title}
+    return shown | words_of([title, text])
 
 
 def counts(message: str) -> dict[str, int] | None:
@@ -89,7 +101,38 @@ def alarms(store: Store, device: Device, now: float | None = None) -> list[Alarm
     """
     if store.replay.state(device.name, time.monotonic()) == "ended":
         return []
-    return faults(device, time.monotonic() if now is None else now)[:MOST]
+    now = time.monotonic() if now is None else now
+    return judged(faults(device, now), device, now, False)[:MOST]
+
+
+def judged(found: list[Alarm], device: Device, now: float, bench: bool) -> list[Alarm]:
+    """What is found here with what the alarms' service says of it: its level, who took note, and
+    what it alone finds, as limits. What is on a shelf is left out. Without the service, as found.
+    """
+    heard = device.get("alarm")
+    if heard is None or device.stale("alarm", now=now):
+        return found
+    said = {one.id: one for one in heard.message.alarms if bool(one.device) is not bench}
+    shown = []
+    for one in found:
+        known = said.pop(one.id, None)
+        if known is None or known.state in (pb.Alarm.STATE_NORMAL, pb.Alarm.STATE_RETURNED):
+            shown.append(one)
+        elif known.state != pb.Alarm.STATE_SHELVED:
+            shown.append(replace(one, **_said(known)))
+    others = [one for one in said.values() if one.state in SHOWN and one.active]
+    shown += [
+        Alarm(plain(one.kind), plain(one.title), plain(one.text), plain(one.page), **_said(one))
+        for one in others
+        if one.kind in ("limit", *ALONE)
+    ]
+    return sorted(shown, key=lambda one: -LEVELS.get(one.level, 1))
+
+
+def _said(one: pb.Alarm) -> dict[str, Any]:
+    level = next((word for word, rank in LEVELS.items() if rank == one.level), "")
+    state = "acknowledged" if one.state == pb.Alarm.STATE_ACKNOWLEDGED else "unacknowledged"
+    return {"level": level, "state": state, "raised_s": one.raised_utc_ns * 1e-9}
 
 
 def faults(device: Device, now: float) -> list[Alarm]:
@@ -99,7 +142,14 @@ def faults(device: Device, now: float) -> list[Alarm]:
 
 
 def bench_alarms(store: Store, now: float | None = None) -> list[Alarm]:
-    """What is wrong with the recorder. Call under the store's lock."""
+    """What is wrong with the recorder and its disk. Call under the store's lock."""
+    found, now = bench_faults(store, now), time.monotonic() if now is None else now
+    told = [one for one in store.devices.values() if not one.stale("alarm", now=now)]
+    return judged(found, told[0], now, True) if told else found
+
+
+def bench_faults(store: Store, now: float | None = None) -> list[Alarm]:
+    """As found here. Call under the store's lock."""
     heard = store.recorder
     if heard is None:
         return []

@@ -1,6 +1,6 @@
 """When what was wrong, of the alarms in a recording (topic alarm)."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -66,6 +66,19 @@ class Episodes:
     def result(self) -> list[Episode]:
         """In the order of their beginnings."""
         return sorted(self._found.values(), key=lambda one: (one.begin_ns, one.device, one.id))
+
+    def ranges(self, first_ns: int, last_ns: int) -> Iterator[tuple[float, str, float]]:
+        """Begin, s after first_ns, words and length, s, of those between two moments; one of the
+        bench stands in every device's status, and once here.
+        """
+        seen = set()
+        for one in self.result():
+            about = (one.id if one.of_bench else f"{one.device}/{one.id}"), one.begin_ns
+            begin_ns, end_ns = max(one.begin_ns, first_ns), min(one.end_ns or last_ns, last_ns)
+            if about not in seen and begin_ns <= end_ns:
+                length_s = max((end_ns - begin_ns) / 1e9, 1e-3)
+                yield (begin_ns - first_ns) / 1e9, f"{one.level}: {one.title}", length_s
+            seen.add(about)
 
 
 def episodes(path: Path, keys: Iterable[str] | None = None) -> list[Episode]:

@@ -159,12 +159,16 @@ class _Reading:
             width,
             dict(sorted(lines.items())),
             dict(sorted(tracks.items())),
-            tuple(sorted([*self._marks, *self._alarmed()], key=lambda mark: mark.t)),
+            tuple(sorted(self._marks + self._alarmed(), key=lambda mark: mark.t)),
             tuple(sorted(self._clocks)),
             self._coarse,
             leader_of(self._path),
             {key: _means(*one, n) for key, one in self._axes.items()},
         )
+
+    def _alarmed(self) -> list[Mark]:
+        ranges = self._alarms.ranges(self._extent.first_ns, self._extent.last_ns)
+        return [Mark(t, text, ALARMS, seconds) for t, text, seconds in ranges]
 
     def _times(self, read: Samples) -> Array:
         """The samples' own times, s from the first message; receive times where those cannot be."""
@@ -250,20 +254,6 @@ class _Reading:
             moment = (at_utc_ns - self._extent.first_ns) / 1e9 if at_utc_ns else float(t[k])
             text, author = fields["text"][k] or "mark", fields["author"][k]
             self._marks.append(Mark(moment, text, author, float(fields["seconds"][k])))
-
-    def _alarmed(self) -> Iterator[Mark]:
-        """Alarms as ranges; one of the bench stands in every device's status, and once here."""
-        seen = set()
-        for one in self._alarms.result():
-            about = one.id if one.of_bench else f"{one.device}/{one.id}"
-            if (about, one.begin_ns) in seen:
-                continue
-            seen.add((about, one.begin_ns))
-            end_ns = one.end_ns or self._extent.last_ns
-            begin_ns = max(one.begin_ns, self._extent.first_ns)
-            t, seconds = (begin_ns - self._extent.first_ns) / 1e9, (end_ns - begin_ns) / 1e9
-            if 0.0 <= t <= self._extent.seconds and seconds >= 0.0:
-                yield Mark(t, f"{one.level}: {one.title}", ALARMS, max(seconds, 1e-3))
 
 
 def _means(binner: Binner, names: tuple[str, ...], n: int) -> Line:
