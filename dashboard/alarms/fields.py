@@ -171,8 +171,9 @@ def _of_channels(
         if device.stale(topic, estimator, now):
             who = f"{topic} of {estimator}" if estimator else topic
             return Sampled(why=f"{who} is not fresh")
-    newest = [float(device.rings[source].rows()["t"][-1]) for source in sources]
-    tables = {s: device.window(*s, after - BEFORE_S, min(newest)) for s in sources}
+    newest = {source: float(device.rings[source].rows()["t"][-1]) for source in sources}
+    end = min(newest.values())  # beyond it one of them has said nothing yet
+    tables = {s: device.window(*s, after - BEFORE_S, newest[s]) for s in sources}
     t = min((table[0] for table in tables.values()), key=len)
     known = {"t": Quantity(t, unit("s"))}
     for name, one in used.items():
@@ -180,7 +181,7 @@ def _of_channels(
         known[name] = Quantity(between(t, own, _seen(device, one, own, rows)), unit(one.unit))
     found = evaluate(what, known)
     y = np.broadcast_to(np.asarray(found.values, dtype=float), np.shape(t))
-    keep = t > after
+    keep = (t > after) & (t <= end)
     if all(one.column in SPARSE for one in used.values()):
         keep &= np.isfinite(y)
     gap_s = max(SLOW_STALE_S.get(topic, STALE_S) for topic, _ in sources)

@@ -101,6 +101,25 @@ def test_a_rate_that_nobody_sees_is_neither_fine_nor_beyond(bench):
     assert one.state() is State.RETURNED
 
 
+def test_what_two_instruments_say_is_compared_where_both_have_spoken(bench):
+    """The tachometer speaks every 70 ms, the filter every 50: no sample lies beside another."""
+    one = bench({"field": "abs(omega_z - tachometer)", "above": 20.0, "on_delay_s": 0.5})
+    one.link()
+    tacho_s = 0.0
+    for k in range(80):
+        one.rate(100.0)
+        while tacho_s < one.data_s:
+            tacho_s += 0.07
+            m = pb.TachoRate(omega_radps=(100.0 if k < 40 else 60.0) * DEG)
+            m.header.device, m.header.utc_ns = "cube", UTC + int(tacho_s * 1e9)
+            one.store.put(tp.TACHO, "cube", "", m)
+        one.look()
+        if k > 5:
+            assert one.watch.eyes["fast", "cube"].answer.value != "unknown", k
+        assert k >= 40 or one.state() is None
+    assert one.state() is State.UNACKNOWLEDGED
+
+
 def test_not_known_is_an_alarm_where_that_is_asked_for(bench):
     one = bench({"above": 100.0, "unknown": "alarm", "device": "cube"})
     one.link()
