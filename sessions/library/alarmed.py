@@ -81,15 +81,12 @@ class Episodes:
             seen.add(about)
 
 
-def episodes(path: Path, keys: Iterable[str] | None = None) -> list[Episode]:
-    """Of a recording; keys: that it is known to have, so that one without alarms need not be read.
-    Raises OSError.
-    """
-    if keys is not None and not any(key.endswith(f"/{ALARM.name}") for key in keys):
-        return []
+def episodes(paths: Iterable[Path]) -> list[Episode]:
+    """Of the files of a recording. Raises OSError."""
     found = Episodes()
-    # what is damaged is told by the reading that takes the samples
-    for _, _, message in messages(path, Selection(frozenset([ALARM.name])), Damage()):
-        if isinstance(message, pb.AlarmStatus):
-            found.take(message)
+    for path in paths:
+        # what is damaged is told by the reading that takes the samples
+        for _, _, message in messages(path, Selection(frozenset([ALARM.name])), Damage()):
+            if isinstance(message, pb.AlarmStatus):
+                found.take(message)
     return found.result()

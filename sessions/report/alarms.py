@@ -1,10 +1,24 @@
 """The alarms of a session, as a table of its report: what was wrong while it was measured."""
 
-from sessions.library.alarmed import Episode
+from collections.abc import Mapping
+from pathlib import Path
+
+from messages.contract.topics import ALARM
+from sessions.library.alarmed import Episode, episodes
+from sessions.recording.manifest import Manifest
 from sessions.report.data import Run
 from sessions.report.grids import Grid
 
 MOST = 200  # rows
+
+
+def in_files(files: Mapping[Path, Manifest | None]) -> list[Episode]:
+    """Of a recording's files; those that are known to have none are not read. Raises OSError."""
+    return episodes(
+        path
+        for path, manifest in files.items()
+        if manifest is None or any(key.endswith(f"/{ALARM.name}") for key in manifest.keys)
+    )
 
 
 def of_run(found: list[Episode], run: Run) -> list[Episode]:

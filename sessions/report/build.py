@@ -13,10 +13,18 @@ import numpy as np
 
 from messages.contract import gyrofree_pb2 as pb
 from sessions.export.table import Progress, silent
-from sessions.library.alarmed import Episode, episodes
-from sessions.procedure.evaluate import Held, Outcome, StepResult, evaluate, held_by, segments
-from sessions.procedure.pages import facts, provenance, steps
-from sessions.recording.manifest import Manifest, SessionError, read_manifest
+from sessions.library.alarmed import Episode
+from sessions.procedure.evaluate import (
+    Held,
+    Outcome,
+    StepResult,
+    evaluate,
+    held_by,
+    pieces,
+    segments,
+)
+from sessions.procedure.pages import facts, provenance, steps, troubles
+from sessions.recording.manifest import Manifest, SessionError, read_manifest, whole
 from sessions.report import alarms
 from sessions.report.analysis import Analysis, analyse
 from sessions.report.data import Run, load_run
@@ -61,6 +69,7 @@ class Judged:
     checks: list[Check]
     held: Held | None
     outcome: Outcome | None
+    before: dict[Path, Manifest] = field(default_factory=dict)  # files that this one goes on with
     episodes: list[Episode] = field(default_factory=list)  # alarms of its run
 
 
@@ -74,15 +83,17 @@ def judged(
         device, boot = held.status.header.device, held.epoch if boot is None else boot
         if spec == load_spec(None):  # nobody asked for other limits than the procedure's
             spec = Spec(title=held.plan.procedure.title, estimator=held.plan.procedure.estimator)
-    run = load_run(path, device, boot, progress)
-    found = analyse(run, manifest, _parts(held, run))
+    before = pieces(path, manifest, held) if held is not None else {}
+    run = load_run((*before, path), device, boot, progress)
+    found = analyse(run, whole(manifest, *before.values()), _parts(held, run))
     figures = metrics(found, spec.estimator)
     checks, outcome = judge(spec, figures), None
     if held is not None:
         outcome = evaluate(held, found, figures)
         figures, checks = [*figures, *outcome.figures], outcome.checks + checks
-    there = alarms.of_run(episodes(path, manifest.keys if manifest else None), run)
-    return Judged(manifest, found, spec, figures, checks, held, outcome, there)
+    there = alarms.of_run(alarms.in_files({**before, path: manifest}), run)
+    one = whole(manifest, *before.values())
+    return Judged(one, found, spec, figures, checks, held, outcome, before, there)
 
 
 def build(
@@ -99,12 +110,16 @@ def build(
     if one.outcome is not None:
         extra = Extra(
             facts(one.outcome),
-            [steps(one.outcome)],
+            [steps(one.outcome), troubles(one.outcome)],
             provenance(one.outcome),
             one.outcome.held.status.operator,
         )
     grid = alarms.alarms(one.episodes, one.found.run)
     extra.grids.extend([grid] if grid is not None else [])
+    extra.provenance.extend(
+        (f"SHA-256 of {manifest.id}, which it goes on with", sha256_of(file))
+        for file, manifest in one.before.items()
+    )
     photo = read_photo(path.parent)
     if photo is not None:
         extra.provenance.append(("SHA-256 of the photo", photo.sha256))
@@ -172,6 +187,7 @@ def _json(one: Judged, sha256: str, photo: Photo | None) -> str:
             "operator": status.operator,
             "state": pb.ProcedureStatus.State.Name(status.state),
             "steps": [_step(one) for one in outcome.steps],
+            "before": [manifest.id for manifest in one.before.values()],
         }
     return json.dumps(_plain(content), indent=1, sort_keys=True, ensure_ascii=False) + "\n"
 
@@ -181,7 +197,9 @@ def _parts(held: Held | None, run: Run) -> list[Segment] | None:
     if held is None:
         return None
     pairs = zip(held.plan.steps, segments(held, run), strict=True)
-    found = [part for step, part in pairs if part is not None and step.kind in ("rate", "still")]
+    found = [
+        part for step, part in pairs if isinstance(part, Segment) and step.kind in ("rate", "still")
+    ]
     return found or None
 
 
@@ -196,6 +214,7 @@ def _step(one: StepResult) -> dict[str, Any]:
         "reason": one.record.reason,
         "attempts": one.record.attempts,
         "spoilt": one.record.spoilt,
+        "trouble": list(one.record.trouble),
         "segment": part,
         "error_radps": None if plateau is None else plateau.error[2],
         "standard_error_radps": None if plateau is None else plateau.standard_error[2],
