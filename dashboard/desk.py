@@ -49,6 +49,10 @@ class Desk:
         """An order to the test of `command.device`."""
         return self._give(orders.PROCEDURES, command, command.device)
 
+    def alarms(self, command: pb.AlarmCommand) -> pb.AlarmReply:
+        """An order to the alarms; how they are after it."""
+        return orders.give(self._session, self._prefix, orders.ALARMS, command)
+
     def replay(self, command: pb.ReplayCommand) -> pb.ReplayStatus:
         """An order to the replay that runs."""
         return self._give(orders.REPLAY, command)

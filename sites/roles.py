@@ -18,6 +18,7 @@ ROLES = (
     "estimator",
     "recorder",
     "procedures",
+    "alarms",
     "dashboard",
     "operator",
     "simulator",
@@ -31,11 +32,19 @@ SERVICES = (
     "estimator",
     "recorder",
     "procedures",
+    "alarms",
     "dashboard",
     "operator",
     "authority",
 )
-KINDS = (orders.RECORDER, orders.ESTIMATOR, orders.BOARD, orders.PROCEDURES, orders.REPLAY)
+KINDS = (
+    orders.RECORDER,
+    orders.ESTIMATOR,
+    orders.BOARD,
+    orders.PROCEDURES,
+    orders.ALARMS,
+    orders.REPLAY,
+)
 REPLAYED = f"$*{tp.REPLAY_SUFFIX}"  # of a device's name: any device that is a replay
 
 
@@ -66,6 +75,7 @@ def rights(role: str, site: str, devices: Iterable[str] = ()) -> Rights:
         "procedures": lambda: (
             _consumer(site) + _publisher(site, tp.PROCEDURES, orders.PROCEDURES) + _orders(site)
         ),
+        "alarms": lambda: _consumer(site) + _publisher(site, tp.ALARMS, orders.ALARMS),
         "dashboard": lambda: _consumer(site) + _orders(site) + Rights(put=_of(site, "*", "any")),
         "operator": lambda: _listener(site) + _orders(site) + _replay(site),
         "simulator": lambda: _listener(site) + Rights(put=_of(site, "*", "simulator")),

@@ -24,6 +24,7 @@ from dashboard.web import (
 )
 from dashboard.web.accounts import pages as account_pages
 from dashboard.web.accounts import provider_pages
+from dashboard.web.alarms import routes as alarm_routes
 from dashboard.web.first import pages as first_pages
 from dashboard.web.frame import proxy
 from dashboard.web.front import Front
@@ -54,6 +55,7 @@ def create_app(front: Front) -> ASGIApp:
     app.include_router(session_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(spectrum_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(compare_api.routes, responses={401: {"description": "not signed in"}})
+    app.include_router(alarm_routes.routes, responses={401: {"description": "not signed in"}})
     app.include_router(pages.routes)
     app.include_router(session_pages.routes)
     app.include_router(users_page.routes)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from gyrofree.commands import calibrate, handover, layout, procedure, sessions, users
+from gyrofree.commands import alarms, calibrate, handover, layout, procedure, sessions, users
 from gyrofree.commands import run as logs
 from gyrofree.commands.board import board
 from gyrofree.commands.demo import demo, play
@@ -39,6 +39,7 @@ app = Commands(
 )
 
 app.add_typer(users.app, name="users")
+app.add_typer(alarms.app, name="alarms")
 app.add_typer(config.app, name="config")
 app.add_typer(site.app, name="site")
 app.add_typer(certs.app, name="certs")

@@ -79,8 +79,9 @@ def record(config: Config = None, verbose: Verbose = False) -> None:
     def body(stop: threading.Event) -> None:
         from sessions.recording import service
 
-        bus = settings.bus.acting_as("recorder")
-        service.run(settings.recorder, bus, stop, settings.model_dump(mode="json"))
+        # who is told of alarms, and where, is nobody's business who gets a recording
+        kept = settings.model_dump(mode="json", exclude={"alarms": {"webhook", "mail"}})
+        service.run(settings.recorder, settings.bus.acting_as("recorder"), stop, kept)
 
     run_service(body, verbose)
 

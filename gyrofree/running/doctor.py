@@ -26,7 +26,7 @@ from gyrofree.config import Settings
 from messages.bus.faults import BusUnavailable
 from messages.bus.session import open_client, subscribe
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import ESTIMATOR, LINK, PROCEDURE, STATUS
+from messages.contract.topics import ALARM, ESTIMATOR, LINK, PROCEDURE, STATUS
 from messages.text import plain
 
 LEAST_FREE = 1 << 30  # bytes of disk below which recording is at risk
@@ -39,6 +39,7 @@ SIGN_OF_LIFE = {
     "estimator": ESTIMATOR,
     "recorder": STATUS,
     "procedures": PROCEDURE,
+    "alarms": ALARM,
 }
 
 
