@@ -22,7 +22,7 @@ from sites.place import Place
 
 WAIT_S = 1.0  # for what was sent to arrive
 OTHER = "not-of-this-place"  # a board that no gateway here has
-SERVING = ("estimator", "recorder", "procedures", "dashboard")
+SERVING = ("estimator", "recorder", "procedures", "alarms", "dashboard")
 PEOPLE = ("dashboard", "operator", "procedures")  # who may order, at home
 
 
@@ -75,6 +75,7 @@ def deeds(place: Place, device: str) -> list[Deed]:
         Deed("publish estimates", tp.RATE.key(site, device, "any"), ("estimator",)),
         Deed("say how the recording stands", tp.STATUS.key(site, tp.RECORDER), ("recorder",)),
         Deed("say how a test stands", tp.PROCEDURE.key(site, device), ("procedures",)),
+        Deed("say what is wrong", tp.ALARM.key(site, device), ("alarms",)),
         Deed("leave a note", tp.NOTE.key(site, device), noting),
         Deed(
             "claim to be the gateway",

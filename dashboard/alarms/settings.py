@@ -90,7 +90,7 @@ class HealthSettings(BaseModel):
         "critical", "the recording failed, the recorder is silent, or a procedure is not recorded"
     )
     disk: LevelOrOff = setting("critical", "little room on the recordings' disk, or a full one")
-    axis: LevelOrOff = setting("warning", "an accelerometer axis is stuck, swapped, biased ...")
+    axis: LevelOrOff = setting("warning", "an accelerometer axis is stuck, swapped or biased")
     board: LevelOrOff = setting("warning", "the board rebooted, or names a fault of its own")
     estimator: LevelOrOff = setting("warning", "an estimator is silent, or says what is wrong")
     late: LevelOrOff = setting("warning", "estimates come late, or less often than they should")

@@ -5,11 +5,11 @@ from typing import Annotated
 
 import typer
 
-from gyrofree.commands import alarms, calibrate, handover, layout, procedure, sessions, users
+from gyrofree.commands import calibrate, handover, layout, procedure, sessions, users
 from gyrofree.commands import run as logs
 from gyrofree.commands.board import board
 from gyrofree.commands.demo import demo, play
-from gyrofree.commands.installation import certs, config, site
+from gyrofree.commands.installation import alarms, certs, config, site
 from gyrofree.commands.installation.completion import answer_the_shell, completion
 from gyrofree.commands.installation.doctor import doctor
 from gyrofree.commands.installation.setup import setup
