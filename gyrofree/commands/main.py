@@ -25,6 +25,7 @@ from gyrofree.commands.services import (
     router,
 )
 from gyrofree.commands.simulate import simulate
+from gyrofree.running.process import ending
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -85,4 +86,8 @@ def _root(
 def main() -> None:
     """Entry point of `gyrofree`."""
     answer_the_shell()
-    app()
+    try:
+        app()
+    except SystemExit as end:
+        ending(end.code)
+        raise
