@@ -140,5 +140,7 @@ def check_role(who: Asker, role: Role, request: Request) -> None:
     act = f"{request.method} {request.url.path}"
     if who.role < role:
         audit.warning("%s (%s) refused: %s", who.name, who.role.name, act)
-        raise HTTPException(403, f"{who.name} is {who.role.name}; this takes {role.name}")
+        raise HTTPException(
+            403, f"{who.name} is signed in as {who.role.name}; this takes the role {role.name}"
+        )
     audit.info("%s (%s): %s", who.name, who.role.name, act)

@@ -54,6 +54,7 @@ class Rate:
     nis_dof: Array
     still: Array  # bool
     calibration: str
+    sight: Array | None = None  # (n, 3) RateEstimate.Sight; None where nobody says
 
 
 @dataclass(frozen=True)
@@ -118,6 +119,7 @@ FIELDS = {  # of long tables: what a report is made of
         "nis_dof",
         "still",
         "calibration",
+        "sight",
     ),
     NAV.name: ("epoch", "device_us", "p_ned_m", "v_n_mps", "sigma"),
     INNOVATION.name: ("epoch", "device_us", "nis", "dof", "accepted"),
@@ -275,7 +277,14 @@ def _rate(name: str, table: Table, times: Times) -> Rate:
         nis_dof=table.data["nis_dof"],
         still=table.data["still"] > 0,
         calibration=str(cards[-1]) if cards is not None else "",
+        sight=_sight(table),
     )
+
+
+def _sight(table: Table) -> Array | None:
+    """What the estimator says of x, y, z (n, 3); None in recordings where none says it."""
+    said = [f"sight_{axis}" for axis in XYZ]
+    return table.vector(*said) if set(said) <= table.data.keys() else None
 
 
 def _navigation(name: str, table: Table, times: Times) -> Navigation:

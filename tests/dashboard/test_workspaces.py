@@ -104,7 +104,7 @@ def test_a_page_that_is_offered_shows_something(view, store):
                 view.tick_panels()
                 assert state(view)["missing"] == "" and state(view)["page"] == page["key"]
                 for words in said(view):
-                    text = re.sub('<span class="gf-name">[^<]*<', "<", words)  # of channels
+                    text = re.sub('<span class="gf-channel">[^<]*<', "<", words)  # of channels
                     there = words_of([re.sub("<[^>]*>", " ", text)])
                     assert all(f'href="{glossary_link(word)}"' in words for word in there), words
 

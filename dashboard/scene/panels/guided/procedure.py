@@ -16,6 +16,7 @@ from dashboard.scene.drawing.palette import GREEN, VERMILLION, number
 from dashboard.scene.panels.base import DEG, Input, Snapshot
 from dashboard.scene.panels.guided.calibration import picture
 from dashboard.scene.panels.guided.guided import Guided, guidance, silent
+from logs.figures.numbers import with_half_width
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
 from messages.text import plain
@@ -220,9 +221,8 @@ def figure(one: pb.ProcedureStatus.Figure) -> Markup:
     name, _, unit = one.name.rpartition("_")
     unit, name = UNITS.get(unit, unit), name.removeprefix("rate_").replace("_", " ")
     if one.value != one.value:
-        return tag("span", f"{name} not told")
-    text = f"{name} {one.value:+.3g}"
-    text += f" ± {2.0 * one.sigma:.2g}" if one.sigma == one.sigma else ""
+        return tag("span", f"{name} –")
+    text = f"{name} {with_half_width(one.value, 2.0 * one.sigma)}"
     low, high = one.HasField("min"), one.HasField("max")
     if not (low or high):
         return tag("span", f"{text} {unit}")
@@ -231,4 +231,6 @@ def figure(one: pb.ProcedureStatus.Figure) -> Markup:
         [f"{one.min:g}"] * low + [f"{one.max:g}"] * high if low and high else []
     ) or (f"≥ {one.min:g}" if low else f"≤ {one.max:g}")
     style = f"color:{GREEN if good else VERMILLION}"
-    return tag("b", f"{'✓' if good else '✗'} {text} {unit} ({limit})", style=style)
+    return tag(
+        "b", f"{'✓' if good else '✗'} {text} {unit} ({limit.replace('-', '−')})", style=style
+    )
