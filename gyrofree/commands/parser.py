@@ -13,7 +13,7 @@ from typing import Any
 import typer
 from typer.core import TyperCommand
 
-from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
+from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, ending, fail
 from messages.text import reason
 
 ROOMS = frozenset(  # an error of theirs is a sentence for people
@@ -193,6 +193,7 @@ def run_main(app: Any) -> None:
         if not code and error.errno != errno.EPIPE:
             fail(error)
         code = code or EXIT_FAILED
+    ending(code)
     raise SystemExit(code)
 
 
