@@ -10,11 +10,12 @@ from google.protobuf.descriptor import FieldDescriptor
 from google.protobuf.message import Message
 from numpy.typing import NDArray
 
-from dashboard.data.channels import NAMED, Channel, between, sight
+from dashboard.data.channels import NAMED, Channel, between, sight_of
 from dashboard.data.device import SLOW_STALE_S, STALE_S, Device
 from logs.figures.expression import Expression, evaluate, known_names, read
 from logs.figures.names import slug
 from logs.figures.quantity import ExpressionError, Quantity
+from logs.figures.sight import vouched
 from logs.figures.units import spelt, unit
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
@@ -178,7 +179,8 @@ def _of_channels(
     known = {"t": Quantity(t, unit("s"))}
     for name, one in used.items():
         own, rows = tables[one.topic, one.estimator]
-        known[name] = Quantity(between(t, own, _seen(device, one, own, rows)), unit(one.unit))
+        seen = vouched(one.of(rows), sight_of(one, rows))
+        known[name] = Quantity(between(t, own, seen), unit(one.unit))
     found = evaluate(what, known)
     y = np.broadcast_to(np.asarray(found.values, dtype=float), np.shape(t))
     keep = (t > after) & (t <= end)
@@ -186,14 +188,3 @@ def _of_channels(
         keep &= np.isfinite(y)
     gap_s = max(SLOW_STALE_S.get(topic, STALE_S) for topic, _ in sources)
     return Sampled(np.array(t[keep]), np.array(y[keep]), spelt(found.unit), gap_s)
-
-
-def _seen(device: Device, one: Channel, own: Array, rows: np.ndarray) -> Array:
-    """Its values, NaN where the filter is blind or does not know the sign."""
-    values = np.array(one.of(rows), dtype=float)
-    if not len(own):
-        return values
-    t, ambiguous, blind = sight(device, one, float(own[0]), float(own[-1]))
-    if len(t) == len(values):
-        values[ambiguous | blind] = np.nan
-    return values
