@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from inertial.whole_file import whole_files
 from messages.contract import gyrofree_pb2 as pb
 from sessions.export.table import Progress, silent
 from sessions.library.alarmed import Episode
@@ -50,12 +51,12 @@ class Report:
 
     def write(self, out: Path, name: str = "report") -> list[Path]:
         """Into the folder `out`, made when absent; raises OSError."""
-        out.mkdir(parents=True, exist_ok=True)
-        files = [out / f"{name}.{form}" for form in ("html", "pdf", "json")]
-        files[0].write_text(self.html, encoding="utf-8")
-        files[1].write_bytes(self.pdf)
-        files[2].write_text(self.json, encoding="utf-8")
-        return files
+        with whole_files(out) as drafts:
+            files = [drafts / f"{name}.{form}" for form in ("html", "pdf", "json")]
+            files[0].write_text(self.html, encoding="utf-8")
+            files[1].write_bytes(self.pdf)
+            files[2].write_text(self.json, encoding="utf-8")
+        return [out / file.name for file in files]
 
 
 @dataclass(frozen=True)

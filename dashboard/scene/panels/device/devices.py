@@ -22,11 +22,14 @@ from dashboard.scene.drawing.palette import (
     number,
 )
 from dashboard.scene.panels.base import DEG, Panel, Snapshot, from_zero
+from inertial.rate.batch import Phase
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
 from messages.text import counted
 
-MOVING = ("standing still", "turning")  # states that are as fast as the samples
+# states that are as fast as the samples: in each pair, what is said of a body that stands still,
+# and of one that turns
+MOTIONS = ((Phase.STILL, Phase.TURNING), (Phase.STILL_AT_START, Phase.INTEGRATING))
 BEHIND_SHOWN_S = 0.5  # that an estimator is behind by less is nobody's business
 
 
@@ -179,7 +182,7 @@ class Devices(Panel):
             if s.stale("estimator", name):
                 items.append((estimator_title(name), bad("silent")))
                 continue
-            state = _state_of(s, name)
+            state = state_of(s, name)
             cost = tag("span", number(m.us_per_sample, 0, "µs"), title="computing, for each sample")
             items.append((estimator_title(name), joined([f"{state} · ", cost])))
             if m.behind_s > BEHIND_SHOWN_S:
@@ -215,16 +218,22 @@ class Devices(Panel):
         return joined(note(text) for text in lines)
 
 
-def _state_of(s: Snapshot, name: str) -> str:
+def state_of(s: Snapshot, name: str) -> str:
     """What an estimator does. Whether the body is still or turns changes faster than the status
     comes: that is taken from the message that the values are of.
     """
     state = s.device.get("estimator", name).message.state
     state = state.partition(":")[0]  # what a person should do stands after it, see _advice
     rate = s.device.get("rate", name)
-    if rate is None or state not in MOVING:
+    if rate is None:
         return state
-    return MOVING[0] if rates.row(rate.message, -1).still else MOVING[1]
+    still = rates.row(rate.message, -1).still
+    for at_rest, turning in MOTIONS:
+        if state == at_rest.text and not still:
+            return turning.text
+        if state == turning.text and still and at_rest == Phase.STILL:
+            return at_rest.text
+    return state
 
 
 def _said_rate(s: Snapshot, name: str, m: pb.RateEstimate) -> tuple[str, Markup | str]:
