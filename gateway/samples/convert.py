@@ -43,8 +43,7 @@ def axis_scales(hello: Hello | None, sensors: int = 4) -> list[float]:
     """
     if hello is None:
         return [ADXL345_SCALE] * (3 * sensors)
-    # in this order of products a log of 3.9 mg has the same bits by whichever way it comes
-    scales = [s.scale_ng / 1e6 * 1e-3 * GRAVITY or ADXL345_SCALE for s in hello.sensors]
+    scales = [s.scale_ng * 1e-9 * GRAVITY or ADXL345_SCALE for s in hello.sensors]
     return [scale for scale in scales[:sensors] for _ in range(3)]
 
 
