@@ -151,8 +151,8 @@ def open_client(
         except zenoh.ZError:
             if stop.is_set() or (end is not None and time.monotonic() > end):
                 raise BusUnavailable(
-                    f"[bus] router {settings.router}: nobody answers{_why(settings)}; start"
-                    " one with `gyrofree router`"
+                    f"[bus] router {settings.router}: nobody answers; start one with `gyrofree"
+                    f" router`{_why(settings)}"
                 ) from None
         if not said and time.monotonic() - start > PATIENCE_S:
             log.warning(

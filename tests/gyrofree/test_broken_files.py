@@ -36,6 +36,7 @@ VALUES = {  # of what is no file
     "common_name": "viewer.anna",
     "place": "office",
     "address": "127.0.0.1",
+    "id": "link/cube",
 }
 GOOD = {  # of a file that is wanted beside the broken one
     "log": "cube.csv",
