@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import tomli_w
 
-from inertial.whole_file import put_in_place
+from inertial.whole_file import whole
 
 T = TypeVar("T")
 
@@ -65,9 +65,8 @@ def write_whole(table: dict[str, Any], path: Path) -> None:
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(path.name + ".part")
-    draft.write_bytes(tomli_w.dumps(table).encode())
-    put_in_place(draft, path)
+    with whole(path) as draft:
+        draft.write_bytes(tomli_w.dumps(table).encode())
 
 
 def read_versioned(

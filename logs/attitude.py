@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from inertial.attitude.filters import ATTITUDES
 from inertial.timing import Timing
+from inertial.whole_file import whole
 from logs.attitude_log import Trial, read_trials
 from logs.sheet import LogError
 from logs.tables.series import check_form, of_attitude, write
@@ -180,5 +181,6 @@ def _draw(
         axis.legend(fontsize=8, loc="upper right")
     axes[-1, 0].set_xlabel("time, s (gaps: standing still or without reference)")
     figure.tight_layout()
-    figure.savefig(file, dpi=120)
+    with whole(file) as draft:
+        figure.savefig(draft, dpi=120)
     plt.close(figure)

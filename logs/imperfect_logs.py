@@ -11,6 +11,7 @@ import numpy as np
 from inertial.calibration.poses import plan
 from inertial.layouts.layout import Layout
 from inertial.simulation.imperfect import MOUNTINGS, Device, device, table_run, tumble
+from inertial.whole_file import whole_files
 
 TRUTH = ("true_wx", "true_wy", "true_wz", "true_qw", "true_qx", "true_qy", "true_qz")
 
@@ -25,9 +26,15 @@ def write(
     """Write the logs; returns their paths. Raises OSError, CalibrationError for a number of poses
     outside 6 to 24.
     """
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     one = device(layout, seed)
+    with whole_files(Path(folder)) as drafts:
+        files = _logs(drafts, one, seed, poses, progress)
+    return [Path(folder) / file.name for file in files]
+
+
+def _logs(
+    folder: Path, one: Device, seed: int, poses: int, progress: Callable[[float, str], None]
+) -> list[Path]:
     progress(0.0, "poses")
     readings = tumble(one, plan(poses))
     files = [_log(folder / "poses.csv", one, np.arange(len(readings)) / 100.0, readings)]

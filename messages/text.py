@@ -8,6 +8,7 @@ One helper for each medium:
     drawn(text)   on figures
     reason(error) of an exception, for any of these
     cell(value)   of a table that a spreadsheet may open
+    counted(n)    how many of something, in the singular where it is one
 
 What acts or hides: control characters (a terminal obeys them), the bidirectional controls of
 Unicode (they let a text read in another order than it stands), characters without any shape, lone
@@ -133,6 +134,11 @@ def cell(value: object) -> object:
     shown = "".join(f"<U+{ord(c):04X}>" if acts(c) and c not in "\t\n\r" else c for c in value)
     shown = _NEXT_CELL.sub(r"\1'", shown)
     return f"'{shown}" if value.lstrip(" \u00a0\u3000")[:1] in (*EXECUTED,) else shown
+
+
+def counted(number: int, one: str, many: str = "") -> str:
+    """`1 message`, `48 537 messages`; thousands stand apart by a thin blank."""
+    return f"{number:,} ".replace(",", "\u202f") + (one if number == 1 else many or f"{one}s")
 
 
 FORBIDDEN_IN_FILES = re.compile(r'[/\\:*?"<>|]')  # by the file systems of others

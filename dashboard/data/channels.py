@@ -17,7 +17,6 @@ from logs.figures.expression import Expression, evaluate, known_names, read, uni
 from logs.figures.names import axis_channel, line_title, slug
 from logs.figures.quantity import ExpressionError, Quantity
 from logs.figures.units import spelt, unit
-from messages.contract import gyrofree_pb2 as pb
 
 Array = NDArray[np.float64]
 
@@ -61,6 +60,7 @@ NAMED = {
     "gnss": ("gnss", (("p_n", "p", NED),)),
     "innovation": ("", (("nis", "nis", ()), ("error", "error", NED))),
 }
+JUDGED = {"omega_ib_b": 0, "angle_z": 2}  # columns that `sight` is about, and of which component
 LEADING = ("rate", "imu", "attitude", "nav", "innovation")  # whose names stand alone, too
 
 
@@ -119,12 +119,16 @@ def _parts(
 
 @dataclass(frozen=True)
 class Drawn:
-    """A derived curve: t (n,) s, y (n,) in `unit`, and the channels that it was made of."""
+    """A derived curve: t (n,) s, y (n,) in `unit`, and the channels that it was made of.
+
+    It knows no more than they do: sight (n,) is the worst that is said of one of them.
+    """
 
     t: Array
     y: Array
     unit: str
     of: tuple[Channel, ...]
+    sight: Array
 
 
 def derived(
@@ -140,14 +144,19 @@ def derived(
     if not tables:  # of time alone
         tables = {("", ""): (np.linspace(t0, t1, 2), blank(np.dtype([("t", float)]), 2))}
     t = min((table[0] for table in tables.values()), key=len)
-    known = {"t": Quantity(t, unit("s"))}
+    known, sight = {"t": Quantity(t, unit("s"))}, np.zeros(len(t))
     for name, one in used.items():
         own, rows = tables[one.topic, one.estimator]
         known[name] = Quantity(between(t, own, one.of(rows)), unit(one.unit))
+        words = sight_of(one, rows)
+        if words is not None:
+            sight = np.fmax(sight, _nearest(t, own, words))
     if not len(t):
-        return Drawn(t, t, expression.given, tuple(used.values()))
+        return Drawn(t, t, expression.given, tuple(used.values()), sight)
     found = evaluate(expression, known)
-    return Drawn(np.array(t), np.asarray(found.values), spelt(found.unit), tuple(used.values()))
+    return Drawn(
+        np.array(t), np.asarray(found.values), spelt(found.unit), tuple(used.values()), sight
+    )
 
 
 def judged(device: Device, lines: Sequence[str]) -> list[dict[str, str]]:
@@ -181,12 +190,18 @@ def between(at: Array, t: Array, y: Array) -> Array:
     return np.where(inside, np.where(exact, y[after], found), np.nan)
 
 
-def sight(device: Device, one: Channel, t0: float, t1: float) -> tuple[Array, Array, Array]:
-    """Where a channel of a rate is ambiguous, and where it is blind: t (n,) s and two masks (n,);
-    empty for what has no such word.
+def sight_of(one: Channel, rows: np.ndarray) -> Array | None:
+    """What the estimator says of a channel (n,), RateEstimate.Sight; None: it has no such word."""
+    if one.topic != "rate" or one.column not in JUDGED:
+        return None
+    part = JUDGED[one.column] if one.part is None else one.part
+    return rows["sight"][:, part]
+
+
+def _nearest(at: Array, t: Array, words: Array) -> Array:
+    """The words (n,) of times t (n,) at other times (m,): of the sample after each, and the last's
+    beyond it.
     """
-    t, rows = device.window(one.topic, one.estimator, t0, t1)
-    if one.topic != "rate" or one.column != "omega_ib_b" or not len(t):
-        return t[:0], np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
-    words = rows["sight"][:, one.part]
-    return t, words == pb.RateEstimate.SIGHT_AMBIGUOUS, words == pb.RateEstimate.SIGHT_BLIND
+    if not len(t):
+        return np.zeros(len(at))
+    return words[np.clip(np.searchsorted(t, at), 0, len(t) - 1)]

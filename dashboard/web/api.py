@@ -170,7 +170,7 @@ def health(request: Request) -> Health:
     return Health(status="ok", scene=front.scene_port() > 0, bus=front.desk is not None)
 
 
-@routes.get("/me", summary="The signed-in user and his CSRF token")
+@routes.get("/me", summary="The signed-in user, and the CSRF token of the sign-in")
 def me(who: SignedIn) -> Me:
     return Me(user=who.name, role=who.role.name, csrf=who.session.csrf)
 

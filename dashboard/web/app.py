@@ -91,7 +91,10 @@ def _refused(request: Request, error: HTTPException) -> Response:
     if _wants_page(request):
         if error.status_code == 401:
             return RedirectResponse(pages.login_link(request), 303)
-        return pages.error_page(request, error.status_code, str(error.detail))
+        text = str(error.detail)
+        if error.status_code == 404 and text == "Not Found":  # the framework's own word
+            text = f"There is no page {request.url.path[:80]}."
+        return pages.error_page(request, error.status_code, text)
     return JSONResponse({"error": error.detail}, error.status_code, headers=error.headers)
 
 

@@ -15,6 +15,7 @@ from dashboard.web.front import Front, front_of
 from dashboard.web.pages import render
 from dashboard.web.schemas import session_out
 from logs.figures.expression import many
+from logs.figures.names import line_title
 from messages.text import plain
 from sessions.library.annotations import read_annotations
 from sessions.library.compare import METHODS, MOST, CompareError, Comparison, as_dict, compare
@@ -23,6 +24,8 @@ from sessions.library.overlay import POINTS, drawing
 from sessions.recording.manifest import SessionError
 
 routes = APIRouter()
+# lists of differences, and what in them names a line
+MEANT = {"differences": ("line", "against"), "track_differences": ("track", "against")}
 Ids = Annotated[
     str, Query(max_length=400, description="ids of one to four sessions, separated by commas")
 ]
@@ -93,6 +96,8 @@ def comparison(
     _add_notes(front, result, drawn)
     facts = as_dict(result)
     table = {name: facts[name] for name in ("bin_s", "differences", "track_differences")}
+    keys = (row[end] for name in MEANT for row in facts[name] for end in MEANT[name])
+    table["titles"] = {key: line_title(key.rpartition("/")[2]) for key in keys}
     errors = [one["errors"] for one in facts["sessions"]]
     return JSONResponse(
         {"state": "reading" if done else "done", "done": share, "errors": errors} | table | drawn

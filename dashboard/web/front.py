@@ -142,7 +142,9 @@ def check_role(who: Asker, role: Role, request: Request) -> None:
     by = f"as {who.role.name}" + (f" by token {who.token}" if who.token else "")
     if who.role < role:
         audit.refused(_act(request), who.name, where, f"{by}, takes {role.name}")
-        raise HTTPException(403, f"{who.name} is {who.role.name}; this takes {role.name}")
+        raise HTTPException(
+            403, f"{who.name} is signed in as {who.role.name}; this takes the role {role.name}"
+        )
     if request.method not in ("GET", "HEAD"):
         audit.done(_act(request), who.name, where, by)
 

@@ -58,6 +58,11 @@ def _utc(seconds: float) -> str:
     )
 
 
+def _count(number: int) -> str:
+    """Thousands apart by a thin blank, which nobody takes for a decimal comma."""
+    return f"{number:,}".replace(",", "\u202f")
+
+
 _templates = jinja2.Environment(
     loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
     autoescape=True,
@@ -66,7 +71,7 @@ _templates = jinja2.Environment(
     trim_blocks=True,
     lstrip_blocks=True,
 )
-_templates.filters |= {"bytes": _bytes, "duration": _duration, "utc": _utc}
+_templates.filters |= {"bytes": _bytes, "count": _count, "duration": _duration, "utc": _utc}
 
 
 def render(

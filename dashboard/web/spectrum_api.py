@@ -9,6 +9,7 @@ from fastapi import APIRouter, HTTPException, Query, Request
 from dashboard.data.live import finite
 from dashboard.web.api import SignedIn, reading_of
 from dashboard.web.front import front_of
+from logs.figures.sight import vouched
 from logs.figures.spectrum import density, unbroken
 from sessions.library.derived import derive
 from sessions.report.stability import LEAST, allan_of
@@ -46,7 +47,7 @@ def spectrum(
     first = -math.inf if begin is None or not math.isfinite(begin) else begin
     last = math.inf if end is None or not math.isfinite(end) else end
     inside = (t >= min(first, last)) & (t <= max(first, last))
-    y, period = unbroken(t[inside], made.y[inside])
+    y, period = unbroken(t[inside], vouched(made.y, made.sight)[inside])
     if len(y) < LEAST:
         said = f"{len(y)} values without a hole; {LEAST} are needed: choose a longer stretch"
         return {"unit": made.unit, "said": said, "density": None, "allan": None}

@@ -224,6 +224,11 @@ def issue_link_token(users_file: Path, user: str, lifetime_s: float = 900.0) -> 
     return token
 
 
+def link_token_waits(users_file: Path, token: str) -> bool:
+    """True while nobody has used this token."""
+    return _link_file(users_file, token).exists()
+
+
 def redeem_link_token(users_file: Path, token: str, now: float | None = None) -> str | None:
     """Name of the user the token is for, once; None when unknown, used or expired: by what has
     elapsed since it was made, or at `now`, s since 1970.

@@ -50,6 +50,8 @@ class Heard:
         past = self._past
         if not past:
             past.append((now_s, counts if counts["fixes", "placed"] else Counter()))
+        elif not counts - past[0][1]:
+            past.clear()  # silence is no wait for a position: that begins with what comes next
         past.append((now_s, counts))
         while len(past) > 2 and past[1][0] <= now_s - WINDOW_S:
             past.popleft()

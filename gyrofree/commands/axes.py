@@ -12,6 +12,7 @@ import typer
 from rich.table import Table
 
 from gyrofree.commands.options import AsJson, say, show_table
+from gyrofree.commands.parser import output_file
 from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
 from inertial.constants import GRAVITY
 
@@ -25,7 +26,13 @@ def axes(
             help="CSV of the three turns: t_s and six SI columns, or a converter's inputs."
         ),
     ],
-    out: Annotated[Path | None, typer.Option(help="Write the axis map to this TOML file.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            callback=output_file(makes=True),
+            help="Write the axis map to this TOML file.",
+        ),
+    ] = None,
     device: Annotated[str, typer.Option(help="Name of the device the map is for.")] = "board",
     volt_per_count: Annotated[
         float, typer.Option(min=1e-12, max=1e3, help="Converter: V per count.")

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from gyrofree.commands.options import LARGEST_SEED, AsJson, Config, Verbose, say, settings_of
+from gyrofree.commands.parser import output_link
 from gyrofree.running.process import EXIT_CONFIG, fail, run_service
 
 FAULT_HELP = (
@@ -28,7 +29,10 @@ def board(
     port_link: Annotated[
         Path | None,
         typer.Option(
-            "--port-link", "--link", help="Make the pseudo-terminal reachable under this path."
+            "--port-link",
+            "--link",
+            callback=output_link(),
+            help="Make the pseudo-terminal reachable under this path.",
         ),
     ] = None,
     tcp: Annotated[

@@ -14,11 +14,13 @@ from rich.table import Table
 
 from gyrofree.commands.axes import axes
 from gyrofree.commands.options import LARGEST_SEED, AsJson, say, show_table
+from gyrofree.commands.parser import Commands, output_file, output_folder
 from gyrofree.commands.run import progress_bar
 from gyrofree.running.process import EXIT_CONFIG, fail
 from inertial.constants import MILLI_G
+from inertial.whole_file import whole
 
-app = typer.Typer(
+app = Commands(
     no_args_is_help=True,
     rich_markup_mode=None,
     help=(
@@ -93,7 +95,13 @@ def fit(
         list[Path],
         typer.Argument(help="CSV logs: tumbles, and runs on the table with tacho_rad_s."),
     ],
-    out: Annotated[Path, typer.Option(help="The card, a TOML file.")] = Path("card.toml"),
+    out: Annotated[
+        Path,
+        typer.Option(
+            callback=output_file(makes=True),
+            help="The card, a TOML file.",
+        ),
+    ] = Path("card.toml"),
     layout: LayoutName = "cube",
     half_side: HalfSide = 0.05,
     lsb_mg: Lsb = None,
@@ -181,14 +189,20 @@ def apply_card(
     log: Annotated[Path, typer.Argument(help="CSV log of the same axes.")],
     card: Annotated[Path, typer.Argument(help="The calibration file.")],
     out: Annotated[
-        Path, typer.Option(help="CSV with a.._mps2 columns, biases and scales taken out.")
+        Path,
+        typer.Option(
+            callback=output_file(), help="CSV with a.._mps2 columns, biases and scales taken out."
+        ),
     ],
     layout: LayoutName = "cube",
     half_side: HalfSide = 0.05,
     lsb_mg: Lsb = None,
     layout_out: Annotated[
         Path | None,
-        typer.Option(help="Also write the calibrated directions and positions as a layout file."),
+        typer.Option(
+            callback=output_file(),
+            help="Also write the calibrated directions and positions as a layout file.",
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -207,10 +221,11 @@ def apply_card(
         data = read_log(log, shape.axis_names, lsb_mg)
         calibrated = found.layout(shape)
         values = found.correct(data.f_axis * np.array(shape.gain))
-        with out.open("w", newline="", encoding="utf-8") as file:
+        with whole(out) as new, new.open("w", newline="", encoding="utf-8") as file:
             _write(file, data, values, found.id)
         if layout_out is not None:
-            layout_out.write_text(as_toml(calibrated), encoding="utf-8")
+            with whole(layout_out) as draft:
+                draft.write_text(as_toml(calibrated), encoding="utf-8")
     except (ValueError, OSError) as error:
         raise fail(error, EXIT_CONFIG) from None
     result = {
@@ -251,7 +266,11 @@ def _write(file: Any, data: Any, values: np.ndarray, card: str) -> None:
 @app.command("simulate")
 def simulate(
     out: Annotated[
-        Path, typer.Option(help="Folder for poses.csv, steps-1.csv ..., run.csv and truth.json.")
+        Path,
+        typer.Option(
+            callback=output_folder(),
+            help="Folder for poses.csv, steps-1.csv ..., run.csv and truth.json.",
+        ),
     ],
     seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Which imperfect device.")] = 1,
     poses: Annotated[int, typer.Option(min=6, max=24, help="Poses of the tumble.")] = 14,

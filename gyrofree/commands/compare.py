@@ -16,6 +16,7 @@ from gyrofree.commands.options import (
     settings_of,
     show_table,
 )
+from gyrofree.commands.parser import output_file
 from gyrofree.commands.run import progress_bar
 from gyrofree.running.process import EXIT_CONFIG, fail
 
@@ -52,7 +53,13 @@ def compare(
     estimator: Annotated[
         str, typer.Option(help="Whose rate stands for a session; default the first by name.")
     ] = "",
-    plot: Annotated[Path | None, typer.Option(help="Draw all of it to this PNG file.")] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            callback=output_file(".png"),
+            help="Draw all of it to this PNG file.",
+        ),
+    ] = None,
     as_json: AsJson = False,
     config: Config = None,
 ) -> None:

@@ -9,6 +9,7 @@ import typer
 
 from gyrofree.commands import board as boards
 from gyrofree.commands.options import Config, Fault, Speed, UnitsAsNamed, Verbose, faults_of
+from gyrofree.commands.parser import output_folder, output_link
 from gyrofree.running.process import EXIT_CONFIG as CONFIG
 from gyrofree.running.process import fail, run_service
 
@@ -35,7 +36,10 @@ def demo(
         int, typer.Option(min=1, max=65535, help="Port of the Zenoh router.")
     ] = 7447,
     folder: Annotated[
-        Path, typer.Option(help="Where journal, recordings and users are kept.")
+        Path,
+        typer.Option(
+            callback=output_folder(), help="Where journal, recordings and users are kept."
+        ),
     ] = Path("var/demo"),
     record: Annotated[bool, typer.Option(help="Record from the start.")] = True,
     by_hand: Annotated[
@@ -110,7 +114,8 @@ def play(
     link: Annotated[
         Path | None,
         typer.Option(
-            help="Only be a board, reachable under this path; no other service is started."
+            callback=output_link(),
+            help="Only be a board, reachable under this path; no other service is started.",
         ),
     ] = None,
     port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the dashboard.")] = 8080,
@@ -118,7 +123,10 @@ def play(
         int, typer.Option(min=1, max=65535, help="Port of the Zenoh router.")
     ] = 7447,
     folder: Annotated[
-        Path, typer.Option(help="Where journal, recordings and users are kept.")
+        Path,
+        typer.Option(
+            callback=output_folder(), help="Where journal, recordings and users are kept."
+        ),
     ] = Path("var/play"),
     units_as_named: UnitsAsNamed = False,
     config: Config = None,

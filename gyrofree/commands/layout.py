@@ -19,11 +19,14 @@ from gyrofree.commands.layout_tables import (
     unknowns_table,
 )
 from gyrofree.commands.options import LARGEST_SEED, AsJson, console_of, say, show_table
+from gyrofree.commands.parser import Commands, output_file
 from gyrofree.running.process import EXIT_CONFIG, fail
+from inertial.whole_file import whole
+from messages.text import reason
 
 WIDTH = 150  # characters of tables where nobody looks at a terminal
 
-app = typer.Typer(
+app = Commands(
     no_args_is_help=True,
     rich_markup_mode=None,
     help=(
@@ -49,7 +52,13 @@ Turn = Annotated[
     typer.Option(min=0.0, max=5000.0, help="Turn about z for the predicted rate noise, deg/s."),
 ]
 Hertz = Annotated[float, typer.Option(min=1.0, max=10000.0, help="Samples per second.")]
-Plot = Annotated[Path | None, typer.Option(help="Draw it into this PNG file.")]
+Plot = Annotated[
+    Path | None,
+    typer.Option(
+        callback=output_file(".png"),
+        help="Draw it into this PNG file.",
+    ),
+]
 
 
 def _quality(name: str, half_side: float | None, turn: float, hertz: float) -> Any:
@@ -159,7 +168,11 @@ def optimise(
     ] = 1,
     sensor: Annotated[str, typer.Option(help="Sensor model, for the predicted noise.")] = "adxl345",
     out: Annotated[
-        Path | None, typer.Option(help="Write the layout found to this TOML file.")
+        Path | None,
+        typer.Option(
+            callback=output_file(),
+            help="Write the layout found to this TOML file.",
+        ),
     ] = None,
     turn: Turn = 180.0,
     hertz: Hertz = 100.0,
@@ -264,9 +277,10 @@ class _bar:
 
 def _write(path: Path, text: str) -> None:
     try:
-        path.write_text(text, encoding="utf-8")
+        with whole(path) as draft:
+            draft.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise fail(f"{path}: {error.strerror}; name another file with --out") from None
+        raise fail(f"{reason(error)}; name another file with --out") from None
 
 
 def _draw(found: list[Any], path: Path) -> None:
@@ -275,4 +289,4 @@ def _draw(found: list[Any], path: Path) -> None:
     try:
         draw(found, path)
     except (OSError, ValueError) as error:
-        raise fail(f"{path}: {error}; name another PNG file with --plot") from None
+        raise fail(f"{reason(error)}; name another PNG file with --plot") from None

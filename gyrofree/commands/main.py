@@ -15,6 +15,7 @@ from gyrofree.commands.installation.doctor import doctor
 from gyrofree.commands.installation.setup import setup
 from gyrofree.commands.installation.up import up
 from gyrofree.commands.options import say
+from gyrofree.commands.parser import Commands, run_main
 from gyrofree.commands.replay import replay
 from gyrofree.commands.services import (
     dashboard,
@@ -26,7 +27,7 @@ from gyrofree.commands.services import (
 )
 from gyrofree.commands.simulate import simulate
 
-app = typer.Typer(
+app = Commands(
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
@@ -85,4 +86,4 @@ def _root(
 def main() -> None:
     """Entry point of `gyrofree`."""
     answer_the_shell()
-    app()
+    run_main(app)

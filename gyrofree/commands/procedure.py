@@ -16,11 +16,12 @@ from gyrofree.commands.options import (
     settings_of,
     show_table,
 )
+from gyrofree.commands.parser import Commands, output_file, output_folder
 from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
 from sessions.procedure import library
 from sessions.procedure.model import DEG, Plan
 
-app = typer.Typer(
+app = Commands(
     no_args_is_help=True,
     rich_markup_mode=None,
     help="Tests as procedures: list, show, check, run, compare. docs/procedures.md",
@@ -127,7 +128,10 @@ def run(
         bool, typer.Option("--own-session/--any-session", help="Record in a session of its own.")
     ] = True,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for the report; default ./report-<session>.")
+        Path | None,
+        typer.Option(
+            callback=output_folder(), help="Folder for the report; default ./report-<session>."
+        ),
     ] = None,
     config: Config = None,
 ) -> None:
@@ -212,7 +216,13 @@ def compare(
     sessions: Annotated[
         list[str], typer.Argument(help="Ids of sessions, or paths of MCAP files: one for a unit.")
     ],
-    out: Annotated[Path | None, typer.Option(help="Write the sheet to this CSV file too.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            callback=output_file(),
+            help="Write the sheet to this CSV file too.",
+        ),
+    ] = None,
     as_json: AsJson = False,
     config: Config = None,
 ) -> None:

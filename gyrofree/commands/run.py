@@ -11,16 +11,23 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from gyrofree.commands.options import LARGEST_SEED, AsJson, UnitsAsNamed, say
+from gyrofree.commands.parser import PICTURES, Commands, output_file, output_folder
 from gyrofree.commands.run_tables import kind_of, known, show
 from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
 
 Report = Callable[[float, str], None]
 
-app = typer.Typer(
+app = Commands(
     no_args_is_help=True, rich_markup_mode=None, help="Make the published figures and tables again."
 )
 
-Plot = Annotated[Path | None, typer.Option(help="Draw the result to this PNG file.")]
+Plot = Annotated[
+    Path | None,
+    typer.Option(
+        callback=output_file(*PICTURES),
+        help="Draw the result to this PNG file.",
+    ),
+]
 Filters = Annotated[str, typer.Option(help="Names, separated by commas; default all of the kind.")]
 
 
@@ -102,7 +109,8 @@ def run(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Write what every estimator said along the log to this .csv or .parquet file."
+            callback=output_file(".csv", ".parquet"),
+            help="Write what every estimator said along the log to this .csv or .parquet file.",
         ),
     ] = None,
     as_json: AsJson = False,
@@ -189,7 +197,11 @@ def parse_outages(text: str) -> list[tuple[float, float]]:
 
 
 Out = Annotated[
-    Path, typer.Option(help="Folder for pictures, tables and index.html; made when absent.")
+    Path,
+    typer.Option(
+        callback=output_folder(),
+        help="Folder for pictures, tables and index.html; made when absent.",
+    ),
 ]
 
 

@@ -23,13 +23,14 @@ from gyrofree.commands.options import (
     settings_of,
     show_table,
 )
+from gyrofree.commands.parser import Commands
 from gyrofree.commands.run import progress_bar
 from gyrofree.running.process import EXIT_FAILED, fail
 from sessions.library.annotations import read_annotations
 from sessions.library.catalogue import Catalogue
 from sessions.recording.manifest import SessionError
 
-app = typer.Typer(
+app = Commands(
     no_args_is_help=True,
     rich_markup_mode=None,
     help="Recorded sessions: list, look, verify, delete.",

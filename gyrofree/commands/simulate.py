@@ -15,13 +15,17 @@ from gyrofree.commands.options import (
     say,
     settings_of,
 )
+from gyrofree.commands.parser import output_file, output_link
 from gyrofree.running.process import EXIT_CONFIG as CONFIG
 from gyrofree.running.process import fail, run_service
 
 
 def simulate(
     link: Annotated[
-        Path | None, typer.Option(help="Make the pseudo-terminal reachable under this path.")
+        Path | None,
+        typer.Option(
+            callback=output_link(), help="Make the pseudo-terminal reachable under this path."
+        ),
     ] = None,
     tcp: Annotated[
         int | None,
@@ -66,7 +70,10 @@ def simulate(
     fault: Fault = None,
     table_link: Annotated[
         Path | None,
-        typer.Option(help="Offer the table's text protocol on a pseudo-terminal under this path."),
+        typer.Option(
+            callback=output_link(),
+            help="Offer the table's text protocol on a pseudo-terminal under this path.",
+        ),
     ] = None,
     table_tcp: Annotated[
         int | None, typer.Option(min=1, max=65535, help="The same on a TCP port of the loopback.")
@@ -80,7 +87,8 @@ def simulate(
     csv: Annotated[
         Path | None,
         typer.Option(
-            help="Be no board: write one run with its truth to this CSV, for `gyrofree run`."
+            callback=output_file(),
+            help="Be no board: write one run with its truth to this CSV, for `gyrofree run`.",
         ),
     ] = None,
     layout: Annotated[

@@ -13,9 +13,10 @@ from dashboard.web.accounts.audit import Audit
 from dashboard.web.programs.tokens import issue_token, load_tokens, revoke_token
 from dashboard.web.users import UsersError, add_user, load_users, remove_user
 from gyrofree.commands.options import AsJson, Config, say, settings_of
+from gyrofree.commands.parser import Commands
 from gyrofree.running.process import EXIT_CONFIG, fail
 
-app = typer.Typer(
+app = Commands(
     no_args_is_help=True, rich_markup_mode=None, help="Who may sign in to the dashboard."
 )
 
@@ -47,7 +48,7 @@ def users_add(
     say(f"{name} may sign in as {role}")
 
 
-tokens = typer.Typer(
+tokens = Commands(
     no_args_is_help=True, rich_markup_mode=None, help="API tokens: for programs, with an end."
 )
 app.add_typer(tokens, name="token")

@@ -9,7 +9,7 @@ import secrets
 from dataclasses import dataclass
 from pathlib import Path
 
-from dashboard.web.users import add_user, issue_link_token
+from dashboard.web.users import add_user, issue_link_token, link_token_waits
 from gyrofree.config import Settings, load
 from gyrofree.running.doctor import port_taken
 from gyrofree.running.process import EXIT_TAKEN, fail, start_logging, stop_on_signals
@@ -123,9 +123,15 @@ def run(plan: Plan) -> None:
     config = write_configuration(plan)
     settings = load(config)
     supervisor = _supervise(plan, config)
-    url = _sign_in_link(settings)
+    token = _sign_in_token(settings)
     supervisor.say(f"starting; configuration and data in {plan.folder}")
-    Watch(supervisor, settings, [(f"open  {url}", "bold green")]).run(stop)
+    users = Path(settings.dashboard.users)
+
+    def welcome() -> list[tuple[str, str]]:
+        link = f"/login/link?token={token}" if link_token_waits(users, token) else ""
+        return [(f"open  {settings.dashboard.url}{link}", "bold green")]
+
+    Watch(supervisor, settings, welcome).run(stop)
     if supervisor.done:
         print(_summary(settings, plan))
 
@@ -143,21 +149,24 @@ def _summary(settings: Settings, plan: Plan) -> str:
 
 def _supervise(plan: Plan, config: Path) -> Supervisor:
     supervisor = Supervisor(name=plan.command)
+    port = plan.folder / "board"  # is not there before the board, which comes last
     for service in SERVICES:
-        supervisor.add(service, service, "--config", str(config))
+        hushed = (f"{port}: not there", f"{port}: open") if service == "gateway" else None
+        supervisor.add(service, service, "--config", str(config), hushed=hushed)
     # The board comes last: estimators that see its first standstill know its heading and biases
     # from the start.
     name, *arguments = plan.board  # a log's name may begin with -, and comes last
-    places = [f"--config={config}", f"--link={plan.folder / 'board'}"]
+    places = [f"--config={config}", f"--link={port}"]
     places += [f"--table-link={plan.folder / 'table'}"] if plan.table else []
     board = [name, *places, *arguments]
     supervisor.add("board", *board, waits_for=("estimator", "estimating"), once=plan.once)
     return supervisor
 
 
-def _sign_in_link(settings: Settings) -> str:
-    """A fresh demo user with a password nobody knows, and the one-time link that signs in as it."""
+def _sign_in_token(settings: Settings) -> str:
+    """A fresh demo user with a password nobody knows, and the token of a link that signs in as it,
+    once.
+    """
     users = Path(settings.dashboard.users)
     add_user(users, USER, secrets.token_urlsafe(24), "operator")
-    token = issue_link_token(users, USER)
-    return f"{settings.dashboard.url}/login/link?token={token}"
+    return issue_link_token(users, USER)

@@ -10,6 +10,7 @@ from queue import Empty, SimpleQueue
 from rich.console import Console
 from rich.text import Text
 
+from logs.figures.numbers import with_half_width
 from messages.bus import orders
 from messages.bus.session import BusSettings, BusUnavailable, open_client, subscribe
 from messages.contract import gyrofree_pb2 as pb
@@ -155,7 +156,8 @@ class View:
             done = step.state in MARKS
             if step.spoilt and (k, step.spoilt) not in self._told:
                 self._told.add((k, step.spoilt))
-                self._line(f"  ! {step.name}: spoilt: {step.reason or m.message}", "yellow")
+                why = f"{step.name}: spoilt: {step.reason}" if step.reason else m.message
+                self._line(f"  ! {why}", "yellow")
             if done and (k, 0) not in self._told:
                 self._told.add((k, 0))
                 mark, style = MARKS[step.state]
@@ -186,12 +188,12 @@ class View:
 
 
 def figures(step: pb.ProcedureStatus.Step) -> str:
-    """The numbers of a step, with what is known of their sigma."""
+    """The numbers of a step, with two standard errors where they are known."""
     parts = []
     for one in step.figures:
         name, _, unit = one.name.rpartition("_")
-        value = f"{one.value:.3g}" if one.value == one.value else "not told"
-        sigma = f" ± {one.sigma:.2g}" if one.sigma == one.sigma else ""
-        unit = {"dps": "deg/s"}.get(unit, unit) if value != "not told" else ""
-        parts.append(f"{name.replace('_', ' ')} {value}{sigma} {unit}".rstrip())
+        known = one.value == one.value
+        value = with_half_width(one.value, 2.0 * one.sigma) if known else "not told"
+        unit = {"dps": "deg/s"}.get(unit, unit) if known else ""
+        parts.append(f"{name.replace('_', ' ')} {value} {unit}".rstrip())
     return ", ".join(parts) + (" " if parts else "")

@@ -11,6 +11,7 @@ from gateway.samples.tacho import Tachometer
 from inertial.layouts.catalogue import find
 from inertial.simulation.profiles import Profile, named
 from inertial.simulation.table import BLOCK, TableTest
+from inertial.whole_file import whole
 from logs.cube_log import TACHO, TRUE_ATTITUDE, TRUE_RATE
 
 
@@ -32,7 +33,7 @@ def write(
     test = TableTest(seed=seed, profile=profile, layout=shape)
     n = round(test.profile.seconds / test.period_s)
     rates = _tacho(test, n)
-    with Path(path).open("w", newline="", encoding="utf-8") as file:
+    with whole(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         file.write(
             f"# simulated: profile {profile.name}, seed {seed}, layout {shape.name},"

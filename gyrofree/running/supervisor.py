@@ -49,6 +49,9 @@ class Child:
         None  # another child, and what its log must say before this one starts
     )
     once: bool = False  # its end is the end of all: done with exit code 0, else a fault
+    hushed: tuple[str, str] | None = (
+        None  # lines with the first text are not shown before the other
+    )
 
 
 def _die_with_parent() -> None:
@@ -67,6 +70,9 @@ class Supervisor:
         self.fatal: Child | None = None
         self.fatal_code = 0  # its exit code
         self.done = False  # a child that runs once has done its work
+        self.lines = 0  # that were shown
+        self.last_line = 0.0  # s, monotonic: when the last of them was
+        self._printing = threading.Lock()
         self._stopping = False
 
     def add(
@@ -75,14 +81,17 @@ class Supervisor:
         *arguments: str,
         waits_for: tuple[str, str] | None = None,
         once: bool = False,
+        hushed: tuple[str, str] | None = None,
     ) -> None:
         """Have `gyrofree ARGUMENTS` as a child called `name`.
 
         waits_for: another child and a text of its log, before which this one is not started; at
         most LONGEST_WAIT. once: it is not started again, and `done` or `fatal` says how it ended.
+        hushed: lines with the first text are no news until one has the second.
         """
-        colour = COLOURS[len(self.children) % len(COLOURS)]
-        self.children.append(Child(name, list(arguments), colour, waits_for=waits_for, once=once))
+        child = Child(name, list(arguments), waits_for=waits_for, once=once, hushed=hushed)
+        child.colour = COLOURS[len(self.children) % len(COLOURS)]
+        self.children.append(child)
 
     def say(self, text: str, style: str = "bold") -> None:
         """A line of the supervisor's own."""
@@ -189,6 +198,10 @@ class Supervisor:
                     and other.waits_for[1] in line
                 ):
                     other.waits_for, other.due = None, 0.0
+            if child.hushed and child.hushed[1] in line:
+                child.hushed = None
+            if child.hushed and child.hushed[0] in line:
+                continue
             self._print(
                 child.name, child.colour, rest if known else line.rstrip(), LEVELS.get(level, "")
             )
@@ -198,4 +211,6 @@ class Supervisor:
         line = Text.assemble(
             (clock, "dim"), " ", (f"{name:<10}", colour), " ", (printed(text), style)
         )
-        self.console.print(line, soft_wrap=True)
+        with self._printing:
+            self.console.print(line, soft_wrap=True)
+            self.lines, self.last_line = self.lines + 1, time.monotonic()

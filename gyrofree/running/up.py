@@ -5,6 +5,7 @@ FIRST, who has a password that nobody knows; he goes as soon as there is another
 """
 
 import secrets
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -14,6 +15,7 @@ from dashboard.web.users import (
     UsersError,
     add_user,
     issue_link_token,
+    link_token_waits,
     load_users,
     remove_user,
 )
@@ -92,7 +94,7 @@ def run(plan: Plan) -> None:
         options = ["--config", str(plan.config)] if plan.config else []
         options += ["--setup"] if service == "dashboard" and plan.asks else []
         supervisor.add(service, service, *options)
-    welcome = _welcome(settings) if "dashboard" in plan.services else []
+    welcome = _welcome(settings) if "dashboard" in plan.services else list
     supervisor.say(f"starting {', '.join(plan.services)}; {_boards(plan)}")
     each = FirstBoard(plan, supervisor).look if plan.asks else lambda: None
     Watch(supervisor, settings, welcome, each).run(stop)
@@ -126,21 +128,22 @@ def _look_for_others(plan: Plan) -> None:
             )
 
 
-def _welcome(settings: Settings) -> list[tuple[str, str]]:
-    """The lines that say where the page is and how to enter."""
+def _welcome(settings: Settings) -> Callable[[], list[tuple[str, str]]]:
+    """What gives the lines that say where the page is and how to enter."""
     users, url = settings.dashboard.users, settings.dashboard.url
+    plain = [(f"open  {url}", "bold green")]
     try:
         others = {name: user for name, user in load_users(users).items() if name != FIRST}
         if others:
             if any(user.role is Role.admin for user in others.values()):
                 _forget_first(users)
-            return [(f"open  {url}", "bold green")]
+            return lambda: plain
         add_user(users, FIRST, secrets.token_urlsafe(24), Role.admin)
         minutes = settings.dashboard.link_minutes
         token = issue_link_token(users, FIRST, 60.0 * minutes)
     except UsersError as error:
         raise fail(error, EXIT_CONFIG) from None
-    return [
+    first = [
         (f"open  {url}/login/link?token={token}", "bold green"),
         (f"nobody may sign in yet: that link signs in once, within {minutes:g} min", ""),
         (
@@ -148,6 +151,7 @@ def _welcome(settings: Settings) -> list[tuple[str, str]]:
             "",
         ),
     ]
+    return lambda: first if link_token_waits(users, token) else plain
 
 
 def _forget_first(users: Path) -> None:

@@ -23,6 +23,9 @@ SERVICES = (
 TICK = 0.1  # s between two looks at the children
 DRAIN = 3.0  # s that the last samples of a played log have to reach the recording
 WAIT_FOR_PAGE = 60.0  # s; a cold compile cache needs most of it
+QUIET = 2.0  # s without a line, after which the welcome is said again below what covered it
+BEGINNING = 60.0  # s from the first welcome in which one line covers it
+SCREENFUL = 20  # lines that cover it later, on a terminal
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,8 @@ class Watch:
 
     supervisor: Supervisor
     settings: Settings
-    welcome: list[tuple[str, str]]  # said once the page answers: text and style; none: no page
+    welcome: Callable[[], list[tuple[str, str]]]  # said once the page answers, and again where it
+    # was scrolled away: text and style; none: no page
     each: Callable[[], None] = lambda: None  # called between two looks
 
     def run(self, stop: threading.Event) -> None:
@@ -55,19 +59,48 @@ class Watch:
             raise fail(f"{supervisor.fatal.name} could not go on", max(code, EXIT_FAILED))
 
     def _look(self, stop: threading.Event) -> None:
-        supervisor, said = self.supervisor, not self.welcome
+        supervisor, said = self.supervisor, not self.welcome()
+        greeter = _Greeter(supervisor, self.welcome)
         deadline = time.monotonic() + WAIT_FOR_PAGE
         while not stop.wait(TICK) and supervisor.fatal is None and not supervisor.done:
             supervisor.step()
             self.each()
             if said:
-                continue
-            if health("dashboard", self.settings).state == "ok":
+                greeter.look()
+            elif health("dashboard", self.settings).state == "ok":
                 said = True
-                for text, style in self.welcome:
-                    supervisor.say(text, style)
+                greeter.say()
             elif time.monotonic() > deadline:
                 raise fail(
                     f"the dashboard does not answer after {WAIT_FOR_PAGE:g} s; the log above"
                     " says why"
                 )
+
+
+class _Greeter:
+    """Says the welcome, and again where the log has scrolled it away and has come to rest."""
+
+    def __init__(
+        self, supervisor: Supervisor, welcome: Callable[[], list[tuple[str, str]]]
+    ) -> None:
+        self._supervisor, self._welcome = supervisor, welcome
+        self._first: float | None = None  # s, monotonic: when it was said first
+        self._seen = 0  # lines of the log when it was said last
+
+    def say(self) -> None:
+        """Now."""
+        lines = self._welcome()
+        self._seen = self._supervisor.lines + len(lines)  # what comes between them covers them
+        for text, style in lines:
+            self._supervisor.say(text, style)
+        self._first = self._first or time.monotonic()
+
+    def look(self) -> None:
+        """Say it where it is covered; cheap."""
+        supervisor, now = self._supervisor, time.monotonic()
+        covered = supervisor.lines - self._seen
+        if self._first is None or not covered or now - supervisor.last_line < QUIET:
+            return
+        beginning = now - self._first < BEGINNING
+        if beginning or (covered >= SCREENFUL and supervisor.console.is_terminal):
+            self.say()

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from inertial.layouts.layout import Layout
 from inertial.layouts.quality import Quality
+from inertial.whole_file import whole
 
 Array = NDArray[np.float64]
 
@@ -37,7 +38,8 @@ def draw(found: Sequence[Quality], path: Path) -> None:
     FigureCanvasAgg(figure)
     for k, q in enumerate(found):
         _one(figure.add_subplot(rows, columns, k + 1, projection="3d"), q)
-    figure.savefig(path, dpi=110, format="png")
+    with whole(path) as draft:
+        figure.savefig(draft, dpi=110, format="png")
 
 
 def _one(ax: object, q: Quality) -> None:

@@ -8,6 +8,8 @@ from typing import Any
 
 import matplotlib
 
+from inertial.whole_file import whole
+
 matplotlib.use("Agg")  # no screen; this module is imported only where something is drawn
 
 import matplotlib.pyplot as plt
@@ -62,7 +64,8 @@ def draw(
         figure.legend(
             handles, labels, loc="outside upper right", ncols=max(1, len(labels)), frameon=False
         )
-        figure.savefig(path)
+        with whole(path) as draft:
+            figure.savefig(draft)
         plt.close(figure)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from inertial.earth import ned_between
 from inertial.navigation.filters import DEFAULT
 from inertial.navigation.results import place_of
+from inertial.whole_file import whole
 from logs.drive_log import DriveLog
 from logs.drive_result import Result
 from logs.figures.colours import COLOURS
@@ -40,7 +41,8 @@ def draw(
                 "velocity_h_rms_mps",
                 "horizontal velocity RMS on unseen fixes, m/s",
             )
-    figure.savefig(path, dpi=110)
+    with whole(path) as draft:
+        figure.savefig(draft, dpi=110)
     plt.close(figure)
 
 

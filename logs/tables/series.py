@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from inertial.navigation.results import place_of
 from inertial.rotation import euler_angles
+from inertial.whole_file import whole
 from logs.cube_log import CubeLog
 from logs.cube_run import EstimatorRun, Reference
 from logs.drive_result import Result
@@ -53,10 +54,11 @@ def write(out: Path, parts: Mapping[str, Columns | list[Columns]], kind: str) ->
             named = {"t_s": columns["t_s"], kind: np.full(n, name)} | columns
             tables.append(pa.table({key: _cells(values) for key, values in named.items()}))
     table = pa.concat_tables(tables, promote_options="default") if tables else pa.table({})
-    if out.suffix.lower() == ".parquet":
-        pq.write_table(table, out, compression="zstd")
-    else:
-        pa.csv.write_csv(table, out, pa.csv.WriteOptions(quoting_style="needed"))
+    with whole(out) as draft:
+        if out.suffix.lower() == ".parquet":
+            pq.write_table(table, draft, compression="zstd")
+        else:
+            pa.csv.write_csv(table, draft, pa.csv.WriteOptions(quoting_style="needed"))
     return {"file": str(out), "rows": len(table), "columns": table.column_names}
 
 

@@ -24,6 +24,7 @@ from messages.contract.topics import REPLAY_SUFFIX, Topic
 from messages.history.spool import Spool
 from messages.setting import setting
 
+PATIENCE_S = 3.0  # for a router that starts together with its clients
 CLOSING_S = 5.0
 LARGEST = 16 << 20  # bytes; messages have at most 1 MB, answers to questions 8
 
@@ -114,7 +115,7 @@ def open_client(
     """
     stop = stop or threading.Event()
     end = None if timeout_s is None else time.monotonic() + timeout_s
-    said = False
+    start, said = time.monotonic(), False
     while True:
         try:
             return zenoh.open(_config(settings, "client"))
@@ -124,7 +125,7 @@ def open_client(
                     f"[bus] router {settings.router}: nobody answers; start one with `gyrofree"
                     " router`"
                 ) from None
-        if not said:
+        if not said and time.monotonic() - start > PATIENCE_S:
             log.warning("router %s does not answer yet: trying on", settings.router)
             said = True
         stop.wait(0.25)

@@ -1056,7 +1056,7 @@ class RecorderCommand(_message.Message):
     def __init__(self, action: _Optional[_Union[RecorderCommand.Action, str]] = ..., name: _Optional[str] = ..., note: _Optional[str] = ..., user: _Optional[str] = ...) -> None: ...
 
 class RecorderStatus(_message.Message):
-    __slots__ = ("header", "recording", "session", "seconds", "messages", "bytes", "durable_messages", "message", "lost", "repaired", "repairing", "refused", "clock_steps", "clock_offset_s")
+    __slots__ = ("header", "recording", "session", "seconds", "messages", "bytes", "durable_messages", "message", "lost", "repaired", "repairing", "refused", "clock_steps", "clock_offset_s", "continues")
     class LostEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -1092,6 +1092,7 @@ class RecorderStatus(_message.Message):
     REFUSED_FIELD_NUMBER: _ClassVar[int]
     CLOCK_STEPS_FIELD_NUMBER: _ClassVar[int]
     CLOCK_OFFSET_S_FIELD_NUMBER: _ClassVar[int]
+    CONTINUES_FIELD_NUMBER: _ClassVar[int]
     header: Header
     recording: bool
     session: str
@@ -1106,7 +1107,8 @@ class RecorderStatus(_message.Message):
     refused: _containers.ScalarMap[str, int]
     clock_steps: int
     clock_offset_s: float
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., recording: _Optional[bool] = ..., session: _Optional[str] = ..., seconds: _Optional[float] = ..., messages: _Optional[int] = ..., bytes: _Optional[int] = ..., durable_messages: _Optional[int] = ..., message: _Optional[str] = ..., lost: _Optional[_Mapping[str, int]] = ..., repaired: _Optional[_Mapping[str, int]] = ..., repairing: _Optional[int] = ..., refused: _Optional[_Mapping[str, int]] = ..., clock_steps: _Optional[int] = ..., clock_offset_s: _Optional[float] = ...) -> None: ...
+    continues: str
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., recording: _Optional[bool] = ..., session: _Optional[str] = ..., seconds: _Optional[float] = ..., messages: _Optional[int] = ..., bytes: _Optional[int] = ..., durable_messages: _Optional[int] = ..., message: _Optional[str] = ..., lost: _Optional[_Mapping[str, int]] = ..., repaired: _Optional[_Mapping[str, int]] = ..., repairing: _Optional[int] = ..., refused: _Optional[_Mapping[str, int]] = ..., clock_steps: _Optional[int] = ..., clock_offset_s: _Optional[float] = ..., continues: _Optional[str] = ...) -> None: ...
 
 class HistoryQuery(_message.Message):
     __slots__ = ("topics", "of", "after_run", "after_sequence", "until_run", "until_sequence", "from_utc_ns", "until_utc_ns", "position", "max_bytes", "until_of", "every_s")
@@ -1229,7 +1231,7 @@ class ProcedureStatus(_message.Message):
     STATE_ABORTED: ProcedureStatus.State
     STATE_STOPPED: ProcedureStatus.State
     class Step(_message.Message):
-        __slots__ = ("name", "kind", "target_radps", "dwell_s", "state", "reason", "attempts", "epoch", "from_us", "until_us", "from_utc_ns", "until_utc_ns", "figures", "spoilt", "confirmed_by")
+        __slots__ = ("name", "kind", "target_radps", "dwell_s", "state", "reason", "attempts", "epoch", "from_us", "until_us", "from_utc_ns", "until_utc_ns", "figures", "spoilt", "confirmed_by", "trouble")
         class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
             __slots__ = ()
             STATE_TODO: _ClassVar[ProcedureStatus.Step.State]
@@ -1263,6 +1265,7 @@ class ProcedureStatus(_message.Message):
         FIGURES_FIELD_NUMBER: _ClassVar[int]
         SPOILT_FIELD_NUMBER: _ClassVar[int]
         CONFIRMED_BY_FIELD_NUMBER: _ClassVar[int]
+        TROUBLE_FIELD_NUMBER: _ClassVar[int]
         name: str
         kind: str
         target_radps: float
@@ -1278,7 +1281,8 @@ class ProcedureStatus(_message.Message):
         figures: _containers.RepeatedCompositeFieldContainer[ProcedureStatus.Figure]
         spoilt: int
         confirmed_by: str
-        def __init__(self, name: _Optional[str] = ..., kind: _Optional[str] = ..., target_radps: _Optional[float] = ..., dwell_s: _Optional[float] = ..., state: _Optional[_Union[ProcedureStatus.Step.State, str]] = ..., reason: _Optional[str] = ..., attempts: _Optional[int] = ..., epoch: _Optional[int] = ..., from_us: _Optional[int] = ..., until_us: _Optional[int] = ..., from_utc_ns: _Optional[int] = ..., until_utc_ns: _Optional[int] = ..., figures: _Optional[_Iterable[_Union[ProcedureStatus.Figure, _Mapping]]] = ..., spoilt: _Optional[int] = ..., confirmed_by: _Optional[str] = ...) -> None: ...
+        trouble: _containers.RepeatedScalarFieldContainer[str]
+        def __init__(self, name: _Optional[str] = ..., kind: _Optional[str] = ..., target_radps: _Optional[float] = ..., dwell_s: _Optional[float] = ..., state: _Optional[_Union[ProcedureStatus.Step.State, str]] = ..., reason: _Optional[str] = ..., attempts: _Optional[int] = ..., epoch: _Optional[int] = ..., from_us: _Optional[int] = ..., until_us: _Optional[int] = ..., from_utc_ns: _Optional[int] = ..., until_utc_ns: _Optional[int] = ..., figures: _Optional[_Iterable[_Union[ProcedureStatus.Figure, _Mapping]]] = ..., spoilt: _Optional[int] = ..., confirmed_by: _Optional[str] = ..., trouble: _Optional[_Iterable[str]] = ...) -> None: ...
     class Figure(_message.Message):
         __slots__ = ("name", "value", "sigma", "min", "max")
         NAME_FIELD_NUMBER: _ClassVar[int]

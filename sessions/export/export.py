@@ -24,6 +24,7 @@ from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 from scipy.io import savemat
 
+from inertial.whole_file import whole_files
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
 from messages.contract.topics import GNSS, LOG, NAV, RATE, Topic, parse
@@ -255,14 +256,15 @@ def export(
     selection: Selection = Selection(),
     progress: Progress = silent,
 ):
-    """Write a recording into the folder `out` (made when absent); the files that were written.
+    """Write a recording into the folder `out`, made when absent; the files, which come together.
 
     Raises ExportError for an unknown format and for a selection without data, OSError.
     """
     if form not in FORMATS:
         raise ExportError(f"format {form!r}: want one of {', '.join(FORMATS)}")
-    out.mkdir(parents=True, exist_ok=True)
-    return FORMATS[form](path, out, selection, progress)
+    with whole_files(out) as drafts:
+        files = FORMATS[form](path, drafts, selection, progress)
+    return [out / file.name for file in files]
 
 
 def _surveyed(path: Path, selection: Selection, progress: Progress) -> Survey:

@@ -19,6 +19,7 @@ from sessions.recording.samples import Gathering, decode
 from sessions.recording.timeline import straight
 
 Progress = Callable[[float, str], None]  # share done 0 to 1, what is being done
+Files = Path | tuple[Path, ...]  # one recording, also where it goes on from file to file, in order
 
 
 def silent(done: float, what: str) -> None:
@@ -50,14 +51,19 @@ class Survey:
     damage: Damage = field(default_factory=Damage)
 
 
+def files(path: Files) -> tuple[Path, ...]:
+    """The files of a recording, in order."""
+    return (path,) if isinstance(path, Path) else path
+
+
 def messages(
-    path: Path, selection: Selection, damage: Damage | None = None
+    path: Files, selection: Selection, damage: Damage | None = None
 ) -> Iterator[tuple[Recorded, Topic, Message | None]]:
     """Selected messages in the order of recording, decoded; None for one that cannot be. What
     cannot be read is counted in `damage`, or logged where none is given. Raises OSError.
     """
     start, found = None, Damage() if damage is None else damage
-    for row in straight(path, found):
+    for row in straight(files(path), found):
         start = row.log_ns if start is None else start
         if not selection.start_s <= (row.log_ns - start) / 1e9 <= selection.end_s:
             continue
@@ -69,18 +75,18 @@ def messages(
                 found.undecodable += 1
                 yield row, topic, None
     if damage is None:
-        say(path, found)
+        say(files(path)[-1], found)
 
 
 def survey(
-    path: Path,
+    path: Files,
     selection: Selection = Selection(),
     progress: Progress = silent,
     damage: Damage | None = None,
 ) -> Survey:
     """First reading: keys, counts, times, widths. What is damaged is logged. Raises OSError."""
     found = Survey(damage=Damage() if damage is None else damage)
-    size = max(1, path.stat().st_size)
+    size = max(1, sum(one.stat().st_size for one in files(path)))
     seen = 0
     for row, topic, message in messages(path, selection, found.damage):
         found.first_ns = found.first_ns or row.log_ns
@@ -96,7 +102,7 @@ def survey(
             found.columns[row.key] = Columns(topic, selection.fields.get(topic.name))
         found.columns[row.key].widen(message)
         found.counts[row.key] = found.counts.get(row.key, 0) + 1
-    say(path, found.damage)
+    say(files(path)[-1], found.damage)
     progress(1.0, "looked through")
     return found
 
@@ -105,7 +111,7 @@ Block = dict[str, NDArray[Any]]  # column name -> (n,) numbers or str
 
 
 def blocks(
-    path: Path, found: Survey, selection: Selection = Selection(), progress: Progress = silent
+    path: Files, found: Survey, selection: Selection = Selection(), progress: Progress = silent
 ) -> Iterator[tuple[str, Block]]:
     """Second reading: (bus key, some rows of it), the rows of a key in the order of recording.
 
@@ -152,7 +158,7 @@ class Table:
 
 
 def tables(
-    path: Path,
+    path: Files,
     selection: Selection = Selection(),
     progress: Progress = silent,
     damage: Damage | None = None,

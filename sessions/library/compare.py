@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.earth import ned_between
+from logs.figures.sight import vouched
 from sessions.library.align import METHODS, MOST, CompareError, Overlaid, key_of, laid, resampled
 from sessions.library.curves import Curves, Line, Track
 
@@ -110,8 +111,8 @@ def _differences(a: Overlaid, b: Overlaid, dt: float) -> list[Difference]:
 
 
 def difference(b: Overlaid, line: Line, a: Overlaid, against: Line, dt: float) -> Difference | None:
-    """RMS of line minus against per component, on a's grid of dt; None where they have no time in
-    common.
+    """RMS of line minus against per component, on a's grid of dt, over the time for which both
+    estimators vouch; None without any.
     """
     rms: dict[str, float] = {}
     seconds = 0.0
@@ -124,10 +125,21 @@ def difference(b: Overlaid, line: Line, a: Overlaid, against: Line, dt: float) -
             mine[0].astype(float), b.curves.bin_s, b.offset_s - a.offset_s, n, dt
         ) - resampled(its[0].astype(float), a.curves.bin_s, 0.0, n, dt)
         there = np.isfinite(delta)
+        t = (np.arange(n) + 0.5) * dt
+        there &= _vouches(line, name, (t - (b.offset_s - a.offset_s)) / b.curves.bin_s)
+        there &= _vouches(against, name, t / a.curves.bin_s)
         if there.any():
             rms[name] = float(np.sqrt(np.mean(delta[there] ** 2)))
             seconds = max(seconds, float(there.sum() * dt))
     return Difference(b.curves.session, line.key, against.key, rms, seconds) if rms else None
+
+
+def _vouches(line: Line, component: str, at: Array) -> NDArray[np.bool_]:
+    """Whether an estimator vouches for a component at so many bins (n,) from its start."""
+    sight = line.said_of(component)
+    if sight is None or not len(sight):
+        return np.ones(len(at), dtype=bool)
+    return sight[np.clip(at.astype(np.int64), 0, len(sight) - 1)] == 0
 
 
 def moved(track: Track, origin: tuple[float, float, float]) -> Array:
@@ -161,17 +173,22 @@ def _track_differences(a: Overlaid, b: Overlaid) -> list[TrackDifference]:
 
 
 def errors(curves: Curves) -> dict[str, dict[str, Any]]:
-    """Line -> what it was compared with, and the RMS per component, rad/s."""
+    """Line -> what it was compared with, per component the RMS of what the estimator vouches for,
+    rad/s, and how much of all that is, 0 to 1.
+    """
     result = {}
     for key, line in curves.lines.items():
         reference, parts = curves.error_of(line)
-        rms = {
-            name: float(np.sqrt(np.nanmean(e.astype(float) ** 2)))
-            for name, e in parts.items()
-            if np.isfinite(e).any()
-        }
-        if rms:
-            result[key] = {"against": reference, "rms_radps": rms}
+        rms, share = {}, {}
+        for name, error in parts.items():
+            there = np.isfinite(error)
+            known = np.isfinite(vouched(error.astype(float), line.said_of(name)))
+            if there.any():
+                share[name] = float(known.sum() / there.sum())
+            if known.any():
+                rms[name] = float(np.sqrt(np.mean(error[known].astype(float) ** 2)))
+        if share:
+            result[key] = {"against": reference, "rms_radps": rms, "valid_share": share}
     return result
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from inertial.whole_file import whole
 from logs.figures.names import ANGLE_UNIT, RATE_UNIT, line_colour, line_title
 from sessions.library.compare import Comparison, Overlaid, moved
 from sessions.library.curves import TACHO, Line
@@ -48,7 +49,8 @@ def draw(found: Comparison, path: Path) -> Path:
             _tracks(figure.add_subplot(grid[4, :]), tracks)
         handles, labels = first.get_legend_handles_labels() if first is not None else ([], [])
         figure.legend(handles, labels, loc="outside upper center", ncols=2, fontsize=8)
-        figure.savefig(path, format="png", metadata={"Software": None})
+        with whole(path) as draft:
+            figure.savefig(draft, format="png", metadata={"Software": None})
     return path
 
 

@@ -67,6 +67,13 @@ class Line:
         """Names of the columns."""
         return self.names or COMPONENTS[self.kind]
 
+    def said_of(self, component: str) -> NDArray[np.uint8] | None:
+        """What an estimator says of one component, (n,), RateEstimate.Sight; of an angle, what of
+        the rate that it is the integral of. None where nobody says.
+        """
+        axis = "xyz".find(component[-1])
+        return None if self.sight is None or axis < 0 else self.sight[:, axis]
+
     def part(self, component: str) -> tuple[Array, Array, Array] | None:
         """Mean, least and greatest of one component, (n,); None where the line has no such."""
         if component not in self.components:

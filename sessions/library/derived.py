@@ -33,6 +33,10 @@ class Named:
         """The means of all bins (n,)."""
         return self.factor * self.line.mean[:, self.part].astype(np.float64)
 
+    def said(self) -> NDArray[np.uint8] | None:
+        """What its estimator says of them (n,), RateEstimate.Sight; None where nobody says."""
+        return self.line.said_of(self.line.components[self.part])
+
 
 @dataclass(frozen=True)
 class Made:
@@ -42,6 +46,7 @@ class Made:
     unit: str
     fault: str = ""
     y: Array | None = None
+    sight: NDArray[np.uint8] | None = None  # (n,) the worst that is said of what it is made of
 
 
 def channels(curves: Curves) -> dict[str, Named]:
@@ -92,7 +97,10 @@ def derive(curves: Curves, lines: Sequence[str]) -> list[Made]:
                 if name != "t"
             }
             y = evaluate(expression, known | {"t": Quantity(curves.t, units["t"])})
-            found.append(Made(line, of, "", np.asarray(y.values)))
+            of_them = (named[name].said() for name in expression.names if name != "t")
+            said = [one for one in of_them if one is not None]
+            sight = np.maximum.reduce(said) if said else None
+            found.append(Made(line, of, "", np.asarray(y.values), sight))
         except ExpressionError as error:
             found.append(Made(line, "", str(error)))
     return found

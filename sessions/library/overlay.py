@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from logs.figures.names import line_colour, line_title
+from logs.figures.sight import WORDS, vouched
 from logs.figures.stretch import stretch
-from sessions.library.compare import Comparison, Overlaid, moved
+from sessions.library.compare import XYZ, Comparison, Overlaid, moved
 from sessions.library.curves import RATE, TACHO, TRUTH, Line, Mark
-from sessions.library.derived import derive
+from sessions.library.derived import Made, derive
 
 Array = NDArray[np.floating[Any]]
 
 POINTS = 1200  # per line, two for each bin of the window
 TRACK_POINTS = 1500
 DEG = float(np.degrees(1.0))
-SIGHTS = {1: "ambiguous", 2: "blind"}  # RateEstimate.Sight
 PROCEDURE = "procedure"  # author of what a procedure says in a recording
 
 
@@ -79,7 +79,7 @@ def _own(
                 curve["fault"] = curve["fault"] or made.fault
                 continue
             curve["unit"] = made.unit
-            curve["lines"].append(_own_line(one, number, made.y, window, points, cursors))
+            curve["lines"].append(_own_line(one, number, made, window, points, cursors))
     for curve in drawn:
         if curve["lines"]:
             curve["fault"] = ""
@@ -89,16 +89,17 @@ def _own(
 def _own_line(
     one: Overlaid,
     number: int,
-    y: Array,
+    made: Made,
     window: tuple[float, float],
     points: int,
     cursors: tuple[float, float] | None,
 ) -> dict[str, Any]:
     inside = (window[0] - one.offset_s, window[1] - one.offset_s)
+    y = vouched(made.y, made.sight)  # what nobody vouches for is a hole
     t, step, first, last, every = _grid(len(y), one.curves.bin_s, inside, max(1, points // 2))
     line = {"session": number, "t0": t + one.offset_s, "dt": step}
     if cursors is not None:
-        line["measured"] = stretch(one.curves.t + one.offset_s, y, *cursors)
+        line["measured"] = stretch(one.curves.t + one.offset_s, made.y, *cursors, made.sight)
     return line | _decimated(y[first:last], y[first:last], every, 1.0)
 
 
@@ -135,21 +136,28 @@ def _session(one: Overlaid) -> dict[str, Any]:
 def _shades(one: Overlaid, window: tuple[float, float], points: int) -> dict[str, Any]:
     """Where the leading line does not vouch for x, y, z: [from, until, word] of each."""
     line = one.curves.lines.get(one.lead)
-    if line is None or line.sight is None:
+    return {} if line is None else _unsure(one, line, window, points)
+
+
+def _unsure(
+    one: Overlaid, line: Line, window: tuple[float, float], points: int
+) -> dict[str, list[list[float | str]]]:
+    """Where a line does not vouch for x, y, z: [from, until, word] of each."""
+    if line.sight is None:
         return {}
     inside = (window[0] - one.offset_s, window[1] - one.offset_s)
     _, step, first, last, every = _grid(len(line.sight), one.curves.bin_s, inside, points // 2 or 1)
     sight = line.sight[first:last]
     sight = np.pad(sight, ((0, -len(sight) % every), (0, 0)))
-    worst = sight.reshape(-1, every, 3).max(axis=1)
+    worst = np.minimum(sight.reshape(-1, every, 3).max(axis=1), len(WORDS) - 1)
     begin = first * one.curves.bin_s + one.offset_s
     found = {}
-    for k, name in enumerate("xyz"):
+    for k, name in enumerate(XYZ):
         edges = np.flatnonzero(np.diff(worst[:, k], prepend=0, append=0))
         found[name] = [
-            [round(begin + a * step, 4), round(begin + b * step, 4), SIGHTS[int(worst[a, k])]]
+            [round(begin + a * step, 4), round(begin + b * step, 4), WORDS[worst[a, k]]]
             for a, b in pairwise(edges.tolist())
-            if int(worst[a, k]) in SIGHTS
+            if worst[a, k]
         ]
     return found
 
@@ -190,6 +198,7 @@ def _line(
         "error": errors,
         "against": against,
         "angle": {"z": angle} if angle else {},
+        "unsure": _unsure(one, line, (begin, end), points),
     }
 
 
@@ -198,7 +207,7 @@ def _measured(one: Overlaid, line: Line, begin: float, end: float) -> dict[str, 
     t = one.curves.t + one.offset_s
     parts = {name: line.part(name) for name in line.components}
     rates = {
-        name: stretch(t, part[0] * DEG, begin, end)
+        name: stretch(t, part[0] * DEG, begin, end, line.said_of(name))
         for name, part in parts.items()
         if part is not None
     }
@@ -206,7 +215,9 @@ def _measured(one: Overlaid, line: Line, begin: float, end: float) -> dict[str, 
     errors = one.curves.error_of(line)[1]
     return {
         "rate": rates,
-        "error": {name: stretch(t, e * DEG, begin, end) for name, e in errors.items()},
+        "error": {
+            name: stretch(t, e * DEG, begin, end, line.said_of(name)) for name, e in errors.items()
+        },
         "angle": {"z": angle} if angle else {},
     }
 

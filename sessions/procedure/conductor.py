@@ -4,6 +4,7 @@ any.
 """
 
 import logging
+import math
 import time
 from collections.abc import Callable
 
@@ -11,13 +12,16 @@ from sessions.procedure.driven.description import TableError
 from sessions.procedure.driven.drive import Drive
 from sessions.procedure.driven.table import RateTable
 from sessions.procedure.model import Step
+from sessions.procedure.recorded import Recorded
 from sessions.procedure.run import ABORTED, DONE, HELD, RUNNING, STOPPED, Journal
-from sessions.procedure.seen import Line, Samples, Seen, TableSays
+from sessions.procedure.seen import Axes, Samples, Seen, TableSays, Trouble
 from sessions.procedure.watch import State, Watch
 
 log = logging.getLogger(__name__)
 
 SILENT_S = 5.0  # s without a sample: a driven table is stopped
+ENDING_S = 60.0  # s that the end waits for a recorder to come back
+NAMED_S = 2.0  # s until an axis that goes wrong is named
 PATIENCE_S = 20.0  # s beyond the ramp that a driven table may need to get there
 
 Say = Callable[[str, int, float], None]  # remark, its moment by the data's clock, its length in s
@@ -32,11 +36,15 @@ class Conductor:
         table: RateTable | None,
         say: Say,
         record: Callable[[bool], str],
+        silence: Callable[[], str] = lambda: "",
     ) -> None:
-        """record(on): begin or end the recording of this run; what could not be done, or empty."""
+        """record(on): begin or end the recording of this run; what could not be done, or empty.
+        silence(): why no samples come, as far as it is known.
+        """
         self.journal, self.run = journal, journal.run
         self.drive = Drive(table)
-        self._say, self._record = say, record
+        self.recorded = Recorded(journal, record)
+        self._say, self._record, self._silence = say, record, silence
         first = self.run.plan.steps[0]
         self.watch = Watch(first, 0.0, self.run.plan.vibration_max)
         self._heard = time.monotonic()
@@ -56,8 +64,9 @@ class Conductor:
             return
         if self.run.at < 0:
             self._go(0)
+        elif self._watched and self.run.steps[self.run.at].state == "active":
+            self._spoilt("the procedures service was cut off and started again")
         else:
-            self._say("the service was restarted: the step begins anew", 0, 0.0)
             self._go(self.run.at)
 
     def next(self, by: str, text: str) -> str:
@@ -85,7 +94,7 @@ class Conductor:
         """Begin the present step anew; empty, or why not."""
         if self.run.over:
             return "the run has ended"
-        if problem := self.drive.take():
+        if problem := self.drive.take() or self.recorded.again():
             return problem
         self._say(f"step {self.run.at + 1} is repeated by {by or 'somebody'}", 0, 0.0)
         self._go(max(self.run.at, 0))
@@ -119,13 +128,28 @@ class Conductor:
 
     def take(self, seen: Seen) -> None:
         """Something was seen on the bus."""
+        if isinstance(seen, Axes) and seen.unfit and self.run.state == RUNNING:
+            self._doubt(seen)
         if isinstance(seen, Samples):
             self._heard = time.monotonic()
             if not self.run.started_utc_ns:
                 self.journal.add("began", utc_ns=seen.utc_ns)
         self.watch.take(seen)
-        if self.watch.over and self.run.state == RUNNING and self._watched:
+        if self.run.state != RUNNING or not self._watched:
+            return
+        if self.watch.over:
             self._judge()
+        elif isinstance(seen, Samples) and self._other_boot():
+            self._spoilt("the board has restarted")
+
+    def _doubt(self, seen: Axes) -> None:
+        """An axis is called unfit soon after a dwell: it may have been so within it."""
+        k = self.run.at - 1
+        window = self.run.steps[k].window if k >= 0 else {}
+        if not window or window["epoch"] != seen.epoch:
+            return
+        if seen.t - window["until_us"] * 1e-6 <= NAMED_S:
+            self._spoilt("; ".join(text for _, text in seen.unfit), k=k)
 
     def tick(self) -> None:
         """A few times a second: ask the table, notice silence, close what has ended."""
@@ -143,13 +167,25 @@ class Conductor:
         except TableError as error:
             if self.run.state == RUNNING:
                 self._hold(str(error))
-        if self._watched and now - self._heard > SILENT_S and self.run.state == RUNNING:
-            why = f"no samples for {now - self._heard:.0f} s"
-            self.watch.take(Line(False, why))
-            if self.watch.over:
-                self._judge()
-            elif self.drive.turns:
-                self._hold(f"{why}: the table is stopped")
+        if self._watched and self.run.state == RUNNING:
+            self._look_around(now)
+
+    def _look_around(self, now: float) -> None:
+        """Samples that do not come, and a recording that does not go on, spoil what is measured;
+        where that lasts, the table is stopped and a person asked.
+        """
+        why, lasts = self.recorded.trouble(now), self.recorded.lasts(now)
+        if self.silent_s > SILENT_S:
+            why, lasts = f"no samples for {self.silent_s:.0f} s", self.drive.turns
+            if known := self._silence():
+                why += f": {known}"
+        if not why:
+            return
+        self.watch.take(Trouble(why))
+        if self.watch.over:
+            self._spoilt(self.watch.reason, lasts)
+        elif lasts:
+            self._hold(why)
 
     @property
     def silent_s(self) -> float:
@@ -169,8 +205,12 @@ class Conductor:
     # --- the way
 
     def _go(self, k: int) -> None:
-        """Begin step k, or end after the last."""
+        """Begin step k, or end after the last; all of it anew where the board has begun anew."""
         steps = self.run.plan.steps
+        if why := self._other_boot():
+            k = 0
+            self.journal.add("anew", reason=why)
+            self._say(f"begun anew: {why}", 0, 0.0)
         while k < len(steps) and steps[k].kind == "record":
             self.journal.add("step", k=k)
             self.journal.add("done", k=k, text=self._record(steps[k].on))
@@ -181,7 +221,7 @@ class Conductor:
         step = steps[k]
         self.journal.add("step", k=k)
         procedure, plan = self.run.plan.procedure, self.run.plan
-        patience = float("inf")
+        patience = math.inf
         if self.drive.table is not None and step.kind in ("rate", "still"):
             patience = step.ramp_s + procedure.settle_s + PATIENCE_S
         before = self.watch
@@ -191,6 +231,15 @@ class Conductor:
             self.drive.turn(target, step.ramp_s)
         except TableError as error:
             self._hold(str(error))
+
+    def _other_boot(self) -> str:
+        """Why what was measured cannot be judged with what comes: a report is of one boot of a
+        board; empty where it can.
+        """
+        boots = {one.window["epoch"] for one in self.run.steps if one.window}
+        if self.watch.epoch < 0 or not boots - {self.watch.epoch}:
+            return ""
+        return "measured before the board restarted: a report is of one boot"
 
     def _judge(self) -> None:
         """What the watch came to."""
@@ -214,11 +263,17 @@ class Conductor:
             self._say(f"step {k + 1}, {step.name}: measured", begin, step.dwell_s)
             self._go(k + 1)
             return
-        self.journal.add("spoilt", k=k, reason=watch.reason)
-        self._say(f"step {k + 1}, {step.name}: spoilt: {watch.reason}", 0, 0.0)
-        record = self.run.steps[k]
-        if record.spoilt > self.run.plan.procedure.repeats:
-            self._hold(watch.reason)
+        self._spoilt(watch.reason)
+
+    def _spoilt(self, why: str, lasts: bool = False, k: int | None = None) -> None:
+        """The last attempt at step k (the present one) is void, and it begins anew; a person is
+        asked where what spoils it lasts, or comes too often.
+        """
+        k = self.run.at if k is None else k
+        self.journal.add("spoilt", k=k, reason=why)
+        self._say(f"step {k + 1}, {self.run.plan.steps[k].name}: spoilt: {why}", 0, 0.0)
+        if lasts or self.run.steps[k].spoilt > self.run.plan.procedure.repeats:
+            self._hold(why)
         else:
             self._go(k)
 
@@ -247,10 +302,13 @@ class Conductor:
             return
         if not self.drive.let_go(now, self._closing_since) or self.journal.fault:
             return
-        problem = self._record(False)
+        problem = self.recorded.end(now)
+        if problem and now - self._closing_since < ENDING_S:
+            return
         if problem:
             log.error("%s", problem)
-        self.journal.add("closed")
+            problem = f"the end of the run is not in its recording: {problem}"
+        self.journal.add("closed", problem=problem)
 
 
 def _known(value: float) -> float | None:

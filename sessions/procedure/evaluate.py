@@ -13,10 +13,13 @@ from inertial.constants import GRAVITY, MILLI_G
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import PROCEDURE
 from sessions.export.table import Selection, messages
+from sessions.procedure.conductor import NAMED_S
 from sessions.procedure.evidence import WINDOW, shaking
 from sessions.procedure.library import ProcedureError, of_text
 from sessions.procedure.model import DEG, Plan, Step
-from sessions.recording.manifest import Manifest
+from sessions.procedure.seen import UNFIT
+from sessions.procedure.watch import HOLE
+from sessions.recording.manifest import Manifest, SessionError, read_manifest
 from sessions.recording.mcap_damage import Damage
 from sessions.report.analysis import Analysis
 from sessions.report.data import Run
@@ -91,9 +94,29 @@ def held_by(path: Path, manifest: Manifest | None, device: str = "") -> Held | N
     return Held(newest, plan) if len(plan.steps) == len(newest.steps) else None
 
 
-def segments(held: Held, run: Run) -> list[Segment | None]:
-    """Where each step lies in a run; None where it was not measured, or is not in it."""
-    found: list[Segment | None] = []
+def pieces(path: Path, manifest: Manifest | None, held: Held) -> dict[Path, Manifest]:
+    """The files before this one that it goes on with, the first of the run first: its recorder was
+    cut off, or a file was full.
+    """
+    found: dict[Path, Manifest] = {}
+    while manifest is not None and manifest.continues:
+        if manifest.start_utc_ns <= held.status.started_utc_ns:
+            break
+        folder = path.parent.parent / manifest.continues
+        try:
+            manifest = read_manifest(folder)
+        except SessionError:
+            break
+        file = folder / manifest.file
+        if manifest.state == "open" or file in found or not file.is_file():
+            break
+        found = {file: manifest} | found
+    return found
+
+
+def segments(held: Held, run: Run) -> list[Segment | str]:
+    """Where each step lies in a run; or why it cannot be judged by what is recorded."""
+    found: list[Segment | str] = []
     before = 0.0
     for step, record in zip(held.plan.steps, held.status.steps, strict=True):
         if run.start_board_s is not None:
@@ -103,18 +126,53 @@ def segments(held: Held, run: Run) -> list[Segment | None]:
                 ns * 1e-9 - run.start_utc_s for ns in (record.from_utc_ns, record.until_utc_ns)
             )
         inside = min(end, run.seconds) - max(begin, 0.0)
-        measured = record.state == M.Step.STATE_DONE and end > begin
-        if not measured or record.epoch != run.epoch or inside < LEAST_SHARE * (end - begin):
-            found.append(None)
+        missing = ""
+        if record.state != M.Step.STATE_DONE or end <= begin:
+            missing = record.reason or "not measured"
+        elif record.epoch != run.epoch:
+            missing = f"measured in boot {record.epoch} of the board: reports are of one boot"
+        elif inside < LEAST_SHARE * (end - begin):
+            missing = "not in this recording"
+        if missing:
+            found.append(missing)
             continue
         begin, end = max(begin, 0.0), min(end, run.seconds)
         omega, scatter = step.target, 0.0
         if run.tacho is not None:
             values = reference(run.tacho, np.arange(begin, end, 0.01))
             omega, scatter = float(values.mean()), float(values.std())
-        found.append(Segment(begin, end, omega, scatter, begin - before))
+        part = Segment(begin, end, omega, scatter, begin - before)
+        found.append(contradiction(step, part, held.plan.procedure.estimator, run) or part)
         before = end
     return found
+
+
+def contradiction(step: Step, part: Segment, estimator: str, run: Run) -> str:
+    """What in the recording speaks against a dwell that was taken for good while it ran; or
+    empty.
+    """
+    rates = [rate.t for rate in run.rates if rate.name == estimator]
+    timed = {"samples": run.accel.t if run.accel is not None else None}
+    timed["estimates"] = rates[0] if rates else None
+    for what, t in timed.items():
+        hole = _hole(t, part) if t is not None else 0.0
+        if hole > HOLE:
+            return f"{hole:.2f} s without {what} in the recording"
+    for t, axis, state in run.states:
+        unfit = UNFIT.get(pb.AxisHealth.State.Value(f"STATE_{state}"))
+        if unfit and part.begin <= t <= part.end + NAMED_S:
+            return f"axis {axis} {unfit}, named {t - part.begin:.1f} s after the dwell began"
+    off = abs(abs(part.omega) - abs(step.target))  # a tachometer may not know the direction
+    if step.kind in ("rate", "still") and run.tacho is not None and off > step.tolerance:
+        told = f"{abs(part.omega) / DEG:.1f} °/s, wanted {abs(step.target) / DEG:.1f}"
+        return f"the tachometer in the recording says {told}"
+    return ""
+
+
+def _hole(t: Array, part: Segment) -> float:
+    """The longest time without one, s, within a part and at its ends."""
+    at = np.concatenate([[part.begin], t[part.holds(t)], [part.end]])
+    return float(np.diff(np.sort(at)).max())
 
 
 def evaluate(held: Held, found: Analysis, figures: list[Metric]) -> Outcome:
@@ -144,17 +202,15 @@ def _step(
     number: int,
     step: Step,
     record: pb.ProcedureStatus.Step,
-    part: Segment | None,
+    part: Segment | str,
     held: Held,
     found: Analysis,
 ) -> StepResult:
     watched = step.kind in ("rate", "still", "pose")
-    if part is None:
-        done = record.state == M.Step.STATE_DONE
-        if not watched and done:
+    if isinstance(part, str):
+        if not watched and record.state == M.Step.STATE_DONE:
             return StepResult(step, record, None, None, None, [])
-        why = "not in this boot of the recording" if done else record.reason or "not measured"
-        missing = Check(f"step {number}, {step.name}", None, None, None, why)
+        missing = Check(f"step {number}, {step.name}", None, None, None, part)
         return StepResult(step, record, None, None, None, [missing])
     rate = found.rate(held.plan.procedure.estimator)
     plateau = None

@@ -22,6 +22,7 @@ SILENCE = 0.6  # s without a pulse: the table stands, as in the report
 OVERDUE, LATE_S = 3.0, 0.05  # times the usual interval, and s: a pulse should have come
 FRESH = 1.0  # s that an estimate is believed
 TABLE_FRESH = 2.5  # s that a table's own word is
+STEADY = 1.0 * DEG  # rad/s, between two words of a table
 WINDOW = 0.5  # s, of vibration and of the direction of gravity
 
 
@@ -57,6 +58,7 @@ class Evidence:
     samples: deque[tuple[Array, Array]] = field(default_factory=deque)
     own_axes: bool = True
     table: tuple[float, float] | None = None  # s, rad/s: what a driven table said last
+    _table_before: tuple[float, float] | None = None
     _thinned: dict[str, int] = field(default_factory=dict)
 
     def forget(self) -> None:
@@ -65,11 +67,27 @@ class Evidence:
         self.estimates.clear()
         self.samples.clear()
         self.health.clear()
-        self.table = None
+        self.table = self._table_before = None
 
     def axes(self, t: float) -> Axes | None:
         """The newest word on the axes up to a moment."""
         return next((one for one in reversed(self.health) if one.t <= t), None)
+
+    def table_says(self, t: float, omega: float) -> None:
+        """What a driven table reads on itself, rad/s."""
+        self._table_before, self.table = self.table, (t, omega)
+
+    def steady(self, t: float) -> float | None:
+        """What a driven table says, rad/s, where it has said it twice and lately."""
+        if self.table is None or self._table_before is None:
+            return None
+        (before, first), (at, omega) = self._table_before, self.table
+        fresh = t - at < TABLE_FRESH and at - before < TABLE_FRESH
+        return omega if fresh and abs(omega - first) < STEADY else None
+
+    def votes(self, t: float) -> list[Estimate]:
+        """Estimators that know the rate without the tachometer."""
+        return [one for one in self.newest(t) if not one.aided and (one.valid or one.still)]
 
     def add_pulse(self, seen: Pulse) -> None:
         """One rate of the tachometer."""
@@ -119,6 +137,10 @@ class Evidence:
             if one.still or one.valid:
                 return Reference(0.0 if one.still else one.omega, True, one.estimator)
         return None
+
+    def overdue(self, t: float) -> bool:
+        """Pulses should have come."""
+        return self._slowed(t) < 1.0 or not any(t - SILENCE < p.t <= t for p in self.pulses)
 
     def _slowed(self, t: float) -> float:
         """At most this share of the rate is left where pulses are overdue: 0 to 1."""

@@ -1,11 +1,12 @@
 """A run of a procedure in the report: facts, and a table of its steps."""
 
-import math
-
 from inertial.constants import MILLI_G
+from logs.figures.names import estimator_title
+from logs.figures.numbers import with_half_width
 from messages.contract import gyrofree_pb2 as pb
 from sessions.procedure.evaluate import Outcome, StepResult
 from sessions.procedure.model import DEG
+from sessions.procedure.run import TROUBLE
 from sessions.report.grids import Grid, deg, number
 
 M = pb.ProcedureStatus
@@ -62,21 +63,30 @@ def steps(outcome: Outcome) -> Grid:
         "result",
     )
     remark = (
-        f"Rates of {outcome.held.plan.procedure.estimator} about z in °/s, over the dwell that"
-        " counts. Attempts: all, and of them spoilt."
+        f"Rates of {estimator_title(outcome.held.plan.procedure.estimator)} about z in °/s, over"
+        " the dwell that counts. Attempts: all, and of them spoilt."
     )
     return Grid("Steps of the procedure", head, rows, remark)
 
 
+def troubles(outcome: Outcome) -> Grid:
+    """Why attempts were spoilt or held, step by step; no rows where nothing was."""
+    rows = [
+        (str(k), one.step.name, why)
+        for k, one in enumerate(outcome.steps, 1)
+        for why in one.record.trouble
+    ]
+    remark = f"In the order they came; of each step the last {TROUBLE} that differ."
+    return Grid("What spoilt or held attempts", ("step", "name", "reason"), rows, remark)
+
+
 def _row(k: int, one: StepResult) -> tuple[str, ...]:
     step, plateau = one.step, one.plateau
-    wanted = f"{step.target / DEG:+.4g} for {step.dwell_s:g} s" if step.kind == "rate" else ""
+    wanted = f"{step.target / DEG:+.4g} °/s for {step.dwell_s:g} s" if step.kind == "rate" else ""
     wanted = wanted or (f"{step.kind}, {step.dwell_s:g} s" if step.dwell_s else step.kind)
     error = "–"
     if plateau is not None:
-        sigma = plateau.standard_error[2]
-        spread = f" ± {2.0 * sigma / DEG:.3f}" if math.isfinite(sigma) else ""
-        error = deg(plateau.error[2]) + spread
+        error = with_half_width(plateau.error[2] / DEG, 2.0 * plateau.standard_error[2] / DEG)
     shaken = number(one.vibration / MILLI_G) if one.vibration is not None else "–"
     turned = one.segment is not None and step.kind != "pose"
     spoilt = f", {one.record.spoilt} spoilt" if one.record.spoilt else ""

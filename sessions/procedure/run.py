@@ -19,6 +19,7 @@ log = logging.getLogger(__name__)
 
 RUNNING, HELD, DONE, ABORTED, STOPPED = "running", "held", "done", "aborted", "stopped"
 OVER = (DONE, ABORTED, STOPPED)
+TROUBLE = 16  # reasons that are kept of a step
 
 
 @dataclass
@@ -29,10 +30,16 @@ class StepRecord:
     spoilt: int = 0
     state: str = "todo"  # todo, active, done, failed, skipped
     reason: str = ""
+    trouble: list[str] = field(default_factory=list)  # why attempts were spoilt or held
     confirmed_by: str = ""
     window: dict[str, int] = field(default_factory=dict)  # epoch, from_us, until_us, *_utc_ns
     figures: list[dict[str, Any]] = field(default_factory=list)
     reference: str = ""
+
+    def went_wrong(self, why: str) -> None:
+        """Keep it, once where it is said again."""
+        if self.trouble[-1:] != [why]:
+            self.trouble = [*self.trouble, why][-TROUBLE:]
 
 
 @dataclass
@@ -47,6 +54,7 @@ class Run:
     own_session: bool
     session: str = ""
     was_recording: bool = False
+    recorded: bool = False  # it should be, now
     state: str = RUNNING
     at: int = -1  # present step
     started_utc_ns: int = 0
@@ -67,6 +75,7 @@ class Run:
         match kind:
             case "session":
                 self.session, self.was_recording = event["id"], event["was_recording"]
+                self.recorded = True
             case "began":
                 self.started_utc_ns = event["utc_ns"]
             case "step":
@@ -74,15 +83,25 @@ class Run:
                 step.state, step.attempts, step.reason = "active", step.attempts + 1, ""
             case "spoilt":
                 step.spoilt, step.reason = step.spoilt + 1, event["reason"]
+                step.went_wrong(event["reason"])
                 self.message = f"{self.plan.steps[k].name}: spoilt: {event['reason']}"
+            case "anew":
+                for one in self.steps:
+                    if one.state == "done" and one.window:
+                        one.state, one.window, one.figures = "todo", {}, []
+                        one.spoilt, one.reference = one.spoilt + 1, ""
+                        one.went_wrong(event["reason"])
             case "failed":
                 step.state, step.reason, self.state = "failed", event["reason"], HELD
+                step.went_wrong(event["reason"])
                 self.message = f"{self.plan.steps[k].name}: {event['reason']}"
             case "done":
                 step.state, step.reason = "done", event.get("text", "")
                 step.window, step.figures = event.get("window", {}), event.get("figures", [])
                 step.confirmed_by = event.get("by", "")
                 step.reference, self.message = event.get("reference", ""), ""
+                if self.plan.steps[k].kind == "record" and not self.plan.steps[k].on:
+                    self.recorded = False
             case "skipped":
                 step.state, step.confirmed_by = "skipped", event["by"]
                 self.state = RUNNING
@@ -93,7 +112,7 @@ class Run:
             case "emergency":
                 self.emergency = True
             case "closed":
-                self.closed = True
+                self.closed, self.message = True, event.get("problem") or self.message
 
 
 class Journal:

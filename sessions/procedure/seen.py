@@ -83,7 +83,14 @@ class TableSays:
     omega: float  # rad/s
 
 
-Seen = Samples | Pulse | Turned | Axes | Line | TableSays
+@dataclass(frozen=True)
+class Trouble:
+    """What goes wrong beside the board: nothing can be measured meanwhile."""
+
+    text: str
+
+
+Seen = Samples | Pulse | Turned | Axes | Line | TableSays | Trouble
 
 
 def of(message: object) -> Seen | None:

@@ -26,9 +26,9 @@ from messages.contract.topics import (
     PROCEDURES,
     RATE,
     TACHO,
-    parse,
 )
 from sessions.procedure import library, seen
+from sessions.procedure.around import Around
 from sessions.procedure.conductor import Conductor
 from sessions.procedure.desk import ProcedureDesk
 from sessions.procedure.driven.description import TableError, described
@@ -83,13 +83,10 @@ class Service:
         self._listening: dict[str, list[zenoh.Subscriber]] = {}
         self._orders: deque[orders.Order[COMMAND, pb.Reply]] = deque()
         self._due: dict[str, float] = {}
-        self._links = subscribe(session, LINK, prefix, self._on_link)
+        self._around = Around(session, prefix, lambda name: self._devices.setdefault(name, 0.0))
         self._taking = orders.take(session, prefix, orders.PROCEDURES, self._on_order, "*")
 
     # --- on Zenoh's threads
-
-    def _on_link(self, key: str, _: pb.LinkStatus) -> None:
-        self._devices.setdefault(parse(key).device, 0.0)
 
     def _on_order(self, order: orders.Order[COMMAND, pb.Reply]) -> None:
         conductor = self._conductors.get(order.device)
@@ -137,6 +134,10 @@ class Service:
         """Orders, data, status; call it every TICK_S."""
         while self._orders:
             self._obey(self._orders.popleft())
+        while self._around.recorder:
+            status = self._around.recorder.popleft()
+            for conductor in self._conductors.values():
+                conductor.recorded.take(status)
         now = time.monotonic()
         for device, conductor in list(self._conductors.items()):
             queue = self._queues[device]
@@ -157,7 +158,7 @@ class Service:
     def close(self) -> None:
         """Stop listening; runs go on with the next life. Driven tables stand meanwhile."""
         self._taking.undeclare()
-        self._links.undeclare()
+        self._around.close()
         for device, conductor in self._conductors.items():
             self._silence(device)
             conductor.drive.stop()
@@ -165,7 +166,7 @@ class Service:
     def abandon(self) -> None:
         """Another process has taken over: say nothing more, least of all to its tables."""
         self._taking.undeclare()
-        self._links.undeclare()
+        self._around.close()
         for device, conductor in self._conductors.items():
             self._silence(device)
             conductor.abandon()
@@ -219,7 +220,8 @@ class Service:
             self._publishers.put(NOTE, device, note)
 
         record = lambda on: desk.record(on, journal)  # noqa: E731
-        conductor = Conductor(journal, self._tables.get(device), say, record)
+        silence = lambda: self._around.silence(device)  # noqa: E731
+        conductor = Conductor(journal, self._tables.get(device), say, record, silence)
         self._ended.pop(device, None)
         self._queues[device] = deque()
         self._conductors[device] = conductor

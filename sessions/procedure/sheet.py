@@ -9,6 +9,7 @@ from typing import Any
 
 from rich.table import Table
 
+from inertial.whole_file import whole
 from messages.text import cell
 from sessions.procedure.batch import COLUMNS, Cell, Unit, marked, remarks, unit_of
 from sessions.report.verdict import load_spec
@@ -50,7 +51,7 @@ def write(units: Sequence[Unit], path: Path) -> None:
     """As CSV, numbers and standard errors in columns of their own; raises OSError."""
     columns = _filled(units)
     names = [f"{key}{end}" for key, *_ in columns for end in ("", "_std_error", "_outlier")]
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with whole(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["unit", "session", "procedure", "verdict", *names])
         for one in units:

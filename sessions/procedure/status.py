@@ -81,6 +81,7 @@ def _add(message: M, step: Step, record, watch: Watch | None, plan) -> None:
         attempts=record.attempts,
         spoilt=record.spoilt,
         confirmed_by=record.confirmed_by,
+        trouble=record.trouble,
         **record.window,
     )
     figures = [(f["name"], f["value"], f["sigma"]) for f in record.figures]

@@ -14,15 +14,25 @@ from enum import Enum
 import numpy as np
 
 from inertial.constants import GRAVITY, MILLI_G
-from sessions.procedure.evidence import TABLE_FRESH, Evidence, Reference
+from sessions.procedure.evidence import Evidence, Reference
 from sessions.procedure.live import Live
 from sessions.procedure.model import DEG, Step
-from sessions.procedure.seen import Axes, Line, Pulse, Samples, Seen, TableSays, Turned
+from sessions.procedure.seen import (
+    Axes,
+    Line,
+    Pulse,
+    Samples,
+    Seen,
+    TableSays,
+    Trouble,
+    Turned,
+)
 
 TICK = 0.05  # s, of the board's clock
 LAG = 0.15  # s, pulses wait for company and estimates are computed
 HOLE = 0.25  # s without samples that spoil a dwell
 FACE = 20.0 * DEG  # rad, between a face and the vertical
+AGAINST_S = 1.5  # s that others may contradict it: its first pulse is late, a table's word is old
 GRAVITY_OFF = 0.15  # of 1, of the specific force of a body at rest
 
 
@@ -56,6 +66,7 @@ class Watch:
     _tick: float = np.nan  # the next look
     _first: float = np.nan  # the first look of this attempt
     _since: float = 0.0  # s, settled
+    _against: float = np.nan  # s, since then the tachometer is contradicted
     _utc: tuple[float, int] = (0.0, 0)  # a moment on both clocks
 
     def then(
@@ -105,16 +116,18 @@ class Watch:
             case Axes() if seen.epoch == self.epoch:
                 self.evidence.health.append(seen)
             case TableSays() if np.isfinite(self.now):
-                self.evidence.table = self.now, seen.omega
+                self.evidence.table_says(self.now, seen.omega)
             case Line() if not seen.connected:
                 self._broken(f"the line to the board is down: {seen.text}".rstrip(": "))
+            case Trouble():
+                self._broken(seen.text)
 
     def _take_samples(self, seen: Samples) -> None:
         first = float(seen.t[0])
         if self.epoch >= 0 and seen.epoch != self.epoch:
             self._broken("the board has restarted")
             self.evidence.forget()
-            self.now, self._tick = -np.inf, np.nan
+            self.epoch, self.now, self._tick = seen.epoch, -np.inf, np.nan
         elif first > self.now + HOLE and np.isfinite(self.now):
             self._broken(f"data lost: {first - self.now:.2f} s without samples")
             self.evidence.samples.clear()
@@ -180,7 +193,7 @@ class Watch:
         axes = self.evidence.axes(t)
         if axes is not None and axes.unfit:
             return "; ".join(text for _, text in axes.unfit)
-        wrong = self._not_posed(t) if self.step.kind == "pose" else self._not_turning_so()
+        wrong = self._not_posed(t) if self.step.kind == "pose" else self._not_turning_so(t)
         if wrong:
             return wrong
         if shaking is None:
@@ -190,10 +203,16 @@ class Watch:
             return f"too much vibration: {found:.0f} mg RMS, at most {most:.0f}"
         return ""
 
-    def _not_turning_so(self) -> str:
+    def _not_turning_so(self, t: float) -> str:
         found, want = self.reference, self.step.target
         if found is None:
             return "the rate is not known: no tachometer has pulsed and no estimator is sure"
+        if contradicted := self._contradicted(t, found):
+            self._against = t if np.isnan(self._against) else self._against
+            if self.state is State.DWELL or t - self._against > AGAINST_S:
+                return contradicted
+        else:
+            self._against = np.nan
         omega, target = found.omega, want
         if not found.signed:
             omega, target = abs(omega), abs(want)
@@ -208,12 +227,39 @@ class Watch:
 
     def _table_differs(self, found: Reference) -> str:
         """A table that takes itself for right: its unit or sign may be described wrongly."""
-        said = self.evidence.table
-        if found.source == "table" or said is None or self.now - said[0] > TABLE_FRESH:
+        said = self.evidence.steady(self.now)
+        if found.source == "table" or said is None:
             return ""
-        if abs(said[1] - self.step.target) > self.step.tolerance:
+        if abs(said - self.step.target) > self.step.tolerance:
             return ""
-        return f"; the table says {said[1] / DEG:+.1f}: look at unit and sign in its description"
+        return f"; the table says {said / DEG:+.1f}: look at unit and sign in its description"
+
+    def _contradicted(self, t: float, found: Reference) -> str:
+        """Who else says something that the tachometer cannot be right with; or empty."""
+        if found.source != "tachometer":
+            return ""
+        allowed = max(self.step.tolerance, 0.1 * abs(found.omega), 2.0 * DEG)
+
+        def off(omega: float) -> float:
+            return abs(omega - found.omega) if found.signed else abs(abs(omega) - abs(found.omega))
+
+        votes, table = self.evidence.votes(t), self.evidence.steady(self.now)
+        if any(off(0.0 if v.still else v.omega) <= allowed + 5.0 * v.sigma for v in votes):
+            return ""
+        if table is not None and off(table) > allowed:
+            other, omega = "the table", table
+        elif table is None and votes and self.evidence.overdue(t):
+            other, omega = votes[0].estimator, votes[0].omega
+        else:
+            return ""
+        if self.evidence.overdue(t):
+            return (
+                f"the tachometer is silent, {other} says {omega / DEG:+.1f} °/s: see to its cable"
+            )
+        return (
+            f"the tachometer says {found.omega / DEG:+.1f} °/s, {other} {omega / DEG:+.1f}: look at"
+            " its pulses per revolution, and at unit and sign in the table's description"
+        )
 
     def _not_posed(self, t: float) -> str:
         if self.reference is not None and abs(self.reference.omega) > 2.0 * DEG:

@@ -144,6 +144,19 @@ class Manifest(BaseModel):
         return sum(count.lost for count in self.keys.values()) + self.overflow
 
 
+def whole(manifest: Manifest | None, *before: Manifest) -> Manifest | None:
+    """That of a session with the counts of those that it goes on with."""
+    if manifest is None or not before:
+        return manifest
+    keys = {key: count.model_copy() for key, count in manifest.keys.items()}
+    for key, count in [item for one in before for item in one.keys.items()]:
+        mine = keys.setdefault(key, KeyCount())
+        mine.messages += count.messages
+        mine.lost += count.lost
+        mine.repeated += count.repeated
+    return manifest.model_copy(update={"keys": keys})
+
+
 def check_id(session: str) -> str:
     """The id itself; raises SessionError for anything that is not one, so that an id can be used as
     a folder name.

@@ -62,7 +62,7 @@ class Recorder:
         self._inbox: deque[tuple[int, str, bytes]] = deque()
         self._orders: deque[Order] = deque()
         self._ask = ask
-        self._fresh = True
+        self._fresh, self._life = True, time.time_ns()
         self._clock = SessionClock()
         self._bytes_in = self._bytes_out = 0  # of the inbox: counted each by one thread
         self._door = Door("recorder", most_devices=self.settings.max_devices)
@@ -307,18 +307,18 @@ class Recorder:
         status = pb.RecorderStatus()
         status.CopyFrom(self._describe(self._store) if self._store else self._last)
         status.recording = self.recording
-        status.header.device = RECORDER
+        status.header.device, status.header.run = RECORDER, self._life
         status.header.utc_ns = self._clock.now_ns()
         status.message = (self._store.error if self._store else "") or self._message
         if self._store is not None:
             steps = self._store.manifest.clock_steps
-            status.clock_steps = len(steps)
-            status.clock_offset_s = sum(step.step_s for step in steps)
+            status.clock_steps, status.clock_offset_s = len(steps), sum(s.step_s for s in steps)
         return status
 
     def _describe(self, store: SessionStore) -> pb.RecorderStatus:
         return pb.RecorderStatus(
             session=store.manifest.id,
+            continues=store.manifest.continues,
             seconds=store.seconds,
             messages=store.messages,
             bytes=store.size,

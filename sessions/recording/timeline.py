@@ -47,11 +47,16 @@ class _Device:
 
 
 def straight(
-    path: Path, damage: Damage | None = None, channels: dict[int, str] | None = None
+    path: Path | tuple[Path, ...],
+    damage: Damage | None = None,
+    channels: dict[int, str] | None = None,
 ) -> Iterator[Recorded]:
-    """What `read` gives, with times on one axis. Raises OSError."""
+    """What `read` gives of one file, or of several that go on with one another, with times on one
+    axis. Raises OSError.
+    """
     timeline = Timeline()
-    yield from map(timeline.place, read(path, damage, channels))
+    for one in (path,) if isinstance(path, Path) else path:
+        yield from map(timeline.place, read(one, damage, channels))
 
 
 class Timeline:

@@ -17,7 +17,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from inertial.whole_file import put_in_place
+from inertial.whole_file import whole
 
 Row = dict[str, Any]
 Work = Callable[[Path], list[Row]]  # an MCAP file -> its rows
@@ -109,6 +109,5 @@ def write_table(out: Path, rows: list[Row]) -> None:
         key=lambda row: (row.get("session", ""), row.get("device", ""), row.get("estimator", "")),
     )
     out.parent.mkdir(parents=True, exist_ok=True)
-    new = out.with_name(out.name + ".new")
-    pq.write_table(pa.Table.from_pylist(rows, schema=COLUMNS), new, compression="zstd")
-    put_in_place(new, out)
+    with whole(out) as draft:
+        pq.write_table(pa.Table.from_pylist(rows, schema=COLUMNS), draft, compression="zstd")

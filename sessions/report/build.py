@@ -5,17 +5,26 @@ same bytes.
 import hashlib
 import json
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from inertial.whole_file import whole_files
 from messages.contract import gyrofree_pb2 as pb
 from sessions.export.table import Progress, silent
-from sessions.procedure.evaluate import Held, Outcome, StepResult, evaluate, held_by, segments
-from sessions.procedure.pages import facts, provenance, steps
-from sessions.recording.manifest import Manifest, SessionError, read_manifest
+from sessions.procedure.evaluate import (
+    Held,
+    Outcome,
+    StepResult,
+    evaluate,
+    held_by,
+    pieces,
+    segments,
+)
+from sessions.procedure.pages import facts, provenance, steps, troubles
+from sessions.recording.manifest import Manifest, SessionError, read_manifest, whole
 from sessions.report.analysis import Analysis, analyse
 from sessions.report.data import Run, load_run
 from sessions.report.document import Extra, compose
@@ -40,12 +49,12 @@ class Report:
 
     def write(self, out: Path, name: str = "report") -> list[Path]:
         """Into the folder `out`, made when absent; raises OSError."""
-        out.mkdir(parents=True, exist_ok=True)
-        files = [out / f"{name}.{form}" for form in ("html", "pdf", "json")]
-        files[0].write_text(self.html, encoding="utf-8")
-        files[1].write_bytes(self.pdf)
-        files[2].write_text(self.json, encoding="utf-8")
-        return files
+        with whole_files(out) as drafts:
+            files = [drafts / f"{name}.{form}" for form in ("html", "pdf", "json")]
+            files[0].write_text(self.html, encoding="utf-8")
+            files[1].write_bytes(self.pdf)
+            files[2].write_text(self.json, encoding="utf-8")
+        return [out / file.name for file in files]
 
 
 @dataclass(frozen=True)
@@ -59,6 +68,7 @@ class Judged:
     checks: list[Check]
     held: Held | None
     outcome: Outcome | None
+    before: dict[Path, Manifest] = field(default_factory=dict)  # files that this one goes on with
 
 
 def judged(
@@ -71,14 +81,17 @@ def judged(
         device, boot = held.status.header.device, held.epoch if boot is None else boot
         if spec == load_spec(None):  # nobody asked for other limits than the procedure's
             spec = Spec(title=held.plan.procedure.title, estimator=held.plan.procedure.estimator)
-    run = load_run(path, device, boot, progress)
-    found = analyse(run, manifest, _parts(held, run))
+    before = pieces(path, manifest, held) if held is not None else {}
+    run = load_run((*before, path), device, boot, progress)
+    found = analyse(run, whole(manifest, *before.values()), _parts(held, run))
     figures = metrics(found, spec.estimator)
     checks, outcome = judge(spec, figures), None
     if held is not None:
         outcome = evaluate(held, found, figures)
         figures, checks = [*figures, *outcome.figures], outcome.checks + checks
-    return Judged(manifest, found, spec, figures, checks, held, outcome)
+    return Judged(
+        whole(manifest, *before.values()), found, spec, figures, checks, held, outcome, before
+    )
 
 
 def build(
@@ -95,10 +108,14 @@ def build(
     if one.outcome is not None:
         extra = Extra(
             facts(one.outcome),
-            [steps(one.outcome)],
+            [steps(one.outcome), troubles(one.outcome)],
             provenance(one.outcome),
             one.outcome.held.status.operator,
         )
+    extra.provenance.extend(
+        (f"SHA-256 of {manifest.id}, which it goes on with", sha256_of(file))
+        for file, manifest in one.before.items()
+    )
     photo = read_photo(path.parent)
     if photo is not None:
         extra.provenance.append(("SHA-256 of the photo", photo.sha256))
@@ -165,6 +182,7 @@ def _json(one: Judged, sha256: str, photo: Photo | None) -> str:
             "operator": status.operator,
             "state": pb.ProcedureStatus.State.Name(status.state),
             "steps": [_step(one) for one in outcome.steps],
+            "before": [manifest.id for manifest in one.before.values()],
         }
     return json.dumps(_plain(content), indent=1, sort_keys=True, ensure_ascii=False) + "\n"
 
@@ -174,7 +192,9 @@ def _parts(held: Held | None, run: Run) -> list[Segment] | None:
     if held is None:
         return None
     pairs = zip(held.plan.steps, segments(held, run), strict=True)
-    found = [part for step, part in pairs if part is not None and step.kind in ("rate", "still")]
+    found = [
+        part for step, part in pairs if isinstance(part, Segment) and step.kind in ("rate", "still")
+    ]
     return found or None
 
 
@@ -189,6 +209,7 @@ def _step(one: StepResult) -> dict[str, Any]:
         "reason": one.record.reason,
         "attempts": one.record.attempts,
         "spoilt": one.record.spoilt,
+        "trouble": list(one.record.trouble),
         "segment": part,
         "error_radps": None if plateau is None else plateau.error[2],
         "standard_error_radps": None if plateau is None else plateau.standard_error[2],

@@ -3,13 +3,12 @@ of the run, by the board's clock (times.py).
 """
 
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from messages.contract.topics import ACCEL, GNSS, INNOVATION, LINK, NAV, RATE, TACHO, parse
-from sessions.export.table import Progress, Selection, Table, silent, tables
+from messages.contract.topics import ACCEL, AXES, GNSS, INNOVATION, LINK, NAV, RATE, TACHO, parse
+from sessions.export.table import Files, Progress, Selection, Table, files, silent, tables
 from sessions.recording.mcap_damage import Damage
 from sessions.report.times import Times
 
@@ -55,6 +54,7 @@ class Rate:
     nis_dof: Array
     still: Array  # bool
     calibration: str
+    sight: Array | None = None  # (n, 3) RateEstimate.Sight; None where nobody says
 
 
 @dataclass(frozen=True)
@@ -98,6 +98,7 @@ class Run:
         default_factory=lambda: np.zeros((0, 4))
     )  # t, latitude rad, longitude rad, height m
     link: dict[str, float] = field(default_factory=dict)  # last ledger of the line
+    states: list[tuple[float, str, str]] = field(default_factory=list)  # s, axis, its new state
     said: tuple[str, ...] = ()  # sentences about damage of the recording
     whole: bool = True  # nothing of the recording is missing or unreadable
 
@@ -118,22 +119,24 @@ FIELDS = {  # of long tables: what a report is made of
         "nis_dof",
         "still",
         "calibration",
+        "sight",
     ),
     NAV.name: ("epoch", "device_us", "p_ned_m", "v_n_mps", "sigma"),
     INNOVATION.name: ("epoch", "device_us", "nis", "dof", "accepted"),
+    AXES.name: ("epoch", "device_us", "axes"),
 }
-WANTED = frozenset(topic.name for topic in (ACCEL, TACHO, RATE, NAV, INNOVATION, GNSS, LINK))
+WANTED = frozenset(topic.name for topic in (ACCEL, TACHO, RATE, NAV, INNOVATION, GNSS, LINK, AXES))
 
 
 def load_run(
-    path: Path, device: str = "", boot: int | None = None, progress: Progress = silent
+    path: Files, device: str = "", boot: int | None = None, progress: Progress = silent
 ) -> Run:
     """The longest boot (or the named one) of a device (default: the one with most samples) of a
-    recording.
+    recording, also of one that goes on from file to file.
 
     Raises ReportError when there is no such device or boot, or no estimate at all; OSError.
     """
-    damage = Damage()
+    damage, last = Damage(), files(path)[-1]
     found = tables(path, Selection(WANTED, fields=FIELDS), progress, damage)
     devices: dict[str, int] = {}
     for key, table in found.items():
@@ -143,17 +146,17 @@ def load_run(
     if not devices:
         why = "".join(f"; {text}" for text in damage.said())
         raise ReportError(
-            f"{path}: no samples and no estimates of any device; nothing to report on{why}"
+            f"{last}: no samples and no estimates of any device; nothing to report on{why}"
         )
     device = device or max(sorted(devices), key=lambda name: devices[name])
     if device not in devices:
-        raise ReportError(f"{path}: no device {device!r}; there is {', '.join(sorted(devices))}")
+        raise ReportError(f"{last}: no device {device!r}; there is {', '.join(sorted(devices))}")
     mine = {key: table for key, table in found.items() if parse(key).device == device}
     timed = [table for key, table in mine.items() if parse(key).topic in (ACCEL, RATE, NAV)]
     lengths = _boots(timed)
     if boot is not None and boot not in lengths:
         raise ReportError(
-            f"{path}: no boot {boot} of {device}; there are {', '.join(map(str, sorted(lengths)))}"
+            f"{last}: no boot {boot} of {device}; there are {', '.join(map(str, sorted(lengths)))}"
         )
     epoch = boot if boot is not None else max(sorted(lengths), key=lambda b: round(lengths[b], 1))
     run = _run(mine, device, epoch, tuple(sorted(lengths)))
@@ -207,6 +210,7 @@ def _run(mine: dict[str, Table], device: str, epoch: int, boots: tuple[int, ...]
             _corrections(name, table, times) for name, table in by_topic.get(INNOVATION.name, [])
         ],
         fixes=_fixes(only(GNSS.name), times),
+        states=_states(only(AXES.name), times),
         link={name: float(link.data[name][-1]) for name in LEDGER} if link else {},
     )
 
@@ -237,6 +241,20 @@ def _tacho(table: Table | None, times: Times) -> Tacho | None:
     return Tacho(times.of(table), table.data["omega_radps"], table.data["sigma_radps"])
 
 
+def _states(table: Table | None, times: Times) -> list[tuple[float, str, str]]:
+    """When an axis began to be called something else, "STUCK", and which."""
+    if table is None:
+        return []
+    t, found = times.of(table), []
+    for name, column in table.data.items():
+        if not (name.startswith("axes_") and name.endswith("_state")):
+            continue
+        axis = name.removeprefix("axes_").removesuffix("_state")
+        changed = np.flatnonzero(np.r_[True, column[1:] != column[:-1]])
+        found += [(float(t[k]), axis, str(column[k]).removeprefix("STATE_")) for k in changed]
+    return sorted(found)
+
+
 def _xyz(table: Table, name: str, ends: tuple[str, ...] = XYZ) -> Array:
     return table.vector(*(f"{name}_{end}" for end in ends))
 
@@ -259,7 +277,14 @@ def _rate(name: str, table: Table, times: Times) -> Rate:
         nis_dof=table.data["nis_dof"],
         still=table.data["still"] > 0,
         calibration=str(cards[-1]) if cards is not None else "",
+        sight=_sight(table),
     )
+
+
+def _sight(table: Table) -> Array | None:
+    """What the estimator says of x, y, z (n, 3); None in recordings where none says it."""
+    said = [f"sight_{axis}" for axis in XYZ]
+    return table.vector(*said) if set(said) <= table.data.keys() else None
 
 
 def _navigation(name: str, table: Table, times: Times) -> Navigation:

@@ -7,10 +7,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 
+from logs.figures.names import estimator_title
+from logs.figures.numbers import with_half_width
 from sessions.recording.manifest import Manifest
 from sessions.report.analysis import Analysis
 from sessions.report.figures import Picture
 from sessions.report.grids import (
+    HYPHEN,
     Grid,
     biases,
     completeness,
@@ -21,9 +24,19 @@ from sessions.report.grids import (
     plateaus,
     positions,
     scale_factors,
+    spelt,
     stability,
 )
 from sessions.report.verdict import Check, Spec, overall
+
+UNITS = {
+    "dps": "°/s",
+    "deg": "°",
+    "ppm": "ppm",
+    "mg": "mg",
+    "m": "m",
+    "s": "s",
+}  # by the end of a figure's name
 
 
 @dataclass(frozen=True)
@@ -86,7 +99,7 @@ def compose(
         verdict=overall(checks),
         facts=extra.facts + _facts(found, manifest, spec),
         checks=[_check(check) for check in checks],
-        grids=[grid for grid in grids if grid is not None and grid.rows],
+        grids=[spelt(grid) for grid in grids if grid is not None and grid.rows],
         pictures=drawn,
         provenance=extra.provenance + _provenance(found, manifest, sha256),
         signed=(
@@ -114,7 +127,7 @@ def _facts(found: Analysis, manifest: Manifest | None, spec: Spec) -> list[tuple
         ("Start (UTC)", start),
         ("Length", f"{run.seconds:.2f} s"),
         ("Source of the data", _sources(manifest)),
-        ("Judged by", f"{spec.title}, estimator {spec.estimator}"),
+        ("Judged by", f"{spec.title}, estimator {estimator_title(spec.estimator)}"),
     ]
     if found.cube is not None and found.cube.tilt is not None:
         facts.append(("Tilt of the table's axis", f"{deg(found.cube.tilt, 2)}°"))
@@ -136,9 +149,11 @@ def _check(check: Check) -> tuple[str, str, str, str]:
     limits = f"{number(low)} to {number(high)}" if low is not None and high is not None else ""
     limits = limits or (f"≥ {number(low)}" if low is not None else f"≤ {number(high)}")
     limits = "measured" if low is None and high is None else limits
-    value = number(check.value, 4)
-    if check.value is not None and check.sigma is not None and math.isfinite(check.sigma):
-        value += f" ± {number(2.0 * check.sigma, 2)}"
+    value, unit = "–", UNITS.get(check.name.rpartition("_")[2], "")
+    if check.value is not None and math.isfinite(check.value):
+        half = math.nan if check.sigma is None else 2.0 * check.sigma
+        value = f"{with_half_width(check.value, half, 4)} {unit}".rstrip()
+    limits = HYPHEN.sub("−", limits)
     name = f"{check.text} ({check.name})" if check.text else check.name
     return (
         name,

@@ -1,15 +1,18 @@
 """The tables of a report, each made of what was analysed; empty ones are left out."""
 
 import math
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from logs.figures.names import estimator_title
+from logs.figures.numbers import with_half_width
 from sessions.recording.manifest import Manifest
 from sessions.report.analysis import Analysis
 
 AXES = "xyz"
+HYPHEN = re.compile(r"(?<![\w.-])-(?=\.?\d)")  # before a number, and part of nothing else
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,16 @@ def deg(value: float | None, places: int = 3) -> str:
     return "–" if value is None or not math.isfinite(value) else f"{math.degrees(value):.{places}f}"
 
 
+def percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
+
+
+def spelt(grid: Grid) -> Grid:
+    """With a minus that is one; hyphens of names and dates stay."""
+    rows = [tuple(HYPHEN.sub("−", cell) for cell in row) for row in grid.rows]
+    return replace(grid, rows=rows)
+
+
 def plateaus(found: Analysis) -> Grid | None:
     rows = [
         (
@@ -42,7 +55,8 @@ def plateaus(found: Analysis) -> Grid | None:
             f"{part.segment.settle:.2f}",
             deg(part.segment.omega),
             str(part.samples),
-            deg(part.mean[2]),
+            percent(part.vouched),
+            deg(part.mean[2]) if part.vouched else "–",
             deg(part.error[2]),
             deg(part.standard_error[2]),
             " ".join(deg(value, 2) for value in part.rms),
@@ -56,6 +70,7 @@ def plateaus(found: Analysis) -> Grid | None:
         "settling, s",
         "reference",
         "n",
+        "valid",
         "mean ω_z",
         "error",
         "std. error",
@@ -63,7 +78,7 @@ def plateaus(found: Analysis) -> Grid | None:
     )
     remark = (
         "Rates in °/s. Plateaus are found from the tachometer alone; 0.25 s at both ends are left"
-        " out."
+        " out. Valid: share for which the estimator vouches."
     )
     return Grid("Rate error on every plateau", head, rows, remark)
 
@@ -78,10 +93,10 @@ def scale_factors(found: Analysis) -> Grid | None:
         rows.append(
             (
                 estimator_title(rate.name),
-                f"{fit.scale_factor:.6f} ± {2 * fit.scale_factor_sigma:.6f}",
+                with_half_width(fit.scale_factor, 2 * fit.scale_factor_sigma, 7),
                 f"{fit.linearity_ppm:,.0f}",
                 asymmetry,
-                f"{deg(fit.bias)} ± {deg(2 * fit.bias_sigma)}",
+                with_half_width(math.degrees(fit.bias), math.degrees(2 * fit.bias_sigma)),
                 f"{fit.cross_axis[0] * 1e3:.2f}, {fit.cross_axis[1] * 1e3:.2f}",
                 " ".join(deg(value, 2) for value in rate.rms) if rate.rms is not None else "–",
                 deg(rate.angle_error, 2),
@@ -95,7 +110,7 @@ def scale_factors(found: Analysis) -> Grid | None:
         "bias, °/s",
         "cross-axis x, y, mrad",
         "RMS x y z, °/s",
-        "angle error, deg",
+        "angle error, °",
     )
     remark = (
         "indicated = bias + scale factor × reference, weighted least squares over all plateaus and"
@@ -135,7 +150,7 @@ def positions(found: Analysis) -> Grid | None:
         "error N E D, m",
         "norm, m",
         "bias left in by (27), m",
-        "equivalent drift, deg/h",
+        "equivalent drift, °/h",
     )
     remark = "The cube stays in its place, so all of its unaided position is error."
     return Grid("Unaided inertial position", head, rows, remark)

@@ -37,6 +37,7 @@ class Plateau:
     error: Array  # (3,) mean minus reference (0, 0, omega)
     standard_error: Array  # (3,) of the mean
     rms: Array  # (3,) RMS of estimate minus reference within the segment
+    vouched: float = 1.0  # share of the samples whose rate about z the estimator vouches for
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,7 @@ def plateaus(rate: Rate, segments: list[Segment], tacho: Tacho) -> list[Plateau]
                 error=error.mean(axis=0),
                 standard_error=batch_error(t, error),
                 rms=np.sqrt((error**2).mean(axis=0)),
+                vouched=1.0 if rate.sight is None else float(1.0 - (rate.sight[at, 2] > 0).mean()),
             )
         )
     return found

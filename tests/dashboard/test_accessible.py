@@ -4,6 +4,8 @@ and tabs that work, one switch for dark and light.
 
 import contextlib
 import re
+import shutil
+import sys
 import threading
 from types import SimpleNamespace
 
@@ -12,17 +14,28 @@ from playwright.sync_api import expect
 from support.browser import visit as opened
 from support.feeder import UTC0_NS, Feeder
 from support.front_door import open_door, wait_for
+from support.table_session import SESSION, table_recording, table_root
 
 from dashboard.data.store import Store
 from dashboard.desk import Desk
 from dashboard.scene.panels import PAGES
 from dashboard.scene.service import OWN_INPUTS, start
+from dashboard.web.jobs import Jobs
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
+from sessions.recording.mcap_log import read
+from sessions.replay.rerun import write_session
 
 axe_of = pytest.importorskip("axe_playwright_python.sync_playwright")
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
 
+AGAIN = f"{SESSION}-again"
+FOREIGN = {  # as a German spreadsheet saves a log
+    "name": "fremd.csv",
+    "mimeType": "text/csv",
+    "buffer": b"Zeit [s];Acc X [g];Acc Y [g];Acc Z [g]\n"
+    + b"".join(b"%d,0;0,01;0,02;1,00\n" % k for k in range(40)),
+}
 SIZES = {"desk": (1440, 900), "tablet": (1024, 768), "narrow": (768, 1024), "phone": (390, 844)}
 # elements that hide a part of their own text; those that scroll are meant to
 CLIPPED = """() => [...document.querySelectorAll('body *')].filter((e) => {
@@ -32,6 +45,19 @@ CLIPPED = """() => [...document.querySelectorAll('body *')].filter((e) => {
   if (e.closest('#webgl-software-rendering') || style.clipPath !== 'none') return false;
   return e.scrollWidth > e.clientWidth + 1 && !['auto', 'scroll'].includes(style.overflowX);
 }).map((e) => `${e.tagName} ${e.id} ${e.className}: ${e.textContent.slice(0, 60)}`)"""  # noqa: E501
+
+# elements of a plain page with text outside of the window, where nothing scrolls
+OUTSIDE = """() => [...document.querySelectorAll('main *')].filter((e) => {
+  if (![...e.childNodes].some((n) => n.nodeType === 3 && n.data.trim()) || !e.getClientRects().length) return false;
+  for (let one = e; one; one = one.parentElement) {
+    const style = getComputedStyle(one);
+    if (['auto', 'scroll'].includes(style.overflowX) || style.clipPath !== 'none') return false;
+  }
+  const words = document.createRange();
+  words.selectNodeContents(e);
+  const { left, right } = words.getBoundingClientRect();
+  return left < -1 || right > document.documentElement.clientWidth + 1;
+}).map((e) => `${e.tagName} outside: ${e.textContent.slice(0, 60)}`)"""  # noqa: E501
 
 
 class Into:
@@ -75,6 +101,10 @@ def door(tmp_path_factory):
     store, desk = Store(), Desk(None, "gyrofree")
     handle = start(SimpleNamespace(viser_port=0), store, desk)
     folder = tmp_path_factory.mktemp("door")
+    jobs = Jobs([sys.executable, "-m", "gyrofree"], [])  # there is an import, but none is made
+    shutil.copytree(table_root() / SESSION, folder / "sessions" / SESSION)
+    rows = ((row.log_ns, row.key, row.payload) for row in read(table_recording()))
+    write_session(folder / "sessions", AGAIN, rows, "", {})
     try:
         with (
             fed(store),
@@ -84,12 +114,14 @@ def door(tmp_path_factory):
                 scene_at=handle.port,
                 store=store,
                 desk=desk,
+                jobs=jobs,
                 open_labels=OWN_INPUTS,
             ) as opened,
         ):
             yield opened
     finally:
         handle.stop()
+        jobs.close()
 
 
 @contextlib.contextmanager
@@ -122,6 +154,13 @@ def serious(where, rules=None):
         for one in found
         if one["impact"] in ("serious", "critical")
     ]
+
+
+def looked_at(page, size):
+    """What is wrong with a plain page."""
+    wide = page.evaluate("document.documentElement.scrollWidth") > SIZES[size][0]
+    found = serious(page) + page.evaluate(CLIPPED) + page.evaluate(OUTSIDE)
+    return found + ["wider than the window"] * wide
 
 
 @pytest.mark.parametrize("scheme, size", [("dark", "desk"), ("light", "phone")])
@@ -166,12 +205,37 @@ def test_no_width_clips_the_bars_or_the_summary(chromium, door, size):
 
 
 def test_the_plain_pages_have_no_serious_finding(chromium, door):
-    for scheme in ("dark", "light"):
-        with visit(chromium, door, user="anna", scheme=scheme) as (page, _):
-            for path in ("/sessions", "/users", "/words", "/api/docs"):
+    plotted = "() => document.body.dataset.plotted === 'done'"
+    paths = {
+        "/sessions": "main",
+        f"/sessions/{SESSION}": plotted,
+        f"/compare?ids={SESSION},{AGAIN}": plotted,
+        "/trend": "main",
+        "/users": "main",
+        "/words": "main",
+        "/api/docs": "main",
+        "/there/is/none": "main",
+    }
+    for scheme, size in (("dark", "desk"), ("light", "phone")):
+        viewport = dict(zip(("width", "height"), SIZES[size], strict=True))
+        with opened(chromium, door, "anna", "/words", viewport, color_scheme=scheme) as (page, _):
+            for path, there in paths.items():
                 page.goto(door.url + path)
-                assert not serious(page), path
-                assert not page.evaluate(CLIPPED), path
+                (page.wait_for_function if "=>" in there else page.wait_for_selector)(there)
+                fault = looked_at(page, size)
+                assert not fault, (path, fault)
+            page.goto(door.url + "/sessions")
+            page.click(".import summary")
+            page.set_input_files("input[name=files]", FOREIGN)
+            page.click("#import button")
+            page.wait_for_selector("#import-preview td select >> visible=true")
+            assert not looked_at(page, size)
+        with opened(chromium, door, "", "/login", viewport, color_scheme=scheme) as (page, _):
+            page.fill("input[name=name]", "otto")
+            page.fill("input[name=password]", "not this one")
+            page.click("button >> text=Sign in")
+            page.wait_for_selector(".fault")
+            assert not looked_at(page, size)
 
 
 def test_keys_work_wherever_the_focus_is_and_d_moves_no_camera(chromium, door):

@@ -76,7 +76,7 @@ def test_viewer_and_missing_token_cannot_give_orders(door: Door):
     with door.client("vera") as client:
         for order in orders:
             answer = client.post(f"/api/{order}", json={})
-            assert answer.status_code == 403 and "takes operator" in answer.json()["error"]
+            assert answer.status_code == 403 and "takes the role operator" in answer.json()["error"]
     with door.client("otto") as client:
         del client.headers["x-csrf-token"]
         for order in orders:

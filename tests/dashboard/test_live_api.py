@@ -83,7 +83,7 @@ def test_a_token_gives_what_its_role_gives_and_no_page(door):
     with bearer(door, secret) as client:
         assert client.get("/api/me").json() == {"user": "vera", "role": "viewer", "csrf": ""}
         refused = client.post("/api/recording/start", json={})
-        assert refused.status_code == 403 and "takes operator" in refused.json()["error"]
+        assert refused.status_code == 403 and "takes the role operator" in refused.json()["error"]
         assert client.get("/users").status_code == 401  # pages are for people
         assert client.post("/users/tokens", data={"user": "vera"}).status_code == 401
     operator, _ = token_of(door, "otto", "operator")

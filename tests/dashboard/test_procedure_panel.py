@@ -19,6 +19,7 @@ def running(state=M.STATE_RUNNING, kind="rate") -> M:
     m.header.device, m.header.utc_ns = "cube", 1_767_323_045_000_000_000
     m.offered[:] = ["published-30s", "six-poses"]
     step = m.steps.add(name="<b>fast", kind=kind, state=M.Step.STATE_DWELL, spoilt=1)
+    step.trouble[:] = ["the <u>router is gone", "too much vibration: " + 20 * "much "]
     step.figures.add(name="rate_error_dps", value=2.0, sigma=0.1, min=-1.0, max=1.0)
     step.figures.add(name="vibration_mg", value=float("nan"), sigma=float("nan"))
     return m
@@ -27,17 +28,18 @@ def running(state=M.STATE_RUNNING, kind="rate") -> M:
 def test_content_shows_steps_beside_their_limits_and_escapes_what_comes():
     page = content(running(), False, True)
     assert "&lt;b&gt;fast" in page and "&lt;i&gt;x" in page and "width:25%" in page
-    assert "✗ error +2 ± 0.2 °/s (-1 to 1)" in page and "vibration not told" in page
-    assert "1× spoilt" in page and "/sessions/s-1" not in page
+    assert "✗ error 2.00 ± 0.20 °/s (−1 to 1)" in page and "vibration –" in page
+    assert "1× spoilt: too much vibration" in page and "the &lt;u&gt;router is gone; too" in page
+    assert "/sessions/s-1" not in page
     assert "/sessions/s-1" in content(running(M.STATE_DONE), False, True)
     assert "silent" in content(running(), True, True)
 
 
 def test_a_figure_with_one_limit_or_none():
     one = M.Figure(name="vibration_mg", value=3.0, sigma=float("nan"), max=5.0)
-    assert "✓ vibration +3 mg (≤ 5)" in figure(one)
+    assert "✓ vibration 3 mg (≤ 5)" in figure(one)
     free = M.Figure(name="force_error_mg", value=3.0, sigma=1.0)
-    assert "✓" not in figure(free) and "± 2 mg" in figure(free)
+    assert "✓" not in figure(free) and "3.0 ± 2.0 mg" in figure(free)
 
 
 def test_orders_follow_the_state_and_the_stop_is_always_there(free_port):

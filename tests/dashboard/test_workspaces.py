@@ -21,6 +21,8 @@ from dashboard.data.store import Store
 from dashboard.desk import Desk
 from dashboard.scene.drawing.labels import free, pixels
 from dashboard.scene.panels import PAGES
+from dashboard.scene.panels.base import Snapshot
+from dashboard.scene.panels.device.devices import state_of
 from dashboard.scene.panels.motion.innovations import verdict
 from dashboard.scene.view import KEYS, View
 from dashboard.scene.workspaces import LAYERS, WORKSPACES, Wish, offered
@@ -28,6 +30,7 @@ from dashboard.web.auth import Role
 from dashboard.web.frame.scene_messages import ROLE, Widgets, may_send
 from dashboard.web.pages import own_path
 from dashboard.web.views import Views
+from inertial.rate.batch import Phase
 from logs.figures.words import glossary_link, words_of
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
@@ -104,7 +107,7 @@ def test_a_page_that_is_offered_shows_something(view, store):
                 view.tick_panels()
                 assert state(view)["missing"] == "" and state(view)["page"] == page["key"]
                 for words in said(view):
-                    text = re.sub('<span class="gf-name">[^<]*<', "<", words)  # of channels
+                    text = re.sub('<span class="gf-channel">[^<]*<', "<", words)  # of channels
                     there = words_of([re.sub("<[^>]*>", " ", text)])
                     assert all(f'href="{glossary_link(word)}"' in words for word in there), words
 
@@ -245,6 +248,25 @@ def test_what_is_wrong_is_an_alarm_with_a_reason_and_a_page_that_exists(store):
 def test_an_axis_that_is_only_looked_into_is_no_alarm(store):
     store.put(tp.AXES, "cube-01", "", health(state=pb.AxisHealth.STATE_SUSPECT))
     assert "axis" not in kinds(store)
+
+
+@pytest.mark.parametrize("phase", Phase)
+@pytest.mark.parametrize("still", [True, False])
+def test_no_table_says_still_beside_a_rate(store, phase, still):
+    """The status comes once a second, the samples a hundred times: the newer word counts."""
+    batch = pb.RateBatch(
+        header=pb.Header(utc_ns=UTC),
+        estimator=ORDER,
+        omega_ib_b_radps=[0.0, 0.0, 0.0 if still else 1.0],
+        omega_covariance=np.eye(3).ravel(),
+        sight=[pb.RateEstimate.SIGHT_VALID] * 3,
+        still=[still],
+    )
+    store.put(tp.RATE, "cube-01", ORDER, batch)
+    status = pb.EstimatorStatus(header=pb.Header(utc_ns=UTC), state=phase.text)
+    store.put(tp.ESTIMATOR, "cube-01", ORDER, status)
+    shown = Snapshot(store, store.device("cube-01"), 0.0, 1.0, time.monotonic(), True)
+    assert still or "still" not in state_of(shown, ORDER).replace("keep still", "")
 
 
 @pytest.mark.parametrize("sight", pb.RateEstimate.Sight.values())

@@ -371,6 +371,17 @@ def test_what_is_heard_is_said():
     assert said() == ""
 
 
+def test_silence_is_no_wait_for_a_position():
+    """A receiver that is plugged in late gets its time."""
+    decoder, heard = GnssDecoder(), Heard()
+    for second in range(12):
+        assert heard.say(100.0 + second, counts_of(decoder, 0, 0), []) == ""
+    decoder.feed(sentence(gga(at(1))))
+    assert heard.say(112.0, counts_of(decoder, 0, 0), []) == ""
+    decoder.feed(sentence(gga(at(2))))
+    assert "no position" in heard.say(117.0, counts_of(decoder, 0, 0), [])
+
+
 def test_all_is_well_is_silence_and_a_refusal_is_still_said():
     good = sentence(gga(at(1))) + sentence(rmc(at(1)))
     assert said(good, placed=1) == ""

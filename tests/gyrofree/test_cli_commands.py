@@ -107,6 +107,10 @@ WRONG = (
     "calibrate show rubbish.json",
     "calibrate apply nowhere.json nowhere.csv",
     "sessions list --config nowhere.toml",
+    "sessions list --config a_file_as_root.toml",
+    "sessions compare 20990101-000000 20990101-000001 --config a_file_as_root.toml",
+    "replay --list --config a_file_as_root.toml",
+    "sessions retain --config a_file_as_root.toml",
 )
 
 
@@ -115,6 +119,7 @@ def test_what_is_wrong_is_said_in_few_words(line, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name in ("rubbish.csv", "rubbish.mcap", "rubbish.json"):
         (tmp_path / name).write_bytes(b"\x00\xffthis is not what you want\n1,2,3\n")
+    (tmp_path / "a_file_as_root.toml").write_text('[recorder]\nroot = "rubbish.csv"\n')
     result = gyrofree(*line.split())
     assert result.exit_code not in (0, None)
     assert result.exception is None or isinstance(result.exception, SystemExit), repr(

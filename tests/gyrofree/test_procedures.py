@@ -155,17 +155,34 @@ def test_a_run_ends_with_a_report_of_its_steps_and_the_same_bytes(bench):
     assert b"SN-1" in first[".html"] and m.sha256.encode() in first[".html"]
 
 
-def test_a_killed_service_goes_on_where_it_was(bench):
+def test_killed_recorder_and_service_spoil_what_ran_and_the_report_is_whole(bench):
+    """Both with -9 within the dwell; the run goes on in the recording that goes on."""
     bench.start("longer")
-    m = bench.until(lambda m: m.step == 1 and m.steps[1].state == M.Step.STATE_DWELL)
+
+    def dwelling(m: M) -> bool:
+        return m.step == 1 and m.steps[1].state == M.Step.STATE_DWELL
+
+    m = bench.until(dwelling)
+    os.kill(bench.demo.children()["record"].pid, signal.SIGKILL)
+    bench.until(lambda m: m.step == 1 and m.steps[1].spoilt)
+    bench.until(lambda m: dwelling(m) and m.steps[1].spoilt)
     os.kill(bench.demo.children()["procedures"].pid, signal.SIGKILL)
     end = bench.ended()
-    assert (end.run, end.session, end.state) == (m.run, m.session, M.STATE_DONE), end.message
-    spoilt = [s.spoilt for s in end.steps]  # by a machine that had no time for the samples
-    assert [s.attempts for s in end.steps] == [1 + spoilt[0], 2 + spoilt[1], 1 + spoilt[2]]
+    assert (end.run, end.state) == (m.run, M.STATE_DONE), end.message
+    assert end.session != m.session
+    spoilt = [s.spoilt for s in end.steps]  # by a machine that had no time for the samples, too
+    assert [s.attempts for s in end.steps] == [1 + n for n in spoilt] and spoilt[1] >= 2
+    told = " ".join(end.steps[1].trouble)
+    # The recorder comes back before its silence is noticed, or after.
+    assert "recorder" in told and "procedures service was cut off" in told
     assert end.steps[1].until_us - end.steps[1].from_us == 6_000_000
-    # The table was driven all the while; the first step's window is still the one before the kill.
+    # The table was driven all the while; the first step's window is still the one before the kills.
     assert end.steps[0].until_us == m.steps[0].until_us < end.steps[1].from_us
+    first, again = bench.report(end.session), bench.report(end.session)
+    assert first == again and b"procedures service was cut off" in first[".html"]
+    said = json.loads(first[".json"])
+    assert said["procedure"]["before"] == [m.session]
+    assert all(step["segment"] is not None for step in said["procedure"]["steps"])
 
 
 def test_a_table_stops_by_itself_when_its_driver_hangs_and_the_step_is_repeated(bench):

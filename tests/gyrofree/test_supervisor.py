@@ -11,6 +11,7 @@ import pytest
 from rich.console import Console
 
 from gyrofree.running.supervisor import Supervisor
+from gyrofree.running.watch import BEGINNING, QUIET, SCREENFUL, _Greeter
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -125,3 +126,37 @@ def test_two_signals_at_once_end_a_service_that_sleeps():
             assert child.wait(30) == 0
         finally:
             child.kill()
+
+
+def test_what_a_child_waits_for_is_no_news_before_it_is_there(supervisor):
+    lines = "print('/b: not there'); print('/b: open'); print('/b: not there', flush=True)"
+    supervisor.add("gateway", f"{lines}; import time; time.sleep(60)", hushed=("/b: not", "/b: op"))
+    supervisor.start()
+    until(supervisor, lambda: "/b: not there" in text(supervisor))
+    shown = [line for line in text(supervisor).splitlines() if "/b" in line]
+    assert len(shown) == 2 and "open" in shown[0] and "not there" in shown[1]
+
+
+def test_the_address_is_said_again_below_what_covers_it(supervisor, monkeypatch):
+    now = [1000.0]
+    monkeypatch.setattr("gyrofree.running.watch.time.monotonic", lambda: now[0])
+    greeter = _Greeter(supervisor, lambda: [("open  here", "bold")])
+
+    def said_after(seconds):
+        before = text(supervisor).count("open  here")
+        now[0] += seconds
+        greeter.look()
+        return text(supervisor).count("open  here") - before
+
+    greeter.say()
+    assert said_after(QUIET + 1) == 0  # nothing covers it
+    supervisor.say("board: open")
+    assert said_after(QUIET / 2) == 0 and said_after(QUIET) == 1
+    now[0] += BEGINNING
+    supervisor.say("board: run ended")
+    assert said_after(QUIET + 1) == 0  # one line does not cover it any more
+    for k in range(SCREENFUL):
+        supervisor.say(f"line {k}")
+    assert said_after(QUIET + 1) == 0  # a file is no screen
+    supervisor.console._force_terminal = True
+    assert said_after(QUIET + 1) == 1 and said_after(QUIET + 1) == 0

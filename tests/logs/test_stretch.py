@@ -2,7 +2,12 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
 
+from logs.figures.numbers import with_half_width
+from logs.figures.sight import WORDS, vouched, word
 from logs.figures.stretch import stretch
 
 
@@ -31,3 +36,31 @@ def test_what_few_samples_do_not_tell_is_not_said(n):
     found = stretch(np.zeros(n), np.ones(n), -1.0, 1.0)
     assert found["n"] == n and found["slope"] is None  # at one moment
     assert (found["mean"] is None) == (n == 0) and (found["sigma"] is None) == (n < 2)
+
+
+@given(hnp.arrays(float, 40, elements=st.sampled_from([0.0, 1.0, 2.0, 7.0, np.nan])), st.data())
+def test_what_an_estimator_does_not_vouch_for_is_in_no_figure(sight, data):
+    """Whatever stands at those samples, the figures are the same, and one says how many count."""
+    t, y = np.arange(40.0), np.sin(np.arange(40.0))
+    found = stretch(t, y, 0.0, 40.0, sight)
+    unsure = sight > 0
+    assert found["of"] == 40 and found["n"] == 40 - unsure.sum()
+    assert (found["word"] in WORDS[1:]) == unsure.any()
+    assert (found["mean"] is None) == unsure.all()
+    wild = data.draw(st.sampled_from([np.nan, np.inf, 1e30, -5.0]))
+    other = stretch(t, np.where(unsure, wild, y), 0.0, 40.0, sight)
+    assert {k: v for k, v in other.items() if k != "of" and k != "word"} == {
+        k: v for k, v in found.items() if k != "of" and k != "word"
+    }
+    assert np.isnan(vouched(y, sight)).tolist() == unsure.tolist()
+
+
+def test_every_sight_has_a_word_and_what_is_not_said_has_none():
+    assert [word(k) for k in (0, 1, 2, 3, np.nan)] == ["", "ambiguous", "blind", "blind", ""]
+
+
+def test_a_number_has_no_digits_below_its_uncertainty():
+    assert with_half_width(0.00201, 0.0014) == "0.0020 ± 0.0014"
+    assert with_half_width(-0.1784, 0.192) == "−0.18 ± 0.19"
+    assert with_half_width(171.03, 12.0) == "171 ± 12"
+    assert with_half_width(4.358, np.nan) == "4.36"

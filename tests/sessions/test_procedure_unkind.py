@@ -40,7 +40,7 @@ IDENTITY = "gyrofree,simulated rate table"
 class SlowTable:
     """A table on a pty that says what `replies` has for a command, else OK; None: nothing."""
 
-    def __init__(self, timeout_s: float = 0.2, **replies: str | None) -> None:
+    def __init__(self, timeout_s: float = 0.6, **replies: str | None) -> None:
         self.replies: dict[str, str | None] = {"*IDN?": IDENTITY, "SENS:RATE?": "0.0"} | replies
         self.line = Answers(lambda text: self.replies.get(text, "OK"))
         said = described("simulated").model_copy(update={"timeout_s": timeout_s})

@@ -158,7 +158,7 @@ def open_door(folder: Path, **options: Any) -> Iterator[Door]:
         assert not thread.is_alive(), "the server did not end"
 
 
-def message(kind: str, **fields: Any) -> bytes:
+def message(kind: str, /, **fields: Any) -> bytes:
     """A message as viser's page would send it."""
     return msgspec.msgpack.encode({"type": kind} | fields)
 

@@ -23,11 +23,13 @@ from dashboard.data.ring import gap_limit
 from dashboard.scene.drawing import series
 from dashboard.scene.drawing.page import Markup, explained, tag
 from dashboard.scene.drawing.palette import number, rgba
+from logs.figures.sight import vouched, word, worst
 from logs.figures.stretch import stretch
 
 LATE_HEIGHT = 0.035  # of the strip that marks filled-in data, of the chart's height
-MOST_RANGES = 24  # named in one chart
+MOST_RANGES, MOST_SHADES = 24, 8  # named in one chart; told of one shade
 SINGLE = np.float32  # of a browser's points: seven digits are more than a screen shows
+RUNAWAY = 4.0  # widths of what is known
 REPAIRED = "#e69f00"
 
 
@@ -56,6 +58,7 @@ class Curve:
     width: float = 1.6
     about_zero: bool = False  # the band is what an error is allowed to be, so it lies around zero
     live: bool = True  # its newest value stands in the heading
+    sight: np.ndarray | None = None  # (n,) what the estimator says of y, RateEstimate.Sight
 
 
 @dataclass
@@ -116,6 +119,9 @@ def drawn(
         "origin": origin,
         "ranges": [[one.t0, one.t1, one.text, one.kind] for one in inside],
         "measured": _measured(curves, *cursors) if cursors else None,
+        "shades": [piece for shade in shades for piece in _pieces(shade, t0, t1)],
+        "holes": {str(c.label): holes for c in curves if (holes := _holes(c, t0, t1))},
+        "unsure": {str(c.label): said for c in curves if (said := worst(c.sight))},
     }
     heading = _heading(name, curves, shades, told)
     curves = [curve for curve in curves if len(curve.t)]
@@ -140,8 +146,7 @@ def _heading(
     for curve in curves:
         if not curve.label:
             continue
-        good = curve.y[np.isfinite(curve.y)] if curve.live else curve.y[:0]
-        value = number(float(good[-1]), name.digits) if len(good) else ("–" if curve.live else "")
+        value = _newest(curve, name.digits) if curve.live else ""
         mark = "gf-dash" if curve.dash else "gf-line"
         stale = " gf-stale" if curve.stale else ""
         sample = tag("i", class_=mark, style=f"border-color:{curve.colour}")
@@ -165,6 +170,37 @@ def _heading(
     legend = tag("span", *items, class_="gf-legend")
     data = json.dumps(told, separators=(",", ":"), ensure_ascii=False)
     return str(tag("div", title, legend, class_="gf-chart", data_chart=data))
+
+
+def _holes(curve: Curve, t0: float, t1: float) -> list[list[float]]:
+    """Where a curve within [t0, t1] has samples but no values, [from, until]; those of the first
+    curve cover all others anyway.
+    """
+    known = np.isfinite(curve.y)
+    if known.all():
+        return []
+    t = curve.t[known]
+    ends = np.concatenate([[t0], t, [t1]]).clip(t0, t1)
+    wide = np.flatnonzero(np.diff(ends) > gap_limit(t))[-MOST_RANGES:]
+    return np.column_stack([ends[wide], ends[wide + 1]]).round(3).tolist()
+
+
+def _pieces(shade: Shade, t0: float, t1: float) -> list[tuple[float, float, str, str]]:
+    """A shade within [t0, t1] as ranges, for a picture; the longest of them."""
+    edges = np.flatnonzero(np.diff(shade.on.astype(np.int8), prepend=0, append=0))
+    ends = np.append(shade.t, shade.t[-1])[edges].round(3).reshape(-1, 2)
+    inside = ends[(ends[:, 1] >= t0) & (ends[:, 0] <= t1)]
+    longest = np.sort(np.argsort(inside[:, 0] - inside[:, 1], kind="stable")[:MOST_SHADES])
+    return [(a, b, shade.label, shade.label) for a, b in inside[longest].tolist()]
+
+
+def _newest(curve: Curve, digits: int) -> Markup | str:
+    """The newest value, or the word of an estimator that does not vouch for it."""
+    good = np.flatnonzero(np.isfinite(curve.y))
+    if not len(good) or curve.t[-1] - curve.t[good[-1]] > gap_limit(curve.t[good]):
+        return "–"  # or not known any more
+    unsure = "" if curve.sight is None else word(curve.sight[good[-1]])
+    return explained(unsure) if unsure else number(float(curve.y[good[-1]]), digits)
 
 
 def _lines(
@@ -216,7 +252,7 @@ def _data(
     of what was filled in and of gaps; all of one length, in the smallest type that serves.
     """
     edges, x = series.grid(t0, t1)
-    lines = [series.decimate(curve.t, curve.y, edges)[0] for curve in curves]
+    lines = [series.decimate(curve.t, _bounded(curve, curves), edges)[0] for curve in curves]
     low, high = min(float(y.min()) for y in lines), max(float(y.max()) for y in lines)
     # A band that grows without bound would press the curves flat: it is cut half their range
     # outside.
@@ -243,10 +279,24 @@ def _data(
     return tuple(out)
 
 
+def _bounded(curve: Curve, curves: Sequence[Curve]) -> np.ndarray:
+    """Its values (n,); those that the estimator does not vouch for at most so far outside of what
+    is known that a filter which runs away does not flatten the others.
+    """
+    if not worst(curve.sight):
+        return curve.y
+    known = np.concatenate([vouched(one.y, one.sight) for one in curves])
+    known = known[np.isfinite(known)]
+    if not len(known) or not (wide := float(np.ptp(known))) > 0.0:
+        return curve.y
+    bounds = np.clip(curve.y, known.min() - RUNAWAY * wide, known.max() + RUNAWAY * wide)
+    return np.where(curve.sight > 0, bounds, curve.y)
+
+
 def _measured(curves: Sequence[Curve], a: float, b: float) -> dict[str, Any]:
     """What lies between two cursors, of every sample; by label."""
     return {
-        str(curve.label): stretch(curve.t, curve.y, a, b) | {"at": [a, b]}
+        str(curve.label): stretch(curve.t, curve.y, a, b, curve.sight) | {"at": [a, b]}
         for curve in curves
         if curve.label
     }

@@ -11,6 +11,7 @@ from messages.contract import gyrofree_pb2 as pb
 
 SIZE, RADIUS = 360, 150  # of the drawing; of the horizon
 DOT = 7.5
+NAME = (23.0, 9.0)  # size of a satellite's name
 NAMES = {  # in the order of the table
     pb.Sky.CONSTELLATION_GPS: "GPS",
     pb.Sky.CONSTELLATION_GALILEO: "Galileo",
@@ -91,10 +92,32 @@ def sky_svg(satellites: Iterable[Satellite], dark: bool) -> Markup:
     for elevation in (30, 60):
         y = middle - RADIUS * (1 - elevation / 90) + 13
         out.append(_text(f"{elevation}°", middle + 14, y, 10, ink))
+    places = [place for one in seen if (place := place_of(one)) is not None]
+    names = _Names(places)
     for one in sorted(seen, key=lambda one: one.use == pb.Sky.USE_YES):
-        out.append(_satellite(one, ink))
+        out.append(_satellite(one, ink, names))
     box = {"viewBox": f"0 0 {SIZE} {SIZE}", "width": "100%", "role": "img"}
     return tag("svg", *out, aria_label=said(seen), **box)
+
+
+class _Names:
+    """Where the names of satellites stand, so that none lies over a dot or another name."""
+
+    def __init__(self, dots: list[tuple[float, float]]) -> None:
+        self._taken = [(x, y, DOT, DOT) for x, y in dots]  # middles and half sizes
+
+    def place(self, x: float, y: float) -> tuple[float, float]:
+        """Foot of the name of a dot at x, y: below it, above or beside; below where all is full."""
+        below = (x, y + DOT + 11)
+        for at in (below, (x, y - DOT - 4), (x + 21, y + 4), (x - 21, y + 4)):
+            middle = (at[0], at[1] - NAME[1] / 2)
+            if not any(
+                abs(middle[0] - u) < NAME[0] / 2 + a and abs(middle[1] - v) < NAME[1] / 2 + b
+                for u, v, a, b in self._taken
+            ):
+                self._taken.append((*middle, NAME[0] / 2, NAME[1] / 2))
+                return at
+        return below
 
 
 def _text(text: str, x: float, y: float, size: int, ink: str) -> Markup:
@@ -102,7 +125,7 @@ def _text(text: str, x: float, y: float, size: int, ink: str) -> Markup:
     return tag("text", text, fill=ink, font_size=size, font_family="sans-serif", **place)
 
 
-def _satellite(one: Satellite, ink: str) -> Markup:
+def _satellite(one: Satellite, ink: str, names: _Names) -> Markup:
     place = place_of(one)
     if place is None:
         return EMPTY
@@ -117,7 +140,7 @@ def _satellite(one: Satellite, ink: str) -> Markup:
         f"{one.name}: elevation {one.elevation_deg:.0f}°, azimuth {one.azimuth_deg:.0f}°, {power}"
     )
     dot = tag("circle", tag("title", title), cx=f"{x:.1f}", cy=f"{y:.1f}", r=DOT, **look)
-    return dot + _text(one.name, x, y + DOT + 11, 10.5, ink)
+    return dot + _text(one.name, *names.place(x, y), 10.5, ink)
 
 
 def legend() -> Markup:

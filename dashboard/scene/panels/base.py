@@ -1,6 +1,7 @@
 """What every panel gets and must do."""
 
 import logging
+import math
 import re
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
@@ -15,8 +16,15 @@ from dashboard.desk import Desk
 from dashboard.scene.drawing.chart import Chart
 from dashboard.scene.drawing.drawn import Curve, Drawn, Name, Range, Shade, drawn
 from dashboard.scene.drawing.page import Markup, html
-from dashboard.scene.drawing.palette import estimator_colour, estimator_title
+from dashboard.scene.drawing.palette import (
+    VERMILLION,
+    YELLOW,
+    estimator_colour,
+    estimator_title,
+    number,
+)
 from dashboard.scene.shared import Made, Shared
+from logs.figures.sight import WORDS, vouched, worst
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
 from messages.text import plain
@@ -205,6 +213,32 @@ def from_zero(device: Device, name: str) -> str:
     return f"from 0 at {when(began_ns)[11:]} UTC" if began_ns else ""
 
 
+def shades_of(t: np.ndarray, sight: np.ndarray) -> list[Shade]:
+    """Where an estimator does not vouch for a component (docs/estimators.md)."""
+    colours = {"ambiguous": YELLOW, "blind": VERMILLION}
+    return [Shade(word, colours[word], t, sight == WORDS.index(word)) for word in colours]
+
+
+def rms(error: np.ndarray, sight: np.ndarray | None = None) -> float:
+    """Of the errors (n,) of what the estimator vouches for; NaN without any."""
+    known = vouched(error, sight)
+    known = known[np.isfinite(known)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
+
+
+def rms_text(error: np.ndarray, sight: np.ndarray, unit: str = "") -> str:
+    """Root mean square of the errors (n,) of what the estimator vouches for, and how much of it
+    that is; a word where it vouches for nothing.
+    """
+    there = np.isfinite(error)
+    unsure = worst(sight[there])
+    share = float(np.mean(~(sight[there] > 0))) if there.any() else 0.0
+    if unsure and not share:
+        return unsure
+    shown = number(rms(error, sight), 2, unit)
+    return f"{shown} · {math.floor(100 * share)} % valid" if unsure else shown
+
+
 def ranges(device: Device) -> list[Range]:
     """Notes, what was filled in, and the steps of a procedure that runs, on the device's axis."""
     found = [Range(at, at, text[:60]) for at, text in device.marks]
@@ -220,8 +254,15 @@ def ranges(device: Device) -> list[Range]:
 
 
 def estimator_curve(
-    s: Snapshot, topic: str, name: str, t: np.ndarray, y: np.ndarray, half: np.ndarray | None = None
+    s: Snapshot,
+    topic: str,
+    name: str,
+    t: np.ndarray,
+    y: np.ndarray,
+    half: np.ndarray | None = None,
+    sight: np.ndarray | None = None,
 ) -> Curve:
     """A curve in the colour and under the title of an estimator."""
     colour = estimator_colour(name, s.device.estimators(topic))
-    return Curve(estimator_title(name), colour, t, y, half, stale=s.stale(topic, name))
+    stale = s.stale(topic, name)
+    return Curve(estimator_title(name), colour, t, y, half, stale=stale, sight=sight)

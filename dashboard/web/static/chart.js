@@ -21,7 +21,7 @@ export function axis(unit, more) {
   return {
     stroke: style("--dim"), font: FONT, gap: 6,
     incrs: STEPS, grid: { stroke: style("--line"), width: 1 }, ticks: { show: false },
-    values: (_, splits, __, ___, step) => splits.map((v) => `${v.toFixed(digits(step))}${unit}`),
+    values: (_, splits, __, ___, step) => splits.map((v) => `${v.toFixed(digits(step)).replace("-", "−")}${unit}`),
     ...more,
   };
 }
@@ -99,9 +99,9 @@ export class Plot {
     const { clientWidth: width, clientHeight: height } = this.root;
     if (!width || !height) return; // hidden: built when there is room
     this.chart = new uPlot({
-      width, height, ...seriesOf(this.lines), legend: { show: false }, padding: [8, 10, 0, 0],
+      width, height, ...seriesOf(this.lines), legend: { show: false }, padding: [8, 18, 0, 0],
       scales: { x: { time: false, auto: false, range: (_, a, b) => [a, b] }, y: { range } },
-      axes: [axis(" s", { space: 60, size: 42 }), axis("", { space: 30, size: 58 })],
+      axes: [axis(" s", { space: 60, size: 42 }), axis("", { space: 22, size: 58 })],
       cursor: {
         y: false, points: { show: false }, drag: { x: false, y: false },
         sync: { key: this.group.cursorKey, scales: ["x", null] },
@@ -133,7 +133,7 @@ export class Plot {
   described() {
     const lines = this.lines.map((line) => {
       const x = Array.from(line.low, (_, k) => line.t0 + k * line.dt);
-      return { label: line.short, color: line.color, dash: line.dash, width: line.width, x, low: line.low, high: line.high };
+      return { label: line.short, color: line.color, dash: line.dash, width: line.width, x, low: line.low, high: line.high, unsure: (line.unsure ?? []).map(([, , word]) => word).sort().at(-1) };
     });
     const fresh = this.lines.every((line) => line.measured && line.asked === this.group.asked);
     return {
@@ -149,7 +149,9 @@ export class Plot {
     const t = u.posToVal(u.cursor.left, "x");
     const values = this.lines.map((line) => {
       const k = Math.round((t - line.t0) / line.dt), low = line.low[k];
-      return low === undefined || low === null ? null : `${line.short} ${((low + line.high[k]) / 2).toFixed(3)}`;
+      if (low === undefined || low === null) return null;
+      const unsure = (line.unsure ?? []).find(([from, until]) => t >= from && t < until);
+      return `${line.short} ${unsure ? unsure[2] : ((low + line.high[k]) / 2).toFixed(3).replace("-", "−")}`;
     }).filter(Boolean);
     this.readout.textContent = `${t.toFixed(2)} s: ${values.join(", ")}`;
   }

@@ -6,7 +6,7 @@ const ids = page.dataset.ids.split(",");
 const form = document.getElementById("aligning");
 const state = document.getElementById("state");
 const given = new Map(); // session -> offset by hand
-const n = (value, digits) => (value === null || value === undefined ? "–" : value.toFixed(digits));
+const n = (value, digits) => (value === null || value === undefined ? "–" : value.toFixed(digits).replace("-", "−"));
 const deg = (value) => (value === undefined ? "–" : ((value * 180) / Math.PI).toPrecision(3));
 
 const more = () => {
@@ -24,6 +24,12 @@ function say(text, fault = false) {
   if (fault) settled(false, "Not computed; what is dimmed is of before.");
 }
 
+const AGAINST = { tacho: "tachometer" };
+// How much of it counts: what an estimator does not vouch for is not measured.
+const valid = (shares) => {
+  const least = Math.min(...Object.values(shares));
+  return least > 0.9995 ? "" : `, of the ${Math.floor(100 * least)} % that are valid`;
+};
 const HOW = { reference: "the others are moved", clock: "one board's clock", tacho: "tachometer", rate: "rate of turn", start: "by their starts", given: "by hand" };
 
 function showTables(answer) {
@@ -35,18 +41,17 @@ function showTables(answer) {
     set("by", HOW[session.by]);
     const rival = session.quality === "ambiguous" ? `, ${n(session.rival_s, 2)} s fits as well` : "";
     if (k === 0) set("quality", "–");
-    else set("quality", `${session.quality}${session.correlation === null ? "" : `, r ${n(session.correlation, 4)}`}${rival}`);
+    else set("quality", `${session.quality}${session.correlation === null ? "" : `, correlation ${n(session.correlation, 4)}`}${rival}`);
     const errors = answer.errors[k][session.line];
-    set("error", errors ? `${["x", "y", "z"].map((c) => deg(errors.rms_radps[c])).join(" / ")} (${errors.against})` : "–");
+    set("error", errors ? `${["x", "y", "z"].map((c) => deg(errors.rms_radps[c])).join(" / ")} (${AGAINST[errors.against] ?? errors.against}${valid(errors.valid_share)})` : "–");
   });
-  const body = document.querySelector("#differences tbody");
-  body.replaceChildren(...answer.differences.map((d) => line([
-    `${d.session}: ${d.line.split("/").slice(1).join(" ")}`, d.against.split("/").slice(1).join(" "),
-    deg(d.rms_radps.x), deg(d.rms_radps.y), deg(d.rms_radps.z), `${d.seconds.toFixed(1)} s`,
-  ])), ...answer.track_differences.map((d) => line([
-    `${d.session}: ${d.track.split("/").slice(1).join(" ")}`, "track: north / east / down, m",
-    ...d.rms_ned_m.map((v) => v === null ? "–" : v.toPrecision(3)), `${d.seconds.toFixed(1)} s`,
-  ])));
+  const called = (key) => answer.titles[key];
+  rows("differences", answer.differences.map((d) => [
+    `${d.session}: ${called(d.line)}`, called(d.against), deg(d.rms_radps.x), deg(d.rms_radps.y), deg(d.rms_radps.z), `${d.seconds.toFixed(1)} s`,
+  ]));
+  rows("track-differences", answer.track_differences.map((d) => [
+    `${d.session}: ${called(d.track)}`, called(d.against), ...d.rms_ned_m.map((v) => (v === null ? "–" : v.toPrecision(3))), `${d.seconds.toFixed(1)} s`,
+  ]));
   // part of a recording: its figures will change
   settled(answer.state !== "reading", `Provisional: ${Math.floor(100 * answer.done)} % of the recordings is read, these figures will change.`);
   document.body.dataset.plotted = answer.state;
@@ -63,16 +68,20 @@ function settled(is, why) {
   words.textContent = is ? "" : why;
 }
 
-function line(cells) {
-  const row = document.createElement("tr"), heads = [...document.querySelectorAll("#differences th")];
-  row.append(...cells.map((text, k) => {
-    const cell = document.createElement("td");
-    cell.textContent = text;
-    cell.className = k > 1 ? "n" : k ? "" : "id";
-    if (k) cell.dataset.label = heads[k]?.textContent ?? "";
-    return cell;
+function rows(id, lines) {
+  const table = document.getElementById(id), heads = [...table.querySelectorAll("th")].map((head) => head.textContent);
+  table.hidden = !lines.length;
+  table.querySelector("tbody").replaceChildren(...lines.map((cells) => {
+    const row = document.createElement("tr");
+    row.append(...cells.map((text, k) => {
+      const cell = document.createElement("td");
+      cell.textContent = text;
+      cell.className = k > 1 ? "n" : k ? "" : "id";
+      if (k) cell.dataset.label = heads[k] ?? "";
+      return cell;
+    }));
+    return row;
   }));
-  return row;
 }
 
 form.addEventListener("change", () => {

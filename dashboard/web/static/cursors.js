@@ -166,9 +166,10 @@ export class Cursors {
     table.append(row("th", ["", `mean, ${unit}`, "σ", "RMS", `slope, ${unit}/s`, "peak to peak", "n"]));
     let rough = false;
     for (const line of figure.lines().filter((l) => l.label)) {
-      const told = figure.measured?.[line.label], found = told ?? drawn(line, a, b);
+      const told = figure.measured?.[line.label], found = told ?? (line.unsure ? { n: "…", word: line.unsure } : drawn(line, a, b));
       rough ||= !told;
-      const made = row("td", [line.label, digits(found.mean), digits(found.sigma), digits(found.rms), digits(found.slope), digits(found.p2p), String(found.n)]);
+      const of = found.word ? `${found.n} of ${found.of ?? "…"}, else ${found.word}` : String(found.n);
+      const made = row("td", [line.label, found.n === 0 && found.word ? found.word : digits(found.mean), digits(found.sigma), digits(found.rms), digits(found.slope), digits(found.p2p), of]);
       made.firstChild.style.color = line.color;
       table.append(made);
     }

@@ -1,6 +1,7 @@
 // What every chart gets, live and of a session: what happened as ranges with names, one outlier that does not flatten
 // the rest, and the figure as SVG or PNG for a paper. `figure` describes a chart:
-// {title, unit, origin, ranges: [[t0, t1, text, kind]], lines: () => [{label, color, dash, width, x, low, high, half}]}
+// {title, unit, origin, ranges: [[t0, t1, text, kind]], lines: () => [{label, color, dash, width, x, low, high, half, unsure}]};
+// `shades` are ranges that the chart itself draws already; `unsure` is what an estimator says where it does not vouch.
 const FAR = 4; // widths of the bulk that a point is away from it before it counts as an outlier
 const FEW = 4; // of them at one side; more are a signal
 const FRESH = 0.04; // newest share of the window, in which a jump may be the beginning of something
@@ -51,10 +52,14 @@ export function dress(u, describe) {
     const margin = 0.12 * (u.odd.max - u.odd.min);
     return [u.odd.min - margin, u.odd.max + margin];
   };
+  for (const axis of u.axes) axis.values = spelt(axis.values);
   (u.hooks.drawAxes ??= []).push(() => drawRanges(u, describe()));
   (u.hooks.draw ??= []).push(() => { drawOdd(u); drawOrigin(u, describe()); });
   u.redraw(true);
 }
+
+// Ticks as numbers are spelt elsewhere: thousands apart by a thin blank, a minus that is one.
+const spelt = (values) => (...asked) => values(...asked).map((v) => (typeof v === "string" ? v.replaceAll(",", "\u202f").replace("-", "−") : v));
 
 const ink = (u) => getComputedStyle(u.root).color;
 
@@ -95,7 +100,7 @@ function drawRanges(u, { ranges }) {
       for (const x of t1 > t0 ? [a, b] : [a]) {
         c.beginPath(); c.moveTo(x, box.top); c.lineTo(x, box.bottom); c.stroke();
       }
-      const words = text.slice(0, 32), wide = c.measureText(words).width;
+      const words = text.length > 32 ? `${text.slice(0, 31)}…` : text, wide = c.measureText(words).width;
       const x = Math.max(box.left, Math.min(a, box.right - wide - 6 * px)) + 3 * px;
       let line = ends.findIndex((end) => end < x);
       if (line < 0) line = ends.length;
@@ -187,10 +192,11 @@ export function svg(u, figure) {
   for (const [v, words] of up) out.push(`<path d="M${L} ${Y(v).toFixed(2)}H${W - R}" stroke="#ddd" stroke-width="0.6"/>`, text(L - 6, Y(v) + 4, words, 'text-anchor="end"'));
   for (const [v, words] of along) out.push(`<path d="M${X(v).toFixed(2)} ${T}V${H - B}" stroke="#ddd" stroke-width="0.6"/>`, text(X(v), H - B + 15, words, 'text-anchor="middle"'));
   out.push('<g clip-path="url(#box)">');
-  for (const [t0, t1, words, kind] of figure.ranges) {
+  for (const [t0, t1, words, kind] of [...(figure.shades ?? []), ...figure.ranges]) {
     if (t1 < a || t0 > b) continue;
-    const colour = TINT[kind] ?? TINT.mark;
-    out.push(`<rect x="${X(t0).toFixed(2)}" y="${T}" width="${Math.max(0.8, X(t1) - X(t0)).toFixed(2)}" height="${H - T - B}" fill="${colour}" fill-opacity="${t1 > t0 ? 0.12 : 1}"/>`, text(Math.max(L, X(t0)) + 3, T + 11, words, `fill="${colour}" font-size="9"`));
+    const colour = TINT[kind] ?? TINT.mark, room = X(Math.min(t1, b)) - X(Math.max(t0, a)), shade = kind in SHADES;
+    out.push(`<rect x="${X(t0).toFixed(2)}" y="${T}" width="${Math.max(0.8, X(t1) - X(t0)).toFixed(2)}" height="${H - T - B}" fill="${colour}" fill-opacity="${t1 > t0 ? 0.12 : 1}"/>`);
+    if (!shade || room > 6 * words.length) out.push(text(Math.max(L, X(t0)) + 3, shade ? H - B - 4 : T + 11, words, `fill="${colour}" font-size="9"`));
   }
   const lines = figure.lines();
   for (const line of lines) {
@@ -212,8 +218,9 @@ export function svg(u, figure) {
   out.push(`</g><path d="M${L} ${T}V${H - B}H${W - R}" fill="none" stroke="#000"/>`);
   let x = W - R;
   for (const line of lines.filter((one) => one.label).reverse()) {
-    x -= 6.4 * line.label.length + 30;
-    out.push(`<path d="M${x} ${T - 10}h18" stroke="${line.color}" stroke-width="2"${line.dash?.length ? ` stroke-dasharray="${line.dash.join(" ")}"` : ""}/>`, text(x + 22, T - 6, line.label));
+    const label = line.unsure ? `${line.label} (${line.unsure} in parts)` : line.label;
+    x -= 6.4 * label.length + 30;
+    out.push(`<path d="M${x} ${T - 10}h18" stroke="${line.color}" stroke-width="2"${line.dash?.length ? ` stroke-dasharray="${line.dash.join(" ")}"` : ""}/>`, text(x + 22, T - 6, label));
   }
   out.push(text(L, T - 6, figure.title, 'font-weight="bold" font-size="12"'));
   out.push(text((L + W - R) / 2, H - 12, figure.across || `time, ${figure.origin || "s"}`, 'text-anchor="middle"'));

@@ -1,6 +1,6 @@
 // Import of a log: send it, show how it is written and its first rows, let a person say what its
 // columns are and when it was recorded, make the session.
-import { call, ended, send, toast } from "/static/rest.js";
+import { call, ended, send } from "/static/rest.js";
 
 const form = document.getElementById("import");
 const state = document.getElementById("import-state");
@@ -8,6 +8,9 @@ const preview = document.getElementById("import-preview");
 let upload = null; // number of what was sent
 
 const element = (name, text = "", more = {}) => Object.assign(document.createElement(name), { textContent: text }, more);
+
+const short = (value) => String(Number(value.toPrecision(4))).replace("-", "−");
+const ENCODINGS = { "utf-8-sig": "UTF-8 with a byte order mark", "utf-8": "UTF-8" };
 
 // Values of a column as a line, least and greatest beside it.
 function sketch(values) {
@@ -17,14 +20,14 @@ function sketch(values) {
   const picture = document.createElementNS("http://www.w3.org/2000/svg", "svg");
   picture.setAttribute("viewBox", "0 0 100 30");
   picture.setAttribute("role", "img");
-  picture.setAttribute("aria-label", `from ${low.toPrecision(4)} to ${high.toPrecision(4)}`);
+  picture.setAttribute("aria-label", `from ${short(low)} to ${short(high)}`);
   picture.classList.add("sketch");
   const line = document.createElementNS("http://www.w3.org/2000/svg", "polyline");
   const points = values.map((value, k) => value === null ? "" : `${(100 * k) / (values.length - 1)},${28 - (26 * (value - low)) / size}`);
   line.setAttribute("points", points.filter(Boolean).join(" "));
   picture.append(line);
   const cell = element("div");
-  cell.append(picture, element("span", `${low.toPrecision(4)} … ${high.toPrecision(4)}`, { className: "dim" }));
+  cell.append(picture, element("span", low === high ? short(low) : `${short(low)} … ${short(high)}`, { className: "dim" }));
   return cell;
 }
 
@@ -40,7 +43,7 @@ function choice(file, column, targets) {
 }
 
 function table(file, found, targets) {
-  const part = element("section"), box = element("div", "", { className: "wide" }), grid = element("table");
+  const part = element("section"), box = element("div", "", { className: "across" }), grid = element("table", "", { className: "plain" });
   const head = element("tr"), meant = element("tr"), drawn = element("tr"), body = element("tbody");
   for (const column of found.columns) {
     head.append(element("th", column.name));
@@ -57,7 +60,7 @@ function table(file, found, targets) {
   grid.append(element("thead"), body);
   grid.tHead.append(head);
   box.append(grid);
-  const written = `${file}: ${found.encoding}, columns by ${found.separator}, decimal ${found.decimal}, header in line ${found.header_line}${found.own ? ", an export of ours" : ""}`;
+  const written = `${file}: ${ENCODINGS[found.encoding] ?? found.encoding}, columns by ${found.separator}, decimal ${found.decimal}, header in line ${found.header_line}${found.own ? ", an export of ours" : ""}`;
   part.append(element("h3", written), box);
   return part;
 }
@@ -88,6 +91,11 @@ async function finish() {
   location.assign(`/sessions/${job.made}`);
 }
 
+function say(text, fault = false) {
+  state.textContent = text;
+  state.className = fault ? "fault" : "dim";
+}
+
 function anew() {
   upload = null;
   preview.hidden = true;
@@ -99,12 +107,12 @@ form?.addEventListener("submit", async (event) => {
   event.preventDefault();
   const button = form.querySelector("button"), sent = upload !== null;
   button.disabled = true;
+  say("");
   try {
     await (sent ? finish() : begin());
   } catch (error) {
-    state.textContent = "";
     if (sent) anew(); // what was sent is gone
-    toast(error.message);
+    say(error.message, true);
   }
   button.disabled = false;
 });

@@ -43,15 +43,25 @@ const asked = (measured) => Object.values(measured ?? {}).every(({ at }) => `${a
 const overTime = (chart) => chart.scales.x.distr !== 3; // a spectrum has logarithmic axes
 const upright = (chart) => (overTime(chart) ? "y" : "level");
 
+// A line that is not known for a while is no line there, though the points that were sent go on.
+function holed(chart) {
+  chart.series.forEach((series, k) => {
+    if (!k) return;
+    const mine = EDGE.test(series.label ?? "") ? series.label.replace(EDGE, "").trim() : series.label;
+    series.gaps = (u, ...found) => [...(found.at(-1) ?? []), ...(told(u).holes?.[mine] ?? []).map((ends) => ends.map((t) => u.valToPos(t, "x", true)))];
+  });
+}
+
 function describe(chart) {
-  const { title = "", unit = "", origin = "", across = "", ranges = [], measured = null } = told(chart), high = upright(chart);
+  const { title = "", unit = "", origin = "", across = "", ranges = [], shades = [], unsure = {}, measured = null } = told(chart), high = upright(chart);
   const [x, ...data] = chart.data;
   const lines = () => chart.series.slice(1).map((series, k) => ({ series, k })).filter(({ series }) => series.scale === high && series.show && series.label && series.label !== NAMELESS && !EDGE.test(series.label))
     .map(({ series, k }) => ({
       label: overTime(chart) ? series.label : "", color: series._stroke ?? series.stroke, dash: series.dash, width: 1.4, x, low: data[k], high: data[k],
+      unsure: unsure[series.label],
       half: EDGE.test(chart.series[k + 2]?.label ?? "") ? [data[k + 1], data[k + 2]] : null,
     })).map((line) => ({ ...line, color: typeof line.color === "function" ? line.color(chart, 0) : line.color }));
-  return { title, unit, origin, across, ranges, lines, high, measured: measured && asked(measured) ? measured : null };
+  return { title, unit, origin, across, ranges, shades, lines, high, measured: measured && asked(measured) ? measured : null };
 }
 
 // A zoom is the view's, so that its charts are drawn anew from every sample, stay while data come in, and are the same
@@ -90,6 +100,7 @@ function look() {
     const t = chart.data?.[0];
     if (!t?.length) continue;
     if (!known.has(chart)) equip(chart);
+    if (overTime(chart)) holed(chart); // series may be new ones
     // The scene keeps a chart's zoom as a share of its time axis, and reads that from a chart just made before the axis
     // has its limits: one second of thirty is then shown for good. Over time, what is sent is what is to be seen.
     const { min, max } = chart.scales.x, off = min !== t[0] || max !== t[t.length - 1];

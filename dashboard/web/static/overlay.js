@@ -59,7 +59,7 @@ export class Overlay {
     const lines = answer.lines.map((line) => ({ ...line, id: `${line.session} ${line.key}` }));
     for (const { figure, kind, part, plot } of this.plots) {
       const mine = lines.filter((line) => line[kind][part]).map((line) => ({
-        ...this.line(line, line[kind][part]), measured: line.measured?.[kind]?.[part], asked: line.asked,
+        ...this.line(line, line[kind][part]), measured: line.measured?.[kind]?.[part], asked: line.asked, unsure: line.unsure?.[part],
       }));
       figure.hidden = !mine.length;
       if (kind === "error" && mine.length) figure.querySelector("small").textContent = `against ${[...new Set(mine.map((l) => REFERENCES[l.against] ?? l.against))].join(", ")}, °/s`;

@@ -8,11 +8,12 @@ import typer
 
 from dashboard.web.map.archive import ArchiveError, open_archive
 from gyrofree.commands.options import AsJson, Config, say, settings_of
+from gyrofree.commands.parser import Commands
 from gyrofree.config import DEFAULT_PATH
 from gyrofree.running.process import EXIT_CONFIG, fail
 from gyrofree.setup import reference, written
 
-app = typer.Typer(
+app = Commands(
     no_args_is_help=True,
     rich_markup_mode=None,
     help="What gyrofree.toml may say, what it says, and whether that is right.",

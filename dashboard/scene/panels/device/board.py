@@ -43,10 +43,12 @@ COUNTERS = (  # of STATUS, under the words that people read
     ("frames built · dropped", ("built", "dropped")),
     ("samples · instants missed", ("samples", "missed_ticks")),
     ("orders heard · damaged", ("rx_ok", "rx_bad")),
-    ("pulses per second", ("pps_total",)),
+    ("pulses of the receiver's clock", ("pps_total",)),
     ("receiver's bytes", ("gps_bytes",)),
     ("stack never used, bytes", ("free_stack",)),
 )
+
+LEAST = {"free_stack": 1}  # a board that does not know says 0
 
 
 def faults(found: list[pb.Fault], now_ns: int) -> Markup:
@@ -117,7 +119,13 @@ class Board(Panel):
         ]
         for words, names in COUNTERS:
             if all(name in m.status for name in names):
-                items.append((words, " · ".join(number(m.status[name], 0) for name in names)))
+                told = (
+                    "–"
+                    if name in LEAST and m.status[name] < LEAST[name]
+                    else number(m.status[name], 0)
+                    for name in names
+                )
+                items.append((words, " · ".join(told)))
         self._table = self.html(said + rows(items, s.stale("board")), self._table)
 
     def _order(self, names: tuple[str, ...], value: int = 0) -> None:

@@ -22,10 +22,14 @@ from dashboard.scene.drawing.palette import (
     number,
 )
 from dashboard.scene.panels.base import DEG, Panel, Snapshot, from_zero
+from inertial.rate.batch import Phase
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
+from messages.text import counted
 
-MOVING = ("standing still", "turning")  # states that are as fast as the samples
+# states that are as fast as the samples: in each pair, what is said of a body that stands still,
+# and of one that turns
+MOTIONS = ((Phase.STILL, Phase.TURNING), (Phase.STILL_AT_START, Phase.INTEGRATING))
 BEHIND_SHOWN_S = 0.5  # that an estimator is behind by less is nobody's business
 
 
@@ -145,10 +149,13 @@ class Devices(Panel):
         found = [*alarms(s.store, s.device, s.now), *bench_alarms(s.store)]
         texts = [f"{alarm.title}: {alarm.text}" for alarm in found]
         if s.store.dropped:
-            texts.append(f"the dashboard could not keep up: {s.store.dropped} messages not shown")
+            texts.append(
+                f"the dashboard could not keep up: {counted(s.store.dropped, 'message')} not shown"
+            )
         if s.store.refused:
             kinds = ", ".join(f"{kind} {n}" for kind, n in sorted(s.store.door.counts().items()))
-            texts.append(f"{s.store.refused} messages refused and not shown ({kinds}): see the log")
+            said = counted(s.store.refused, "message")
+            texts.append(f"{said} refused and not shown ({kinds}): see the log")
         return joined(alert(text) for text in texts)
 
     @staticmethod
@@ -175,8 +182,9 @@ class Devices(Panel):
             if s.stale("estimator", name):
                 items.append((estimator_title(name), bad("silent")))
                 continue
-            state = _state_of(s, name)
-            items.append((estimator_title(name), f"{state} · {number(m.us_per_sample, 0, 'µs')}"))
+            state = state_of(s, name)
+            cost = tag("span", number(m.us_per_sample, 0, "µs"), title="computing, for each sample")
+            items.append((estimator_title(name), joined([f"{state} · ", cost])))
             if m.behind_s > BEHIND_SHOWN_S:
                 items.append(("", bad(f"{m.behind_s:.1f} s behind")))
             if m.skipped_s:
@@ -210,16 +218,22 @@ class Devices(Panel):
         return joined(note(text) for text in lines)
 
 
-def _state_of(s: Snapshot, name: str) -> str:
+def state_of(s: Snapshot, name: str) -> str:
     """What an estimator does. Whether the body is still or turns changes faster than the status
     comes: that is taken from the message that the values are of.
     """
     state = s.device.get("estimator", name).message.state
     state = state.partition(":")[0]  # what a person should do stands after it, see _advice
     rate = s.device.get("rate", name)
-    if rate is None or state not in MOVING:
+    if rate is None:
         return state
-    return MOVING[0] if rates.row(rate.message, -1).still else MOVING[1]
+    still = rates.row(rate.message, -1).still
+    for at_rest, turning in MOTIONS:
+        if state == at_rest.text and not still:
+            return turning.text
+        if state == turning.text and still and at_rest == Phase.STILL:
+            return at_rest.text
+    return state
 
 
 def _said_rate(s: Snapshot, name: str, m: pb.RateEstimate) -> tuple[str, Markup | str]:
@@ -233,12 +247,14 @@ def _said_rate(s: Snapshot, name: str, m: pb.RateEstimate) -> tuple[str, Markup 
         return "–", "no rate in its message"
     omega = m.omega_ib_b_radps[2]
     sight = m.sight[2] if len(m.sight) == 3 else pb.RateEstimate.SIGHT_VALID
-    if sight == pb.RateEstimate.SIGHT_BLIND and not m.still:
-        return "–", joined([term("blind"), f": {m.sight_reason or 'too slow to be seen'}"])
+    drifted = m.still and abs(omega) > TURNS_RADPS
+    if sight == pb.RateEstimate.SIGHT_BLIND:
+        why = "the body stands still, the integral drifted" if drifted else m.sight_reason
+        return "–", joined([term("blind"), f": {why or 'too slow to be seen'}"])
     shown = number(omega * DEG, 1)
     if sight == pb.RateEstimate.SIGHT_AMBIGUOUS:
         return f"± {number(abs(omega) * DEG, 1)}", joined([term("ambiguous"), ": sign not known"])
-    if m.still and abs(omega) > TURNS_RADPS:
+    if drifted:
         return shown, tag("span", "drifted: the body stands still", class_="gf-bad")
     angle = f"angle {number(m.angle_z_rad * DEG, 0, '°')} {from_zero(s.device, name)}"
     return shown, "still" if m.still else angle.strip()

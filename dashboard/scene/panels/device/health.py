@@ -9,6 +9,7 @@ from dashboard.scene.drawing.page import Markup, alert, bad, joined, note, tag
 from dashboard.scene.drawing.palette import age, number
 from dashboard.scene.panels.base import Panel, Snapshot
 from messages.contract import gyrofree_pb2 as pb
+from messages.text import counted
 
 MOST = 64  # axes in the table
 FULL = 2.0 * BAD  # sigmas that fill a bar
@@ -46,13 +47,19 @@ class Health(Panel):
         ]
         good = ", ".join([f"{len(m.axes) - len(bad_ones)} of {len(m.axes)} good", *bad_ones])
         ratio = number(m.chi2, 1) if m.dof else "–"
-        words = f"{m.layout}: {good} · χ² {ratio}, {m.dof} conditions"
+        words = f"layout {m.layout}: {good}"
+        fit = f"Misfit of all axes together: χ² {ratio} with {counted(m.dof, 'condition')}."
         body = (_row(axis, m.header.utc_ns) for axis in m.axes[:MOST])
         kind = "gf-rows gf-stale" if s.stale("axes") else "gf-rows"
         table = tag("table", _HEAD, *body, class_=kind)
-        more = note(f"and {len(m.axes) - MOST} axes more") if len(m.axes) > MOST else ""
+        more = (
+            note(f"and {counted(len(m.axes) - MOST, 'axis', 'axes')} more")
+            if len(m.axes) > MOST
+            else ""
+        )
         bar = note("Bar: residual against the other axes over its σ, full at 8 σ; gate at 4 σ.")
-        parts = [alert(m.message), tag("p", words, class_="gf-title"), table, more, bar]
+        said = alert(m.message) if m.message != f"axes: {good}" else ""
+        parts = [said, tag("p", words, class_="gf-title"), table, more, bar, note(fit)]
         self._table = self.html(joined(parts), self._table)
 
 

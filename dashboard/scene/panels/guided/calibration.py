@@ -13,6 +13,7 @@ from dashboard.scene.panels.guided.guided import Guided, guidance, head, silent
 from dashboard.scene.panels.guided.solid import Camera
 from inertial.constants import MILLI_G
 from messages.contract import gyrofree_pb2 as pb
+from messages.text import counted
 
 CAMERA = np.array([0.80, -0.52, 0.50])  # where the picture is seen from, in the frame whose z is up
 ACTION = pb.EstimatorCommand
@@ -104,7 +105,9 @@ def content(m: pb.CalibrationStatus, gone: bool, dark: bool, card: str) -> Marku
         if m.good_enough
         else "not yet good enough"
     )
-    first = head(STATES.get(m.state, ""), joined([f"{len(m.poses)} poses · ", good]), gone)
+    first = head(
+        STATES.get(m.state, ""), joined([f"{counted(len(m.poses), 'pose')} · ", good]), gone
+    )
     wanted = np.array(m.next_up_b) if len(m.next_up_b) == 3 else None
     shown = wanted if m.state in (STATE.STATE_WAITING, STATE.STATE_FITTED) else None
     if m.state == STATE.STATE_TAKING and wanted is not None:

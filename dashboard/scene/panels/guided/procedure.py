@@ -4,6 +4,7 @@ for operators.
 """
 
 import logging
+import textwrap
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from dashboard.scene.drawing.palette import GREEN, VERMILLION, number
 from dashboard.scene.panels.base import DEG, Input, Snapshot
 from dashboard.scene.panels.guided.calibration import picture
 from dashboard.scene.panels.guided.guided import Guided, guidance, silent
+from logs.figures.numbers import with_half_width
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
 from messages.text import plain
@@ -25,6 +27,7 @@ ACTION = pb.ProcedureCommand
 M = pb.ProcedureStatus
 STEP = M.Step
 ACTIVE = (M.STATE_RUNNING, M.STATE_HELD)
+SHORT = 60  # characters of a reason; all of it is in the tooltip
 STATES = {
     M.STATE_IDLE: "no test runs",
     M.STATE_RUNNING: "running",
@@ -202,8 +205,11 @@ def steps_of(m: pb.ProcedureStatus) -> Markup:
         sign = tag("b", mark, style=f"color:{colour}", title=word)
         name = joined([sign, tag("b" if now else "span", step.name)], " ")
         parts: list[object] = [figure(one) for one in step.figures]
-        if step.spoilt:
-            parts.append(tag("span", f"{step.spoilt}× spoilt", title=step.reason))
+        if step.spoilt or step.trouble:
+            often = f"{step.spoilt}× spoilt" if step.spoilt else "held"
+            last = textwrap.shorten("".join(step.trouble[-1:]), SHORT, placeholder=" …")
+            text = f"{often}: {last}".rstrip(": ")
+            parts.append(tag("span", text, title="; ".join(step.trouble)))
         if step.kind == "open" and step.reason:
             parts.append(step.reason)
         items.append((name, joined(parts, " · ") if parts else html(word)))
@@ -215,9 +221,8 @@ def figure(one: pb.ProcedureStatus.Figure) -> Markup:
     name, _, unit = one.name.rpartition("_")
     unit, name = UNITS.get(unit, unit), name.removeprefix("rate_").replace("_", " ")
     if one.value != one.value:
-        return tag("span", f"{name} not told")
-    text = f"{name} {one.value:+.3g}"
-    text += f" ± {2.0 * one.sigma:.2g}" if one.sigma == one.sigma else ""
+        return tag("span", f"{name} –")
+    text = f"{name} {with_half_width(one.value, 2.0 * one.sigma)}"
     low, high = one.HasField("min"), one.HasField("max")
     if not (low or high):
         return tag("span", f"{text} {unit}")
@@ -226,4 +231,6 @@ def figure(one: pb.ProcedureStatus.Figure) -> Markup:
         [f"{one.min:g}"] * low + [f"{one.max:g}"] * high if low and high else []
     ) or (f"≥ {one.min:g}" if low else f"≤ {one.max:g}")
     style = f"color:{GREEN if good else VERMILLION}"
-    return tag("b", f"{'✓' if good else '✗'} {text} {unit} ({limit})", style=style)
+    return tag(
+        "b", f"{'✓' if good else '✗'} {text} {unit} ({limit.replace('-', '−')})", style=style
+    )

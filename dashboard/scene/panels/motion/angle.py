@@ -40,11 +40,11 @@ class Angle(Panel):
         angles, errors = [], []
         for name in s.device.estimators("rate"):
             t, rows = s.rows("rate", name)
-            angle = rows["angle_z"] * DEG
-            angles.append(estimator_curve(s, "rate", name, t, angle))
+            angle, sight = rows["angle_z"] * DEG, rows["sight"][:, 2]
+            angles.append(estimator_curve(s, "rate", name, t, angle, sight=sight))
             if len(true_t) > 1:
                 true = np.interp(t, true_t, true_rows["angle_z"] * DEG)
-                errors.append(estimator_curve(s, "rate", name, t, angle - true))
+                errors.append(estimator_curve(s, "rate", name, t, angle - true, sight=sight))
         if len(true_t):
             y = true_rows["angle_z"] * DEG
             angles.append(Curve("truth", truth_colour(s.dark), true_t, y, width=1.0))

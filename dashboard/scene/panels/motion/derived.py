@@ -5,14 +5,11 @@ scene.
 import time
 from functools import partial
 
-import numpy as np
-
-from dashboard.data.channels import Channel, Drawn, channels, derived, sight
+from dashboard.data.channels import Channel, Drawn, channels, derived
 from dashboard.data.device import Device
-from dashboard.scene.drawing.drawn import Curve, Shade
+from dashboard.scene.drawing.drawn import Curve
 from dashboard.scene.drawing.page import Markup, alert, joined, note, tag
-from dashboard.scene.drawing.palette import VERMILLION, YELLOW
-from dashboard.scene.panels.base import Panel, Snapshot
+from dashboard.scene.panels.base import Panel, Snapshot, shades_of
 from logs.figures.expression import read
 from logs.figures.names import BLUE, OCHRE, OLIVE, PURPLE, TEAL, VIOLET
 from logs.figures.quantity import ExpressionError
@@ -58,34 +55,9 @@ class Derived(Panel):
     def _draw(self, s: Snapshot, k: int, text: str, drawn: Drawn) -> None:
         stale = any(s.stale(one.topic, one.estimator) for one in drawn.of)
         curve = Curve(text, COLOURS[k % len(COLOURS)], drawn.t, drawn.y, stale=stale)
-        self.show(
-            f"derived{k}",
-            text,
-            drawn.unit,
-            [curve],
-            s,
-            partial(_shades, s, drawn),
-            height=190,
-            digits=3,
-        )
-
-
-def _shades(s: Snapshot, drawn: Drawn) -> list[Shade]:
-    """A curve knows no more than what it is made of: where one of them is not seen, nor is it."""
-    shades = []
-    for label, colour, which in (("ambiguous", YELLOW, 1), ("blind", VERMILLION, 2)):
-        t, on = drawn.t[:0], np.zeros(0, dtype=bool)
-        for one in drawn.of:
-            words = sight(s.device, one, s.t0, s.t1)
-            if not len(words[0]):
-                continue
-            if not len(t):
-                t, on = words[0], words[which]
-            else:
-                at = np.clip(np.searchsorted(words[0], t), 0, len(words[0]) - 1)
-                on = on | words[which][at]
-        shades.append(Shade(label, colour, t, on))
-    return shades
+        curve.sight = drawn.sight
+        shades = partial(shades_of, drawn.t, drawn.sight)
+        self.show(f"derived{k}", text, drawn.unit, [curve], s, shades, height=190, digits=3)
 
 
 def _offer(named: dict[str, Channel]) -> Markup:
@@ -109,6 +81,6 @@ def _offer(named: dict[str, Channel]) -> Markup:
 def _names(stems: dict[str, list[str]]) -> Markup:
     """`omega_x _y _z` for the three of them."""
     return joined(
-        [tag("span", stem + " ".join(parts), class_="gf-name") for stem, parts in stems.items()],
+        [tag("span", stem + " ".join(parts), class_="gf-channel") for stem, parts in stems.items()],
         " ",
     )

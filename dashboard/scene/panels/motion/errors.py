@@ -8,7 +8,7 @@ from dashboard.data.device import Device
 from dashboard.scene.drawing.drawn import Curve
 from dashboard.scene.drawing.page import joined, note, rows, sub
 from dashboard.scene.drawing.palette import AXES, estimator_title, number
-from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
+from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve, rms_text
 
 
 class Errors(Panel):
@@ -65,17 +65,17 @@ class Errors(Panel):
                     true = np.interp(t, true_t, tacho["omega"])
                     omega = omega if reference == "tachometer" else np.abs(omega)
                 inside = (t >= true_t[0]) & (t <= true_t[-1])
-                error, sigma = (
-                    ((omega - true) * DEG)[inside],
-                    (r["sigma"][:, k] * DEG)[inside],
-                )
-                curve = estimator_curve(s, "rate", name, t[inside], error, 3 * sigma)
+                error, half = (omega - true)[inside] * DEG, 3 * r["sigma"][inside, k] * DEG
+                sight = r["sight"][inside, k]
+                curve = estimator_curve(s, "rate", name, t[inside], error, half, sight)
                 curve.about_zero = True
                 curves.append(curve)
                 if len(error):
-                    value = number(float(np.sqrt(np.nanmean(error**2))), 2, "°/s")
                     rms.append(
-                        (joined(["RMS ", sub("ω", axis), ", ", estimator_title(name)]), value)
+                        (
+                            joined(["RMS ", sub("ω", axis), ", ", estimator_title(name)]),
+                            rms_text(error, sight, "°/s"),
+                        )
                     )
             title = joined(["Error of ", sub("ω", axis), f" against {reference}"])
             self.show(

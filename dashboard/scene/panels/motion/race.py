@@ -5,9 +5,9 @@ step costs.
 import numpy as np
 
 from dashboard.data.device import Device
-from dashboard.scene.drawing.page import Markup, explained, joined, note, sub, tag
+from dashboard.scene.drawing.page import Markup, explained, joined, note, sub, tag, term
 from dashboard.scene.drawing.palette import estimator_colour, estimator_title, number
-from dashboard.scene.panels.base import DEG, NO_RATE, Panel, Snapshot
+from dashboard.scene.panels.base import DEG, NO_RATE, Panel, Snapshot, rms, rms_text
 from dashboard.scene.panels.motion.innovations import verdict
 
 HEAD = (
@@ -21,8 +21,11 @@ NOTE = joined(
     [
         "RMS of ",
         sub("ω", "z"),
-        " against the tachometer over the window shown; NIS over its degrees of freedom is 1 for a"
-        " filter whose innovations are as large as it says.",
+        " against the tachometer over the window shown, of what is ",
+        term("valid"),
+        "; ",
+        term("NIS"),
+        " over its degrees of freedom is 1 for a filter whose innovations are as large as it says.",
     ]
 )
 
@@ -49,33 +52,36 @@ class Race(Panel):
         if not names:
             self._table = self.html(note("No rate estimators run for this device."), self._table)
             return
-        found = sorted((_error(s, name), name) for name in names)
-        body = (_row(s, name, error) for error, name in found)
+        found = sorted((*_error(s, name), name) for name in names)
+        body = (_row(s, name, score) for _, score, name in found)
         head = tag("tr", *(tag("td", explained(cell)) for cell in HEAD))
         table = tag("table", head, *body, class_="gf-rows")
         self._table = self.html(table + note(NOTE), self._table)
 
 
-def _error(s: Snapshot, name: str) -> float:
-    """RMS against the tachometer, deg/s; infinite without one, and for an estimate that the
-    tachometer itself aided.
+def _error(s: Snapshot, name: str) -> tuple[float, str]:
+    """RMS against the tachometer, deg/s, to sort by, and as it is shown; infinite and a dash
+    without one, and for an estimate that the tachometer itself aided.
 
     Without a direction channel: of the magnitudes.
     """
+    unscored = float("inf"), "–"
     latest = s.device.get("tacho")
     if _aid(s, name):
-        return float("inf")
+        return unscored
     true_t, true = s.rows("tacho")
     t, rows = s.rows("rate", name)
     if latest is None or len(true_t) < 2 or not len(t):
-        return float("inf")
+        return unscored
     inside = (t >= true_t[0]) & (t <= true_t[-1])
     omega, reference = rows["omega_ib_b"][inside, 2], np.interp(t[inside], true_t, true["omega"])
     if not latest.message.direction_known:
         omega, reference = np.abs(omega), np.abs(reference)
-    return (
-        float(np.sqrt(np.nanmean((omega - reference) ** 2)) * DEG) if inside.any() else float("inf")
-    )
+    if not inside.any():
+        return unscored
+    error, sight = (omega - reference) * DEG, rows["sight"][inside, 2]
+    value = rms(error, sight)
+    return value if np.isfinite(value) else float("inf"), rms_text(error, sight)
 
 
 def _aid(s: Snapshot, name: str) -> str:
@@ -84,7 +90,7 @@ def _aid(s: Snapshot, name: str) -> str:
     return newest.message.aid if newest else ""
 
 
-def _row(s: Snapshot, name: str, error: float) -> Markup:
+def _row(s: Snapshot, name: str, score: str) -> Markup:
     _, rows = s.rows("rate", name)
     known = np.isfinite(rows["nis"])
     nis, dof = rows["nis"][known], np.maximum(rows["nis_dof"][known], 1.0)
@@ -92,11 +98,11 @@ def _row(s: Snapshot, name: str, error: float) -> Markup:
     cost = status.message.us_per_sample if status else float("nan")
     state = status.message.state if status else "–"
     aid = _aid(s, name)
-    score = f"not scored: aided by the {aid}" if aid else number(error, 2)
+    score = f"not scored: aided by the {aid}" if aid else score
     colour = estimator_colour(name, s.device.estimators("rate"))
     title = joined([tag("span", "■", style=f"color:{colour}"), " ", estimator_title(name)])
     honest = "–"
     if len(nis):
         honest = joined([number(float(np.mean(nis / dof)), 2), " · ", verdict(nis, dof)])
-    cells = (tag("td", cell) for cell in (title, score, honest, number(cost, 0), state))
+    cells = (tag("td", cell) for cell in (title, explained(score), honest, number(cost, 0), state))
     return tag("tr", *cells, class_="gf-stale" if s.stale("rate", name) else "")

@@ -13,12 +13,9 @@ from dashboard.scene.drawing.palette import (
     AXES,
     GREY,
     REFERENCE,
-    VERMILLION,
-    YELLOW,
     truth_colour,
 )
-from dashboard.scene.panels.base import DEG, NO_RATE, Panel, Snapshot, estimator_curve
-from messages.contract import gyrofree_pb2 as pb
+from dashboard.scene.panels.base import DEG, NO_RATE, Panel, Snapshot, estimator_curve, shades_of
 
 TITLES = {axis: joined([sub("ω", axis), " with 3σ"]) for axis in "xyz"}
 
@@ -86,9 +83,8 @@ class Rates(Panel):
         for name in s.device.estimators("rate"):
             t, rows = s.rows("rate", name)
             sigma = rows["sigma"][:, k] * DEG
-            curves.append(
-                estimator_curve(s, "rate", name, t, rows["omega_ib_b"][:, k] * DEG, 3 * sigma)
-            )
+            omega, sight = rows["omega_ib_b"][:, k] * DEG, rows["sight"][:, k]
+            curves.append(estimator_curve(s, "rate", name, t, omega, 3 * sigma, sight))
         curves += _bound(s, k)
         return curves
 
@@ -108,11 +104,7 @@ def _sight(s: Snapshot, k: int) -> list[Shade]:
     if not name:
         return []
     t, rows = s.rows("rate", name)
-    words = rows["sight"][:, k]
-    return [
-        Shade("ambiguous", YELLOW, t, words == pb.RateEstimate.SIGHT_AMBIGUOUS),
-        Shade("blind", VERMILLION, t, words == pb.RateEstimate.SIGHT_BLIND),
-    ]
+    return shades_of(t, rows["sight"][:, k])
 
 
 def _bound(s: Snapshot, k: int) -> list[Curve]:

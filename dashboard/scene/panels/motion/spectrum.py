@@ -10,7 +10,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from dashboard.data.channels import Channel, channels, derived
+from dashboard.data.channels import Channel, channels, derived, sight_of
 from dashboard.data.device import Device
 from dashboard.scene.drawing.chart import AXIS
 from dashboard.scene.drawing.page import Markup, alert, note, tag
@@ -18,6 +18,7 @@ from dashboard.scene.panels.base import Panel, Snapshot
 from logs.figures.expression import read
 from logs.figures.names import BLUE
 from logs.figures.quantity import ExpressionError
+from logs.figures.sight import vouched
 from logs.figures.spectrum import density, unbroken
 from sessions.report.stability import LEAST, allan_of
 
@@ -49,14 +50,14 @@ def symbol(name: str) -> str:
 
 
 def samples(s: Snapshot, signal: Channel | str) -> tuple[Array, Array, str]:
-    """Times (n,) s, values (n,) and unit of what was chosen, in the window. Raises
-    ExpressionError.
+    """Times (n,) s, values (n,) and unit of what was chosen, in the window; NaN where an estimator
+    does not vouch for it. Raises ExpressionError.
     """
     if isinstance(signal, str):
         drawn = derived(s.device, read(signal), s.t0, s.t1, channels(s.device))
-        return drawn.t, drawn.y, drawn.unit
+        return drawn.t, vouched(drawn.y, drawn.sight), drawn.unit
     t, rows = s.rows(signal.topic, signal.estimator)
-    return np.asarray(t), np.asarray(signal.of(rows)), signal.unit
+    return np.asarray(t), vouched(signal.of(rows), sight_of(signal, rows)), signal.unit
 
 
 def _scales(x: Array) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from dashboard.scene.drawing.geometry import MODES
 from dashboard.scene.drawing.page import Markup, note, rows
 from dashboard.scene.drawing.palette import FIX, estimator_title, number
 from dashboard.scene.panels.base import DEG, Panel, Snapshot, estimator_curve
+from logs.figures.sight import word
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
 
@@ -45,7 +46,8 @@ class Position(Panel):
                     curves.append(estimator_curve(s, "nav", name, t, r["p_n"][:, k], half))
                 else:
                     t, r = s.rows("rate", name)
-                    curves.append(estimator_curve(s, "rate", name, t, r["p_n"][:, k]))
+                    sight = r["sight"].max(axis=1)  # the way is no better known than the turns
+                    curves.append(estimator_curve(s, "rate", name, t, r["p_n"][:, k], sight=sight))
             if vehicle and s.device.get("gnss"):
                 t, r = s.rows("gnss")
                 curves.append(
@@ -101,11 +103,9 @@ def _cube_note(s: Snapshot) -> Markup:
     for name in names:
         m = rates.row(s.device.get("rate", name).message, -1)
         if len(m.p_n_m) == 3:
+            far = number(float(np.linalg.norm(m.p_n_m)), 1, "m")
             items.append(
-                (
-                    f"distance, {estimator_title(name)}",
-                    number(float(np.linalg.norm(m.p_n_m)), 1, "m"),
-                )
+                (f"distance, {estimator_title(name)}", word(max(m.sight, default=0)) or far)
             )
     text = "Inertial navigation from the start without any aid: it drifts by nature."
     return note(text) + rows(items)

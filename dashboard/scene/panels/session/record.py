@@ -4,6 +4,7 @@ import viser
 
 from dashboard.scene.drawing.page import EMPTY, Markup, alert, bad, rows, tag
 from dashboard.scene.drawing.palette import number
+from messages.text import counted
 
 
 class Record:
@@ -41,17 +42,18 @@ class Record:
             items.append(("length", number(m.seconds, 0, "s")))
             items.append(
                 (
-                    "written · safe on disk",
+                    "messages · on disk",
                     f"{number(m.messages, 0)} · {number(m.durable_messages, 0)}",
                 )
             )
             items.append(("size", number(m.bytes / 1e6, 1, "MB")))
         if m.clock_steps:
-            steps = f"set {m.clock_steps} times, {m.clock_offset_s:+,.1f} s in all"
+            off = number(m.clock_offset_s, 1, "s", sign=True)
+            steps = f"set {counted(m.clock_steps, 'time')}, {off} in all"
             items.append(("wall clock", bad(f"{steps}; times go on without")))
         lost = sum(m.lost.values())
         if lost:
-            items.append(("lost on the bus", bad(f"{number(lost, 0)} messages")))
+            items.append(("lost on the bus", bad(counted(lost, "message"))))
         if m.refused:
             kinds = ", ".join(f"{kind} {n}" for kind, n in sorted(m.refused.items()))
             items.append(("refused on the bus", bad(kinds)))

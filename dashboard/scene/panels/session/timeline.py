@@ -15,7 +15,7 @@ from dashboard.scene.drawing.page import EMPTY, Markup, joined, note, tag
 from dashboard.scene.panels.base import Input
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
-from messages.text import plain
+from messages.text import counted, plain
 
 log = logging.getLogger(__name__)
 
@@ -130,8 +130,10 @@ class Timeline:
             text = " · not being recorded: notes are shown, but not kept"
             return note(tag("b", "Live"), text)
         repaired = sum(m.repaired.values())
-        filled = f" · {repaired} messages filled in after a loss" if repaired else ""
-        holding = f" · filling a gap, {m.repairing} messages wait" if m.repairing else ""
+        filled = f" · {counted(repaired, 'message')} filled in after a loss" if repaired else ""
+        holding = (
+            f" · filling a gap: {counted(m.repairing, 'message')} to come" if m.repairing else ""
+        )
         words = f" {m.session} · {clock(m.seconds)}{filled}{holding}"
         return note(tag("b", "Live"), " ", tag("b", "●", class_="gf-rec"), words)
 

@@ -41,7 +41,7 @@ function nearest(times) {
 
 function inWords(ellipse, quality, t) {
   const sure = ellipse ? `± ${metre(ellipse[0])} × ${metre(ellipse[1])} (2σ)` : "accuracy not said";
-  return `${quality ? `${quality}, ` : ""}${sure} at ${t.toFixed(1)} s`;
+  return `${quality ? `${quality}, ` : ""}${sure} at ${t.toFixed(1)}\u00a0s`;
 }
 
 function redraw() {
