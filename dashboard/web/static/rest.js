@@ -7,14 +7,17 @@ export async function call(path, body) {
     headers: { "content-type": "application/json", "x-csrf-token": csrf },
     body: JSON.stringify(body),
   };
-  return answered(await fetch(`/api/${path}`, options));
+  return answered(await asked(`/api/${path}`, options));
 }
 
 // Bytes as they are, a piece of a file.
 export async function send(path, blob) {
   const headers = { "content-type": "application/octet-stream", "x-csrf-token": csrf };
-  return answered(await fetch(`/api/${path}`, { method: "POST", headers, body: blob }));
+  return answered(await asked(`/api/${path}`, { method: "POST", headers, body: blob }));
 }
+
+// A browser's own word for a server that is gone tells nobody what to do.
+const asked = (path, options) => fetch(path, options).catch(() => { throw new Error("The dashboard does not answer: does it still run, and is the network there?"); });
 
 async function answered(answer) {
   if (answer.status === 401) location.assign(`/login?${new URLSearchParams({ next: location.pathname + location.search })}`);
