@@ -71,7 +71,7 @@ class DashboardSettings(BaseModel):
 
     session_hours: float = setting(12.0, "longest sign-in", unit="h", gt=0, le=720)
     idle_hours: float = setting(
-        2.0, "a sign-in unused for so long ends; to look on is no use", unit="h", gt=0, le=720
+        12.0, "a sign-in unused for so long ends; to look on is no use", unit="h", gt=0, le=720
     )
     sign_ins_per_user: int = setting(
         10, "of one user at a time; a new one ends the oldest", ge=1, le=1000

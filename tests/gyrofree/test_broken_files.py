@@ -37,6 +37,7 @@ VALUES = {  # of what is no file
     "place": "office",
     "address": "127.0.0.1",
     "id": "link/cube",
+    "minutes": "5",
 }
 GOOD = {  # of a file that is wanted beside the broken one
     "log": "cube.csv",
