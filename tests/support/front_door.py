@@ -73,6 +73,7 @@ class Door:
         self, folder: Path, port: int, scene: bool = True, scene_at: int = 0, **options: Any
     ) -> None:
         services = {key: options.pop(key) for key in SERVICES if key in options}
+        options = {"idle_hours": 2.0} | options
         self.settings = DashboardSettings(
             port=port, users=folder / "users.json", sessions_root=folder / "sessions", **options
         )
