@@ -294,6 +294,8 @@ def test_the_log_of_acts_is_bounded_and_survives_damage(tmp_path, monkeypatch):
     newest = log.newest(5)
     assert [one.who for one in newest] == [f"user {k}" for k in range(999, 994, -1)]
     assert log.damaged == 3 and log.newest(5, "USER 998 act")[0].who == "user 998"
+    stamp = json.loads(log._tail()[10])["utc_s"]
+    assert not log.newest(5, str(stamp)), "a time in seconds is no text that people look for"
     away = Audit(tmp_path / "users.json.audit" / "not a folder")
     away.done("act", "user")
     assert away.lost == 1

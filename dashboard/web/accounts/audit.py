@@ -59,7 +59,8 @@ class Audit:
             except (ValueError, TypeError, RecursionError):
                 damaged += 1
                 continue
-            inside = " ".join(map(str, asdict(entry).values())).lower()
+            said = (entry.who, entry.address, entry.what, entry.result, entry.detail)
+            inside = " ".join(map(str, said)).lower()
             if all(word in inside for word in words):
                 found.append(entry)
                 if len(found) == number:
