@@ -15,6 +15,7 @@ COPY estimator estimator
 COPY logs logs
 COPY sessions sessions
 COPY dashboard dashboard
+COPY sites sites
 COPY emulator emulator
 COPY gyrofree gyrofree
 RUN PATH=/src/.venv/bin:$PATH CXX="$(cat .make/compiler)" .venv/bin/pip wheel --no-deps --no-build-isolation \

@@ -3,7 +3,7 @@
 # make test   everything it needs, then all tests
 # make cases  inputs that once failed, from $GYROFREE_CASES or ../shared/cases
 # make firmware  the board's image and map into build/firmware, with its size
-# make fuzz   libFuzzer on the board's decoder and commands (SECONDS=60)
+# make fuzz   libFuzzer on the board's decoder and commands (SECONDS=60); make fuzz-web hostile requests to the page
 # make wheel  dist/gyrofree-*.whl, which installs and runs where there is no compiler
 # make site   the documents as a site in build/site, links checked; make pictures takes its pictures anew
 # make bench  the figures of README and docs, one JSON line each
@@ -19,7 +19,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 INSTALL := $(PIP) install --quiet --no-deps --require-hashes
 DRIVE := $(if $(DATA),--data "$(DATA)")
 
-.PHONY: demo test cases setup wheel dev system-packages bench docs site pictures messages lint firmware fuzz compose-test clean
+.PHONY: demo test cases setup wheel dev system-packages bench docs site pictures messages lint firmware fuzz fuzz-web compose-test clean
 
 # BOARD=emulated: the table is sensed by the firmware image in the emulator
 demo: setup $(if $(filter emulated,$(BOARD)),.make/board firmware)
@@ -101,6 +101,9 @@ firmware:
 
 fuzz: setup dev system-packages
 	$(BIN)/python tests/fuzz.py --seconds $(SECONDS)
+
+fuzz-web: setup dev
+	$(BIN)/python tests/fuzz_web.py
 
 docs: setup
 	$(BIN)/python -m firmware_protocol.document > docs/protocol.md

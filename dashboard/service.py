@@ -22,6 +22,7 @@ from dashboard.web.first.control import FirstRun
 from dashboard.web.front import Front
 from dashboard.web.jobs import Jobs
 from dashboard.web.map.archive import ArchiveError, open_archive
+from dashboard.web.tls.certificate import open_certificate
 from dashboard.web.users import UserStore, load_users
 from messages.bus.session import BusSettings, open_client
 from sessions.library.catalogue import Catalogue
@@ -93,7 +94,7 @@ def serve(front: Front, bound: socket.socket, stop: threading.Event) -> None:
         proxy_headers=bool(settings.trusted_proxies),
         forwarded_allow_ips=settings.trusted_proxies or None,
         timeout_graceful_shutdown=GRACE_S,
-        http=connections.protocol(),
+        http=connections.protocol(front.certificate),  # type: ignore[arg-type]
         ws=connections.sockets(),
         h11_max_incomplete_event_size=HEAD_LIMIT,
         timeout_keep_alive=15,
@@ -106,6 +107,8 @@ def serve(front: Front, bound: socket.socket, stop: threading.Event) -> None:
     async def until_stopped() -> None:
         serving = asyncio.create_task(server.serve(sockets=[bound]))
         while not stop.is_set() and not serving.done():
+            if front.certificate is not None:
+                front.certificate.look()
             await asyncio.sleep(STOP_LOOK_S)
         server.should_exit = True
         await serving
@@ -128,26 +131,28 @@ def run(
     replay: Replay | None = None,
     jobs: Jobs | None = None,
     first_run: FirstRun | None = None,
+    watching: str = "",
 ) -> None:
     """The dashboard until `stop` is set.
 
     `replay` starts replays for the sessions page (control.ProcessReplay); without it the page has
     no such button. `jobs` makes reports and exports in the background; `first_run` asks an
-    administrator for the first board. Raises PortTaken when the
-    port or viser's is in use, UsersError for a damaged users file, BusUnavailable when it is
-    stopped before a router answers.
+    administrator for the first board. `watching`: why nobody here may give orders. Raises
+    PortTaken when the port or viser's is in use, CertificateError, UsersError for a damaged users
+    file, BusUnavailable when it is stopped before a router answers.
     """
     from dashboard.scene import (
         service as scene,
     )  # here: viser takes a second to import, a taken port should not wait
 
+    certificate = open_certificate(settings)
     with listen(settings.host, settings.port) as bound:
         if not load_users(settings.users):
             log.warning(
                 "%s has no users: nobody can sign in; add one with `gyrofree users add`",
                 settings.users,
             )
-        if not settings.secure_cookies and settings.host not in ("127.0.0.1", "::1", "localhost"):
+        if not settings.secure and settings.host not in ("127.0.0.1", "::1", "localhost"):
             log.warning(
                 "serving %s without TLS: passwords cross the network readable; see docs",
                 settings.url,
@@ -155,7 +160,7 @@ def run(
         _look_at_map(settings)
         with open_client(bus, stop) as session:
             store = Store(settings.devices, settings.history_bytes)
-            desk, watched = Desk(session, bus.prefix), threading.Event()
+            desk, watched = Desk(session, bus.prefix, watching), threading.Event()
             try:
                 handle = scene.start(settings, store, desk, watched)
             except scene.SceneError as error:
@@ -166,6 +171,7 @@ def run(
                 gate=Gate(settings, UserStore(settings.users)),
                 catalogue=Catalogue(settings.sessions_root),
                 scene_port=lambda: handle.port,
+                certificate=certificate,
                 store=store,
                 desk=desk,
                 replay=replay,

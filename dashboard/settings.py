@@ -3,7 +3,7 @@
 import ipaddress
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, field_validator
+from pydantic import BaseModel, ConfigDict, field_validator, model_validator
 
 from messages.setting import setting
 
@@ -40,11 +40,42 @@ class DashboardSettings(BaseModel):
     demo: bool = setting(False, "says so on the pages; the demo's link signs in without a password")
 
     allowed_hosts: list[str] = setting([], "names besides localhost that people type to get here")
-    secure_cookies: bool = setting(False, "true behind TLS: `__Host-` cookie, Secure, HSTS")
+    tls_certificate: Path | None = setting(
+        None,
+        "PEM file of the certificate and its chain: the port speaks TLS by itself; other files are"
+        " taken when they change",
+        shown=True,
+    )
+    tls_key: Path | None = setting(None, "PEM file of its private key", shown=True)
+    secure_cookies: bool = setting(
+        False, "true behind a proxy with TLS: `__Host-` cookie, Secure, HSTS"
+    )
     trusted_proxies: list[str] = setting([], "addresses whose X-Forwarded-For is believed")
 
+    oidc_issuer: str = setting(
+        "", "identity provider of the lab (OpenID Connect), as https://id.example.org/lab"
+    )
+    oidc_client: str = setting("", "what this dashboard is called there")
+    oidc_secret: Path | None = setting(None, "file of its secret there; none: a public client")
+    oidc_address: str = setting(
+        "", "this page as browsers see it, as https://bench.example.org; they come back there"
+    )
+    oidc_suffix: str = setting("lab", "its people are called NAME@suffix here")
+    oidc_scope: str = setting("openid profile", "what is asked for")
+    oidc_name_claim: str = setting("preferred_username", "their name; absent: `sub`")
+    oidc_role_claim: str = setting("groups", "says what they may do")
+    oidc_admins: list[str] = setting([], "values of it that make an admin")
+    oidc_operators: list[str] = setting([], "values of it that make an operator")
+    oidc_viewers: list[str] = setting([], 'values of it that make a viewer; `["*"]`: everybody')
+    oidc_ca: Path | None = setting(None, "PEM file of who vouches for the provider's certificate")
+
     session_hours: float = setting(12.0, "longest sign-in", unit="h", gt=0, le=720)
-    idle_hours: float = setting(2.0, "a sign-in unused for so long ends", unit="h", gt=0, le=720)
+    idle_hours: float = setting(
+        12.0, "a sign-in unused for so long ends; to look on is no use", unit="h", gt=0, le=720
+    )
+    sign_ins_per_user: int = setting(
+        10, "of one user at a time; a new one ends the oldest", ge=1, le=1000
+    )
     link_minutes: float = setting(
         15.0, "life of a one-time sign-in link", unit="min", gt=0, le=1440
     )
@@ -78,6 +109,9 @@ class DashboardSettings(BaseModel):
     body_limit: int = setting(
         65536, "largest body of a request", unit="bytes", ge=1024, le=10_000_000
     )
+    upload_bytes_per_user: int = setting(
+        2 << 30, "logs and photos of one user that are being sent", unit="bytes", ge=1 << 20
+    )
     body_timeout_s: float = setting(10.0, "to receive that body", unit="s", gt=0, le=300)
     message_limit: int = setting(
         65536, "largest message from a browser's scene", unit="bytes", ge=1024, le=10_000_000
@@ -103,12 +137,37 @@ class DashboardSettings(BaseModel):
                 )
         return [host.lower() for host in value]
 
+    @model_validator(mode="after")
+    def _both_files_of_tls(self) -> "DashboardSettings":
+        if (self.tls_certificate is None) != (self.tls_key is None):
+            raise ValueError("tls_certificate and tls_key: want both, or none")
+        return self
+
+    @model_validator(mode="after")
+    def _whole_provider(self) -> "DashboardSettings":
+        if not self.oidc_issuer:
+            return self
+        if not self.oidc_client or not self.oidc_address:
+            raise ValueError("oidc_issuer: want oidc_client and oidc_address, too")
+        if not (self.oidc_admins or self.oidc_operators or self.oidc_viewers):
+            raise ValueError("oidc_issuer: nobody gets a role; want oidc_viewers or others")
+        for url in (self.oidc_issuer, self.oidc_address):
+            local = url.startswith(("http://127.0.0.1", "http://localhost", "http://[::1]"))
+            if not url.startswith("https://") and not local:
+                raise ValueError(f"{url!r}: want https://")
+        return self
+
+    @property
+    def secure(self) -> bool:
+        """Browsers reach it by https, ours or a proxy's."""
+        return self.secure_cookies or self.tls_certificate is not None
+
     @property
     def cookie(self) -> str:
         """Name of the cookie. Cookies do not know ports, so the port is in the name where __Host-
         is not possible.
         """
-        return "__Host-gyrofree" if self.secure_cookies else f"gyrofree-{self.port}"
+        return "__Host-gyrofree" if self.secure else f"gyrofree-{self.port}"
 
     @property
     def url(self) -> str:
@@ -125,4 +184,4 @@ class DashboardSettings(BaseModel):
             )
         except ValueError:
             pass
-        return f"{'https' if self.secure_cookies else 'http'}://{host}:{self.port}"
+        return f"{'https' if self.secure else 'http'}://{host}:{self.port}"

@@ -125,7 +125,7 @@ finish() {
     local code=$?
     trap - EXIT
     if [ $code != 0 ]; then
-        for service in router gateway board estimator recorder procedures dashboard; do
+        for service in router gateway board estimator recorder procedures alarms dashboard; do
             printf -- '-- %s\n' "$service"
             podman logs --tail 15 "$(container "$service")" 2>&1 || true
         done
@@ -151,11 +151,11 @@ prove() {
     local begun=$SECONDS service
     compose up --detach --no-build >"$STATE/up.log" 2>&1 || { cat "$STATE/up.log"; die "podman-compose up"; }
     eventually 120 "the dashboard answers on its published port" page
-    for service in router gateway estimator recorder procedures dashboard; do
+    for service in router gateway estimator recorder procedures alarms dashboard; do
         eventually 90 "$service is healthy" healthy "$service"
     done
     say "all healthy after $((SECONDS - begun)) s"
-    for service in router gateway board estimator recorder procedures dashboard; do
+    for service in router gateway board estimator recorder procedures alarms dashboard; do
         [ "$(inside "$service" id -u)" = 10001 ] || die "$service runs as another user"
         refused inside "$service" touch /etc/gyrofree/x /opt/gyrofree/x || die "$service can write its root"
         inside "$service" grep -q '^CapEff:[[:space:]]*0*$' /proc/1/status || die "$service has capabilities"

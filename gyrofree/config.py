@@ -12,6 +12,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from dashboard.alarms.settings import AlarmSettings
 from dashboard.settings import DashboardSettings
 from estimator.settings import EstimatorSettings
 from gateway.settings import GatewaySettings
@@ -40,6 +41,7 @@ class Settings(BaseModel):
     procedures: ProcedureSettings = setting(
         ProcedureSettings(), "Where runs of procedures are kept, and what they drive"
     )
+    alarms: AlarmSettings = setting(AlarmSettings(), "What is an alarm, and who is told")
     dashboard: DashboardSettings = setting(DashboardSettings(), "The page in the browser")
 
 

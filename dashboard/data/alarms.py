@@ -5,7 +5,8 @@ the summary and the REST interface, so that all three say the same.
 import re
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from dashboard.data.device import BEHIND_STALE_S, Device
 from dashboard.data.store import Store
@@ -34,6 +35,9 @@ AXIS_MEANINGS = {  # of what is wrong with an axis, for people
     "biased": "It is off by a constant that the others do not share.",
     "not fresh": "Its values are repeated: no new reading comes.",
 }
+LEVELS = {"critical": 3, "warning": 2, "watch": 1}
+SHOWN = (pb.Alarm.STATE_UNACKNOWLEDGED, pb.Alarm.STATE_ACKNOWLEDGED)
+ALONE = ("clock", "disk", "inconsistent", "recorder")  # that the alarms' service finds, and we not
 MOST = 12  # of one device
 TURNS_RADPS = 0.035  # 2 deg/s: beyond it a rate is no standstill
 PROCEDURES_SILENT_S = 3.0  # s without a word of who drives a table
@@ -49,13 +53,27 @@ class Alarm:
     title: str  # in a few words
     text: str  # what was found and what to do
     page: str  # key of the page that shows it; "" for none
+    about: str = ""  # which axis, filter or fault it is
+    level: str = ""  # watch, warning or critical, where the service has said so
+    state: str = ""  # unacknowledged or acknowledged, likewise
+    raised_s: float = 0.0  # s since 1970, likewise
+
+    @property
+    def id(self) -> str:
+        """Stays while what is said of it changes."""
+        return f"{self.kind}-{self.about}" if self.about else self.kind
 
 
 def words(alarm: Alarm) -> dict[str, str]:
     """Words of the trade that stand in an alarm, with their meanings."""
-    of_axes = AXIS_MEANINGS if alarm.kind == "axis" else {}
-    shown = {word: means for word, means in of_axes.items() if word in alarm.title}
-    return shown | words_of([alarm.title, alarm.text])
+    return words_in(alarm.kind, alarm.title, alarm.text)
+
+
+def words_in(kind: str, title: str, text: str) -> dict[str, str]:
+    """Likewise of one that came over the bus."""
+    of_axes = AXIS_MEANINGS if kind == "axis" else {}
+    shown = {word: means for word, means in of_axes.items() if word in title}
+    return shown | words_of([title, text])
 
 
 def counts(message: str) -> dict[str, int] | None:
@@ -81,16 +99,57 @@ def alarms(store: Store, device: Device, now: float | None = None) -> list[Alarm
     """What is wrong with a device, the worst first. Call under the store's lock; now:
     time.monotonic(), s, of a replay that is paused, when it was.
     """
-    now = time.monotonic() if now is None else now
     if store.replay.state(device.name, time.monotonic()) == "ended":
         return []
+    now = time.monotonic() if now is None else now
+    return judged(faults(device, now), device, now, False)[:MOST]
+
+
+def judged(found: list[Alarm], device: Device, now: float, bench: bool) -> list[Alarm]:
+    """What is found here with what the alarms' service says of it: its level, who took note, and
+    what it alone finds, as limits. What is on a shelf is left out. Without the service, as found.
+    """
+    heard = device.get("alarm")
+    if heard is None or device.stale("alarm", now=now):
+        return found
+    said = {one.id: one for one in heard.message.alarms if bool(one.device) is not bench}
+    shown = []
+    for one in found:
+        known = said.pop(one.id, None)
+        if known is None or known.state in (pb.Alarm.STATE_NORMAL, pb.Alarm.STATE_RETURNED):
+            shown.append(one)
+        elif known.state != pb.Alarm.STATE_SHELVED:
+            shown.append(replace(one, **_said(known)))
+    others = [one for one in said.values() if one.state in SHOWN and one.active]
+    shown += [
+        Alarm(plain(one.kind), plain(one.title), plain(one.text), plain(one.page), **_said(one))
+        for one in others
+        if one.kind in ("limit", *ALONE)
+    ]
+    return sorted(shown, key=lambda one: -LEVELS.get(one.level, 1))
+
+
+def _said(one: pb.Alarm) -> dict[str, Any]:
+    level = next((word for word, rank in LEVELS.items() if rank == one.level), "")
+    state = "acknowledged" if one.state == pb.Alarm.STATE_ACKNOWLEDGED else "unacknowledged"
+    return {"level": level, "state": state, "raised_s": one.raised_utc_ns * 1e-9}
+
+
+def faults(device: Device, now: float) -> list[Alarm]:
+    """All of them. Call under the store's lock."""
     found = [*_table(device, now), *_link(device, now), *_board(device, now), *_axes(device, now)]
-    found += [*_estimators(device, now), *_sight(device, now)]
-    return found[:MOST]
+    return [*found, *_estimators(device, now), *_sight(device, now)]
 
 
 def bench_alarms(store: Store, now: float | None = None) -> list[Alarm]:
-    """What is wrong with the recorder. Call under the store's lock."""
+    """What is wrong with the recorder and its disk. Call under the store's lock."""
+    found, now = bench_faults(store, now), time.monotonic() if now is None else now
+    told = [one for one in store.devices.values() if not one.stale("alarm", now=now)]
+    return judged(found, told[0], now, True) if told else found
+
+
+def bench_faults(store: Store, now: float | None = None) -> list[Alarm]:
+    """As found here. Call under the store's lock."""
     heard = store.recorder
     if heard is None:
         return []
@@ -119,9 +178,9 @@ def _table(device: Device, now: float) -> Iterator[Alarm]:
             f"the procedures have been silent for {heard.age(now):.0f} s and"
             f" {plain(heard.message.table, 60)} may still turn: stop it at the table"
         )
-        yield Alarm("table", "the table is left alone", text, "procedure")
+        yield Alarm("table", "the table is left alone", text, "procedure", "alone")
     if heard is not None and heard.message.alarm:
-        yield Alarm("table", "the table may turn", plain(heard.message.alarm), "procedure")
+        yield Alarm("table", "the table may turn", plain(heard.message.alarm), "procedure", "turns")
 
 
 def _link(device: Device, now: float) -> Iterator[Alarm]:
@@ -135,7 +194,7 @@ def _link(device: Device, now: float) -> Iterator[Alarm]:
     elif not m.connected:
         yield Alarm("link", "link lost", plain(m.message) or "the board is not connected", "link")
     elif m.message:
-        yield Alarm("link", "link", plain(m.message), "link")
+        yield Alarm("link", "link", plain(m.message), "link", "said")
 
 
 def _board(device: Device, now: float) -> Iterator[Alarm]:
@@ -148,7 +207,8 @@ def _board(device: Device, now: float) -> Iterator[Alarm]:
         if fault.name == "reboot" and simulated:
             continue
         if fault.active or fault.name == "reboot":  # over as soon as it is known
-            yield Alarm("board", plain(fault.name), plain(fault.text), "board")
+            name = plain(fault.name)
+            yield Alarm("board", name, plain(fault.text), "board", name)
 
 
 def _axes(device: Device, now: float) -> Iterator[Alarm]:
@@ -158,9 +218,10 @@ def _axes(device: Device, now: float) -> Iterator[Alarm]:
     for axis in heard.message.axes:
         if axis_good(axis):
             continue
-        title = f"axis {plain(axis.name, 16)} {AXIS_WORDS.get(axis.state, 'unknown')}"
+        name = plain(axis.name, 16)
+        title = f"axis {name} {AXIS_WORDS.get(axis.state, 'unknown')}"
         text = plain(axis.text) or "it does not fit the other axes"
-        yield Alarm("axis", title, text + (", not used" if axis.excluded else ""), "health")
+        yield Alarm("axis", title, text + (", not used" if axis.excluded else ""), "health", name)
 
 
 def _estimators(device: Device, now: float) -> Iterator[Alarm]:
@@ -170,12 +231,13 @@ def _estimators(device: Device, now: float) -> Iterator[Alarm]:
         m, called = heard.message, plain(name, 40)
         if device.stale("estimator", name, now):
             text = f"nothing from it for {heard.age(now):.0f} s: does its process still run?"
-            yield Alarm("estimator", f"{called} silent", text, page)
+            yield Alarm("estimator", f"{called} silent", text, page, called)
             continue
         if m.message and counts(m.message) is None:
             doubted = m.message.startswith("settings: ")
             title = "is a setting wrong?" if doubted else called
-            yield Alarm("settings" if doubted else "estimator", title, plain(m.message), page)
+            kind = "settings" if doubted else "estimator"
+            yield Alarm(kind, title, plain(m.message), page, called)
     yield from _late(device, page)
 
 
@@ -184,7 +246,7 @@ def _late(device: Device, page: str) -> Iterator[Alarm]:
     said = [device.get("estimator", name).message for name in device.estimators("estimator")]
     trouble = next((plain(m.trouble) for m in said if m.trouble), "")
     if trouble:
-        yield Alarm("disk", "state not saved", trouble, page)
+        yield Alarm("disk", "state not saved", trouble, page, "state")
     behind_s = max((m.behind_s for m in said), default=0.0)
     limit_hz = max((m.limit_hz for m in said), default=0.0)
     if behind_s <= BEHIND_STALE_S and not limit_hz:
@@ -215,11 +277,12 @@ def _sight(device: Device, now: float) -> Iterator[Alarm]:
         return
     reason, called = plain(m.sight_reason), plain(name, 40)
     if "contradict" in reason:
-        yield Alarm("contradicted", f"{called} contradicted", reason, "nis")
+        yield Alarm("contradicted", f"{called} contradicted", reason, "nis", called)
     blind = len(m.sight) == 3 and all(s == pb.RateEstimate.SIGHT_BLIND for s in m.sight)
     if blind and not m.still:
-        yield Alarm("blind", f"{called} blind", reason or "no component is seen now", "rates")
+        text = reason or "no component is seen now"
+        yield Alarm("blind", f"{called} blind", text, "rates", called)
     omega = m.omega_ib_b_radps
     if m.still and len(omega) == 3 and max(map(abs, omega)) > TURNS_RADPS:
         text = "the accelerometers say that it stands still, the filter says that it turns"
-        yield Alarm("contradicted", f"{called} contradicted", text, "rates")
+        yield Alarm("contradicted", f"{called} contradicted", text, "rates", f"{called}-still")

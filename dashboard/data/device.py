@@ -25,6 +25,7 @@ SLOW_STALE_S = {
     "estimator": 3.0,
     "board": 30.0,
     "procedure": 5.0,
+    "alarm": 6.0,
     "gnss": 2.5,
     "sky": 5.0,
     "innovation": 10.0,

@@ -51,10 +51,16 @@ class Feed:
     """
 
     def __init__(
-        self, session: zenoh.Session, prefix: str, store: Store, watched: threading.Event
+        self,
+        session: zenoh.Session,
+        prefix: str,
+        store: Store,
+        watched: threading.Event,
+        past: bool = True,
     ) -> None:
+        """past: ask for what was before a device was heard."""
         self._session, self._prefix = session, prefix
-        self._store, self._watched = store, watched
+        self._store, self._watched, self._past_too = store, watched, past
         self._queue: deque = deque()
         self._bytes_in = self._bytes_out = 0  # of the queue: counted each by one thread
         self._door = store.door
@@ -142,7 +148,7 @@ class Feed:
             self._store.put(ready.topic, ready.device, ready.estimator, message, arrived)
             if ready.device not in self._known and ready.topic.source in (tp.GATEWAY, tp.ESTIMATES):
                 self._known.add(ready.device)
-                if not ready.device.endswith(tp.REPLAY_SUFFIX):
+                if self._past_too and not ready.device.endswith(tp.REPLAY_SUFFIX):
                     self._ask_past(ready.device, message.header.utc_ns)
 
     def _ask_past(self, device: str, now_ns: int) -> None:

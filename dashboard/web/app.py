@@ -22,6 +22,9 @@ from dashboard.web import (
     session_pages,
     spectrum_api,
 )
+from dashboard.web.accounts import pages as account_pages
+from dashboard.web.accounts import provider_pages
+from dashboard.web.alarms import routes as alarm_routes
 from dashboard.web.first import pages as first_pages
 from dashboard.web.frame import proxy
 from dashboard.web.front import Front
@@ -52,9 +55,12 @@ def create_app(front: Front) -> ASGIApp:
     app.include_router(session_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(spectrum_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(compare_api.routes, responses={401: {"description": "not signed in"}})
+    app.include_router(alarm_routes.routes, responses={401: {"description": "not signed in"}})
     app.include_router(pages.routes)
     app.include_router(session_pages.routes)
     app.include_router(users_page.routes)
+    app.include_router(account_pages.routes)
+    app.include_router(provider_pages.router(front.gate))
     app.include_router(first_pages.routes)
     app.add_exception_handler(RequestValidationError, _not_valid)
     app.add_exception_handler(HTTPException, _refused)

@@ -8,7 +8,6 @@ dashboard still knows who is signed in.
 import asyncio
 import hashlib
 import hmac
-import ipaddress
 import json
 import logging
 import secrets
@@ -19,6 +18,9 @@ from dataclasses import asdict, dataclass, field
 from starlette.requests import HTTPConnection
 
 from dashboard.settings import DashboardSettings
+from dashboard.web.accounts.audit import Audit
+from dashboard.web.accounts.backoff import Backoff, WaitError
+from dashboard.web.accounts.bell import Bell
 from dashboard.web.programs.tokens import TokenStore
 from dashboard.web.users import (
     Role,
@@ -30,8 +32,10 @@ from dashboard.web.users import (
     write_private,
 )
 from messages.clock import Clock, Moment
+from messages.text import plain
 
 __all__ = [
+    "Backoff",
     "Gate",
     "Role",
     "SignIn",
@@ -44,8 +48,8 @@ __all__ = [
 
 log = logging.getLogger(__name__)
 
-ADDRESSES = 4096  # addresses whose failures are remembered; the oldest go first
 SESSIONS = 1024  # sign-ins at a time
+AGENT = 120  # characters kept of what a browser calls itself
 PARALLEL = 2  # passwords verified at once: each takes 32 MiB and a core
 
 
@@ -59,59 +63,11 @@ class SignIn:
     seen: float
     password: str = ""  # mark of the one it began under; empty: of a version that kept none
     moment: list[str | int] = field(default_factory=list)  # of its beginning: messages.clock.Moment
-
-
-class WaitError(Exception):
-    """Too many wrong passwords from this address."""
-
-    def __init__(self, seconds: float) -> None:
-        super().__init__(f"too many wrong passwords from this address: wait {seconds:.0f} s")
-        self.seconds = seconds
-
-
-class Backoff:
-    """Waiting time per address: none for the first failures, then 1, 2, 4 ... s up to a limit."""
-
-    def __init__(self, free: int, longest_s: float, clock: Callable[[], float]) -> None:
-        self._free, self._longest, self._clock = free, longest_s, clock
-        self._failures: dict[
-            str, tuple[int, float]
-        ] = {}  # network -> failures, time of the next attempt
-
-    @staticmethod
-    def network(address: str) -> str:
-        """An IPv6 host owns a /64: count that as one address."""
-        try:
-            parsed = ipaddress.ip_address(address)
-        except ValueError:
-            return address
-        return (
-            str(ipaddress.ip_network((parsed, 64), strict=False))
-            if parsed.version == 6
-            else address
-        )
-
-    def attempt(self, address: str) -> None:
-        """Count an attempt as failed before it is verified, so that parallel ones gain nothing;
-        raises WaitError.
-        """
-        key, now = self.network(address), self._clock()
-        count, allowed = self._failures.pop(key, (0, 0.0))
-        if now > allowed + self._longest:
-            count = 0
-        if now < allowed:
-            allowed = min(allowed, now + self._longest)  # also when the clock went back
-            self._failures[key] = (count, allowed)
-            raise WaitError(allowed - now)
-        over = count + 1 - self._free
-        wait = min(2.0 ** min(over, 30), self._longest) if over >= 0 else 0.0
-        self._failures[key] = (count + 1, now + wait)
-        while len(self._failures) > ADDRESSES:
-            self._failures.pop(next(iter(self._failures)))
-
-    def forgive(self, address: str) -> None:
-        """The password was right after all."""
-        self._failures.pop(self.network(address), None)
+    role: str = ""  # of the user when it began; empty: of a version that kept none
+    address: str = ""  # it came from
+    means: str = ""  # password, one-time link ...
+    agent: str = ""  # what the browser calls itself
+    external: bool = False  # an identity provider vouched for him; no user of our file
 
 
 class Gate:
@@ -126,6 +82,7 @@ class Gate:
         """clock: s since 1970; None: by elapsed time, whatever is done to the wall clock."""
         self.settings, self.users = settings, users
         self.tokens = TokenStore(settings.users, users.get)
+        self.audit, self.bell = Audit(settings.users), Bell()
         self._own = clock is None
         self._clock = clock or _elapsed()
         self.backoff = Backoff(settings.free_attempts, settings.longest_wait_s, self._clock)
@@ -134,20 +91,25 @@ class Gate:
         self._sessions: dict[str, SignIn] = self._load()
         self._verifying = asyncio.Semaphore(PARALLEL)
 
-    async def sign_in(self, name: str, password: str, address: str) -> str | None:
+    async def sign_in(self, name: str, password: str, address: str, agent: str = "") -> str | None:
         """A new session id, or None for a wrong name or password; raises WaitError and
         UsersError.
         """
+        user = await self.verified(name, password, address)
+        return None if user is None else self.begin(user.name, address, "password", agent)
+
+    async def verified(self, name: str, password: str, address: str) -> User | None:
+        """The user whose password this is; raises WaitError and UsersError."""
         self.backoff.attempt(address)
         async with self._verifying:
             user = await asyncio.to_thread(self.users.verify, name, password)
         if user is None:
-            log.warning("sign-in refused for %r from %s", name[:64], address)
+            self.audit.refused("password", name, address, "wrong name or password")
             return None
         self.backoff.forgive(address)
-        return self._begin(user.name, address, "password")
+        return user
 
-    def redeem(self, token: str, address: str) -> str | None:
+    def redeem(self, token: str, address: str, agent: str = "") -> str | None:
         """A new session id for a one-time link, or None when it is used, expired or unknown; raises
         WaitError.
         """
@@ -155,57 +117,110 @@ class Gate:
         now = None if self._own else self._clock()
         name = redeem_link_token(self.settings.users, token, now)
         if name is None or self.users.get(name) is None:
-            log.warning("sign-in link refused from %s: used, expired or unknown", address)
+            self.audit.refused("sign-in", "", address, "one-time link: used, expired or unknown")
             return None
         self.backoff.forgive(address)
-        return self._begin(name, address, "one-time link")
+        return self.begin(name, address, "one-time link", agent)
 
     def session_of(self, connection: HTTPConnection) -> tuple[SignIn, User] | None:
         """Who sends this request or opens this WebSocket; None for nobody."""
         token = connection.cookies.get(self.settings.cookie, "")
-        return self.look_up(_digest(token)) if token else None
+        return self.look_up(_digest(token), _by_a_person(connection)) if token else None
 
     def key_of(self, connection: HTTPConnection) -> str:
         """What look_up takes: the hash of the cookie's id."""
         return _digest(connection.cookies.get(self.settings.cookie, ""))
 
-    def look_up(self, key: str) -> tuple[SignIn, User] | None:
-        """The session and the user as the users file has him now; ends what is expired."""
+    def look_up(self, key: str, used: bool = False) -> tuple[SignIn, User] | None:
+        """The session and the user as the users file has him now; ends what is over. used: a person
+        did something, so it is not idle.
+        """
         session, now = self._sessions.get(key), self._clock()
         if session is None:
             return None
-        old = now - session.created > self.settings.session_hours * 3600
-        idle = now - session.seen > self.settings.idle_hours * 3600
-        back = now < session.seen - 1.0  # its age is not known any more
-        user = self.users.get(session.user)
-        if old or idle or back or user is None or not _same_password(user, session):
-            self._end(key)
+        user = self._user_of(session)
+        if why := self._over(session, user, now):
+            self.end(key, why)
             return None
-        session.seen = now
-        return session, user
+        if used:
+            session.seen = now
+        return None if user is None else (session, user)
+
+    def _user_of(self, session: SignIn) -> User | None:
+        if session.external:  # his name ends in the provider's suffix; a user made since is another
+            return User(session.user, Role[session.role], "", session.created)
+        return self.users.get(session.user)
+
+    def _over(self, session: SignIn, user: User | None, now: float) -> str:
+        """Why it is; empty when it is not."""
+        if now - session.created > self.settings.session_hours * 3600:
+            return "past its longest"
+        if now - session.seen > self.settings.idle_hours * 3600:
+            return "idle"
+        if now < session.seen - 1.0:
+            return "its age is not known any more"
+        if user is None:
+            return "no such user any more"
+        if not session.external and not _same_password(user, session):
+            return "another password"
+        return "another role" if session.role not in ("", user.role.name) else ""
 
     def sign_out(self, connection: HTTPConnection) -> None:
         """Forget the session of this request."""
-        self._end(self.key_of(connection))
+        self.end(self.key_of(connection), "signed out")
 
-    def _begin(self, name: str, address: str, means: str) -> str:
+    def sign_ins(self, name: str) -> dict[str, SignIn]:
+        """The open ones of a user by key, the newest first."""
+        mine = [(k, s) for k, s in list(self._sessions.items()) if s.user == name]
+        good = [(key, session) for key, session in mine if self.look_up(key) is not None]
+        return dict(sorted(good, key=lambda pair: -pair[1].created))
+
+    def external(self) -> dict[str, Role]:
+        """Who is signed in by an identity provider."""
+        return {s.user: Role[s.role] for s in list(self._sessions.values()) if s.external}
+
+    def begin(
+        self, name: str, address: str, means: str, agent: str = "", role: Role | None = None
+    ) -> str:
+        """The id of a new session of a user who has shown who he is. role: given by an identity
+        provider, whose people are not in the users file.
+        """
         token, now = secrets.token_urlsafe(32), self._clock()
+        for key in list(self.sign_ins(name))[self.settings.sign_ins_per_user - 1 :]:
+            self.end(key, "one sign-in too many")
         with self._lock:
-            user = self.users.get(name)
+            user = None if role is not None else self.users.get(name)
             mark = "" if user is None else _mark(user)
+            rank = user.role.name if user is not None else role.name if role is not None else ""
             self._sessions[_digest(token)] = SignIn(
-                name, secrets.token_urlsafe(24), now, now, mark, list(Moment.now())
+                name,
+                secrets.token_urlsafe(24),
+                now,
+                now,
+                mark,
+                list(Moment.now()),
+                rank,
+                address,
+                means,
+                plain(agent, AGENT),
+                role is not None,
             )
             while len(self._sessions) > SESSIONS:
                 self._sessions.pop(next(iter(self._sessions)))
             self._save()
-        log.info("%s signed in from %s by %s", name, address, means)
+        self.audit.done("sign-in", name, address, f"by {means}")
         return token
 
-    def _end(self, key: str) -> None:
+    def end(self, key: str, why: str, by: str = "") -> None:
+        """End a sign-in with all that is open under it. by: another than its user."""
         with self._lock:
-            if self._sessions.pop(key, None) is not None:
-                self._save()
+            session = self._sessions.pop(key, None)
+            if session is None:
+                return
+            self._save()
+        detail = why + (f", by {by}" if by else "")
+        self.audit.done("sign-in ended", session.user, session.address, detail)
+        self.bell.ring()
 
     def _load(self) -> dict[str, SignIn]:
         try:
@@ -232,10 +247,19 @@ class Gate:
         try:
             write_private(
                 self._file,
-                json.dumps({key: asdict(session) for key, session in self._sessions.items()}),
+                # not who came by a provider: what it gives him may be another by the next start
+                json.dumps({k: asdict(s) for k, s in self._sessions.items() if not s.external}),
             )
         except OSError as error:
             log.warning("%s: %s: a restart will sign everybody out", self._file, error.strerror)
+
+
+def _by_a_person(connection: HTTPConnection) -> bool:
+    """Pages ask for values again and again by themselves: that is no use of a sign-in."""
+    if connection.scope["type"] != "http":
+        return False
+    asks = connection.scope["method"] in ("GET", "HEAD")
+    return not (asks and connection.url.path.startswith(("/api/", "/map/")))
 
 
 def _elapsed() -> Callable[[], float]:

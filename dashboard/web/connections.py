@@ -16,7 +16,7 @@ import struct
 import sys
 import time
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +25,8 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 
 from dashboard.settings import DashboardSettings
 from dashboard.web.auth import Backoff
+from dashboard.web.tls.certificate import Certificate
+from dashboard.web.tls.first_byte import FirstByte
 
 log = logging.getLogger(__name__)
 
@@ -39,12 +41,13 @@ SPARED = 200  # open files of the process that are not connections
 class Connection:
     """One TCP connection, also after it has become a WebSocket."""
 
-    transport: asyncio.Transport
-    protocol: H11Protocol
+    transport: asyncio.Transport  # of TCP, also where TLS is within
+    protocol: H11Protocol | None  # None until a TLS handshake begins
     address: str
     idle_since: float | None  # s, monotonic; since its last answer, None while one is made
     stuck_since: float | None = None  # s, while its client hardly takes what is sent
     taken_then: int = 0  # bytes that it had taken at that time
+    closing_since: float | None = None  # s, while only its end is waited for
 
     @property
     def gone(self) -> bool:
@@ -66,10 +69,18 @@ class Connection:
             self.stuck_since, self.taken_then = now, self.taken
 
     @property
+    def closing(self) -> bool:
+        """Nothing more is answered on it."""
+        inner = None if self.protocol is None else self.protocol.transport
+        return self.transport.is_closing() or (inner is not None and inner.is_closing())
+
+    @property
     def asked(self) -> bool:
         """A request of it is being answered, or it is a WebSocket."""
+        if self.protocol is None or self.protocol.transport is None or self.closing:
+            return False  # TLS is not there yet, or not any more
         cycle = self.protocol.cycle
-        upgraded = self.transport.get_protocol() is not self.protocol
+        upgraded = self.protocol.transport.get_protocol() is not self.protocol
         return upgraded or (cycle is not None and not cycle.response_complete)
 
 
@@ -85,16 +96,22 @@ class Connections:
         self._looking: asyncio.TimerHandle | None = None
         self.ended = ended
 
-    def protocol(self) -> type[H11Protocol]:
-        """What uvicorn makes of every connection."""
+    def protocol(self, certificate: Certificate | None = None) -> Callable[..., asyncio.Protocol]:
+        """What uvicorn makes of every connection; with a certificate TLS is spoken on all."""
         connections = self
 
         class Counted(H11Protocol):
             _counted: Connection | None = None
 
+            def within(self, counted: Connection) -> "Counted":
+                """The one in a TLS connection, which is counted already."""
+                self._counted, counted.protocol = counted, self
+                return self
+
             def connection_made(self, transport: Any) -> None:
                 super().connection_made(transport)
-                self._counted = connections.enter(transport, self)
+                if self._counted is None:
+                    self._counted = connections.enter(transport, self)
 
             def on_response_complete(self) -> None:
                 super().on_response_complete()
@@ -105,7 +122,17 @@ class Connections:
                 connections.leave(self._counted)
                 super().connection_lost(exc)
 
-        return Counted
+        if certificate is None:
+            return Counted
+        settings = self._settings
+        return lambda **options: FirstByte(
+            certificate,
+            lambda transport: self.enter(transport, None),
+            lambda counted: Counted(**options).within(counted),
+            self.over,
+            settings.request_s,
+            10.0 * settings.take_s,  # _look judges that; it knows who takes, though slowly
+        )
 
     def sockets(self) -> type[WebSocketsSansIOProtocol]:
         """What uvicorn makes of a connection that becomes a WebSocket. Text that is none ends it
@@ -128,7 +155,9 @@ class Connections:
 
         return Checked
 
-    def enter(self, transport: asyncio.Transport, protocol: H11Protocol) -> Connection | None:
+    def enter(
+        self, transport: asyncio.Transport, protocol: H11Protocol | None
+    ) -> Connection | None:
         """Count a new connection, or end it when nobody can give way."""
         address = _network(transport)
         new = Connection(transport, protocol, address, time.monotonic())
@@ -152,6 +181,12 @@ class Connections:
         """It is closed."""
         if one is not None:
             self._open.pop(one, None)
+
+    def over(self, one: Connection | None, why: str) -> None:
+        """It is closed, and why where it had not come to anything."""
+        if one in self._open and why:
+            self.count(one.address, why)
+        self.leave(one)
 
     def __len__(self) -> int:
         return len(self._open)
@@ -196,8 +231,10 @@ class Connections:
                 one.idle_since = None
             elif one.idle_since is None:
                 one.idle_since = now
-            if one.transport.is_closing():
-                self._after(one, one.stuck_since or now, LINGER_S, "took nothing", now)
+            if one.closing:
+                one.closing_since = one.closing_since or now
+                since = one.stuck_since or one.closing_since
+                self._after(one, since, LINGER_S, "took nothing", now)
             elif one.idle_since is not None:
                 self._after(one, one.idle_since, self._settings.request_s, "asked nothing", now)
             if one.stuck_since is not None:

@@ -1,6 +1,5 @@
 """What the pages and the REST interface share: the services behind them, and who is asking."""
 
-import logging
 import math
 from collections import Counter
 from collections.abc import Callable, Collection
@@ -11,16 +10,16 @@ from fastapi import HTTPException, Request
 from dashboard.data.store import Store
 from dashboard.desk import Desk
 from dashboard.settings import DashboardSettings
+from dashboard.web.accounts.audit import Audit
 from dashboard.web.auth import Gate, Role, SignIn, User, WaitError, same_token
 from dashboard.web.control import Replay
 from dashboard.web.first.control import FirstRun
 from dashboard.web.jobs import Jobs
 from dashboard.web.readings import Readings
+from dashboard.web.tls.certificate import Certificate
 from dashboard.web.uploads import Uploads
 from dashboard.web.views import Views
 from sessions.library.catalogue import Catalogue
-
-audit = logging.getLogger("dashboard.audit")
 
 
 @dataclass
@@ -40,6 +39,7 @@ class Front:
     first_run: FirstRun | None = None  # while there is no board, and where one can be configured
     readings: Readings = field(default_factory=Readings)
     uploads: Uploads = field(default_factory=Uploads)
+    certificate: Certificate | None = None  # of the port, where it speaks TLS by itself
     open_labels: Collection[str] = ()  # of the scene's inputs that concern nobody else
     ended: Counter[str] = field(default_factory=Counter)  # why -> connections that were ended
     views: Views = field(init=False)
@@ -98,7 +98,7 @@ def _by_token(request: Request) -> Asker:
             gate.backoff.attempt(address_of(request))
         except WaitError as wait:
             raise _wait(str(wait).replace("passwords", "tokens"), wait.seconds) from None
-        audit.warning("a token refused from %s: %s", address_of(request), request.url.path)
+        gate.audit.refused("API token", "", address_of(request), request.url.path)
         raise HTTPException(
             401,
             "this token is unknown, revoked or past its end; want Authorization: Bearer TOKEN",
@@ -125,6 +125,7 @@ def needs(role: Role) -> Callable[[Request], Asker]:
         if not who.token and not same_token(
             request.headers.get("x-csrf-token", ""), who.session.csrf
         ):
+            audit_of(request).refused(_act(request), who.name, address_of(request), "X-CSRF-Token")
             raise HTTPException(
                 403,
                 "the header X-CSRF-Token is missing or is not this session's; GET /api/me has it",
@@ -136,11 +137,22 @@ def needs(role: Role) -> Callable[[Request], Asker]:
 
 
 def check_role(who: Asker, role: Role, request: Request) -> None:
-    """HTTP 403 unless this user has the role; both outcomes stand in the audit log."""
-    act = f"{request.method} {request.url.path}"
+    """HTTP 403 unless this user has the role; orders and refusals stand in the audit log."""
+    audit, where = audit_of(request), address_of(request)
+    by = f"as {who.role.name}" + (f" by token {who.token}" if who.token else "")
     if who.role < role:
-        audit.warning("%s (%s) refused: %s", who.name, who.role.name, act)
+        audit.refused(_act(request), who.name, where, f"{by}, takes {role.name}")
         raise HTTPException(
             403, f"{who.name} is signed in as {who.role.name}; this takes the role {role.name}"
         )
-    audit.info("%s (%s): %s", who.name, who.role.name, act)
+    if request.method not in ("GET", "HEAD"):
+        audit.done(_act(request), who.name, where, by)
+
+
+def audit_of(request: Request) -> Audit:
+    """Where acts are written down."""
+    return front_of(request).gate.audit
+
+
+def _act(request: Request) -> str:
+    return f"{request.method} {request.url.path}"

@@ -20,6 +20,15 @@ PAGE_CSP = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src"
     " 'self'; frame-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
 )
+# What a page of ours might be asked for by a script and needs none of.
+PERMISSIONS = ", ".join(
+    f"{name}=()"
+    for name in (
+        "accelerometer ambient-light-sensor bluetooth browsing-topics camera display-capture"
+        " geolocation gyroscope hid idle-detection local-fonts magnetometer microphone midi payment"
+        " serial storage-access usb window-management xr-spatial-tracking"
+    ).split()
+)
 
 
 class Refused(Exception):
@@ -73,7 +82,7 @@ class Guard:
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
-        with_headers = self._add_headers(send)
+        with_headers = self._add_headers(send, Headers(scope=scope).get("host", ""))
         try:
             self._check(scope)
             if scope["type"] == "http":
@@ -98,12 +107,12 @@ class Guard:
             )
         origin = headers.get("origin")
         if scope["type"] == "websocket":
-            if origin is None or not same_origin(origin, host, self._settings.secure_cookies):
+            if origin is None or not same_origin(origin, host, self._settings.secure):
                 raise Refused(403, "WebSocket from another site refused")
         elif scope["method"] not in SAFE_METHODS:
             foreign = headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none")
             if foreign or (
-                origin is not None and not same_origin(origin, host, self._settings.secure_cookies)
+                origin is not None and not same_origin(origin, host, self._settings.secure)
             ):
                 raise Refused(403, "request from another site refused")
 
@@ -129,19 +138,23 @@ class Guard:
                 408, f"body not complete within {self._settings.body_timeout_s:g} s"
             ) from None
 
-    def _add_headers(self, send: Send) -> Send:
+    def _add_headers(self, send: Send, host: str) -> Send:
+        lasting = self._settings.secure and not host.startswith("localhost")
+
         async def wrapped(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
-                for name, value in security_headers(self._settings.secure_cookies):
+                for name, value in security_headers(lasting):
                     headers.setdefault(name, value)
             await send(message)
 
         return wrapped
 
 
-def security_headers(secure: bool) -> Iterator[tuple[str, str]]:
-    """Headers of every answer that did not set its own."""
+def security_headers(lasting: bool) -> Iterator[tuple[str, str]]:
+    """Headers of every answer that did not set its own. lasting: by https from now on, which is for
+    all ports of a host: not asked of `localhost`, where others serve, too.
+    """
     yield "content-security-policy", PAGE_CSP
     yield "x-content-type-options", "nosniff"
     yield "x-frame-options", "DENY"
@@ -151,9 +164,11 @@ def security_headers(secure: bool) -> Iterator[tuple[str, str]]:
     )  # not no-referrer: that would make the Origin of our own forms "null"
     yield "cross-origin-opener-policy", "same-origin"
     yield "cross-origin-resource-policy", "same-origin"
-    yield "permissions-policy", "camera=(), microphone=(), geolocation=(), payment=(), usb=()"
+    yield "permissions-policy", PERMISSIONS
+    yield "origin-agent-cluster", "?1"
+    yield "x-permitted-cross-domain-policies", "none"
     yield "cache-control", "no-store"
-    if secure:
+    if lasting:
         yield "strict-transport-security", "max-age=31536000"
 
 

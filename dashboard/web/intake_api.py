@@ -2,6 +2,7 @@
 and for a session estimated again.
 """
 
+import shutil
 from typing import Annotated, Any
 
 from fastapi import APIRouter, HTTPException, Query, Request, Response
@@ -24,6 +25,7 @@ from logs.tables.preview import TARGETS, look, rewritten
 from messages import text
 from sessions.report import photo
 
+LEAST_FREE = 256 << 20  # bytes of the disk that uploads leave to others
 routes = APIRouter(prefix="/api")
 
 LARGEST = 1 << 30  # bytes of one log
@@ -101,6 +103,7 @@ async def take_piece(
     if not file.lower().endswith((".csv", *PHOTOS)):
         raise HTTPException(422, f"file {text.plain(file, 80)}: want a CSV file, like imu.csv")
     body = await request.body()
+    _check_room(front_of(request), found, len(body))
     with found.lock:
         path = found.folder / file
         have = path.stat().st_size if path.exists() else 0
@@ -116,9 +119,22 @@ async def take_piece(
         try:
             with path.open("ab") as stream:
                 stream.write(body)
+            found.taken += len(body)
         except OSError as error:
             raise HTTPException(507, f"{file} cannot be kept: {error.strerror}") from None
         return PieceOut(bytes=have + len(body))
+
+
+def _check_room(front: Front, found: Upload, size: int) -> None:
+    """HTTP 413 for more than a user may have under way, 507 where the disk is nearly full."""
+    most = front.settings.upload_bytes_per_user
+    if size > front.uploads.room(found.user, most):
+        front.ended["an upload over its user's quota"] += 1
+        raise HTTPException(
+            413, f"{found.user} has {most >> 20} MB under way: finish an upload, or begin anew"
+        )
+    if shutil.disk_usage(found.folder).free < LEAST_FREE:
+        raise HTTPException(507, f"less than {LEAST_FREE >> 20} MB are free where uploads wait")
 
 
 @routes.get("/imports/{upload}/look", summary="How the files sent are written, and their columns")

@@ -12,6 +12,7 @@ import jinja2
 from fastapi import APIRouter, Depends, HTTPException, Query, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 
+from dashboard.settings import DashboardSettings
 from dashboard.web import api
 from dashboard.web.auth import Role, WaitError, same_token
 from dashboard.web.front import Asker, address_of, asker, front_of
@@ -83,6 +84,7 @@ def render(
         "Role": Role,
         "demo": front.settings.demo,
         "version": version(),
+        "provider": front.settings.oidc_suffix if front.settings.oidc_issuer else "",
         "path": request.url.path,
     }
     return HTMLResponse(_templates.get_template(template).render(common | values), status)
@@ -150,20 +152,29 @@ def own_path(path: str) -> str:
     return path if pages else "/"
 
 
-def _enter(request: Request, token: str, wanted: str = "/") -> RedirectResponse:
+def caller(request: Request) -> tuple[str, str]:
+    """Address, and what the browser calls itself."""
+    return address_of(request), request.headers.get("user-agent", "")
+
+
+def enter(request: Request, token: str, wanted: str = "/") -> RedirectResponse:
     """Set the cookie and go to the page that was asked for."""
-    settings = front_of(request).settings
     answer = RedirectResponse(own_path(wanted), 303)
+    set_cookie(front_of(request).settings, answer, token)
+    return answer
+
+
+def set_cookie(settings: DashboardSettings, answer: Response, token: str) -> None:
+    """The cookie of a sign-in."""
     answer.set_cookie(
         settings.cookie,
         token,
         max_age=int(settings.session_hours * 3600),
         path="/",
-        secure=settings.secure_cookies,
+        secure=settings.secure,
         httponly=True,
         samesite="strict",
     )
-    return answer
 
 
 @routes.get("/")
@@ -192,9 +203,9 @@ async def login(request: Request) -> Response:
     gate, fields = front_of(request).gate, await _form(request)
     name, status, headers = fields.get("name", ""), 401, {}
     try:
-        token = await gate.sign_in(name, fields.get("password", ""), address_of(request))
+        token = await gate.sign_in(name, fields.get("password", ""), *caller(request))
         if token is not None:
-            return _enter(request, token, fields.get("next", "/"))
+            return enter(request, token, fields.get("next", "/"))
         fault = "Name or password is wrong."
     except WaitError as wait:
         seconds = max(1, round(wait.seconds))
@@ -228,7 +239,7 @@ def link_page(request: Request, token: Annotated[str, Query(max_length=200)] = "
 async def link(request: Request) -> Response:
     fields = await _form(request)
     try:
-        token = front_of(request).gate.redeem(fields.get("token", ""), address_of(request))
+        token = front_of(request).gate.redeem(fields.get("token", ""), *caller(request))
     except WaitError as wait:
         raise HTTPException(
             429, str(wait), {"retry-after": str(max(1, round(wait.seconds)))}
@@ -238,7 +249,7 @@ async def link(request: Request) -> Response:
             403,
             "this sign-in link was used already, is too old, or is not complete: ask for a new one",
         )
-    return _enter(request, token)
+    return enter(request, token)
 
 
 @routes.post("/logout")
@@ -250,7 +261,7 @@ async def logout(request: Request) -> Response:
     answer.delete_cookie(
         front.settings.cookie,
         path="/",
-        secure=front.settings.secure_cookies,
+        secure=front.settings.secure,
         httponly=True,
         samesite="strict",
     )

@@ -65,6 +65,11 @@ class AlarmOut(BaseModel):
     title: str
     text: str = Field(description="what was found and what to do")
     page: str = Field(description="of the live page (?p=), that shows it; empty for none")
+    about: str = Field(description="which axis, filter or fault it is; may be empty")
+    id: str = Field(description="stays while what is said of it changes; see /api/alarms")
+    level: str = Field(description="watch, warning, critical; empty where no service judges it")
+    state: str = Field(description="unacknowledged or acknowledged; likewise")
+    raised_s: float = Field(description="s since 1970; 0 likewise")
     words: dict[str, str] = Field(description="words of the trade in it, with their meanings")
 
 
@@ -139,7 +144,7 @@ class SessionOut(BaseModel):
 
 def alarms_out(found: Iterable[Alarm]) -> list[AlarmOut]:
     """Alarms as JSON."""
-    return [AlarmOut(**asdict(alarm), words=words(alarm)) for alarm in found]
+    return [AlarmOut(**asdict(alarm), id=alarm.id, words=words(alarm)) for alarm in found]
 
 
 def device_out(device: Device, stale_s: float, found: Iterable[Alarm] = ()) -> DeviceOut:

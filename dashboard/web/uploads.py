@@ -16,7 +16,8 @@ LATITUDE = re.compile(r"(?<![a-z])lat(itude)?(?![a-z])")
 SAMPLES = re.compile(r"(f|w)[xyz]_|a\d{2,3}_")
 RECEIVER = re.compile(r"gnss|gps")
 FILES = 4  # of one upload
-AT_ONCE = 4  # uploads that have not been finished; the oldest gives way
+AT_ONCE = 12  # uploads that have not been finished; the oldest gives way
+EACH_AT_ONCE = 3  # of them of one user: nobody's take the room of another's
 
 
 class UploadError(ValueError):
@@ -75,6 +76,7 @@ class Upload:
     user: str
     folder: Path
     reading: bool = False  # a job makes a session of it: no more pieces
+    taken: int = 0  # bytes
     lock: threading.Lock = field(default_factory=threading.Lock)
 
 
@@ -91,10 +93,16 @@ class Uploads:
         with self._lock:
             number = next(self._numbers)
             self.open[number] = Upload(user, Path(tempfile.mkdtemp(prefix="gyrofree-upload-")))
-            idle = [key for key, one in self.open.items() if not one.reading]
-            for key in idle[:-AT_ONCE]:
+            idle = {key: one.user for key, one in self.open.items() if not one.reading}
+            mine = [key for key, owner in idle.items() if owner == user]
+            for key in {*mine[:-EACH_AT_ONCE], *list(idle)[:-AT_ONCE]}:
                 self._forget(key)
             return number
+
+    def room(self, user: str, most: int) -> int:
+        """Bytes that this user may still send, of `most`; what is made a session of counts, too."""
+        with self._lock:
+            return most - sum(one.taken for one in self.open.values() if one.user == user)
 
     def _forget(self, number: int) -> None:
         gone = self.open.pop(number, None)

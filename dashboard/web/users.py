@@ -16,18 +16,17 @@ import secrets
 import tempfile
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from pathlib import Path
 
 from argon2 import PasswordHasher
 from argon2.exceptions import InvalidHashError, VerificationError
 
+from dashboard.web.accounts.passwords import PASSWORD_MAX, fault_of
 from messages.clock import Moment
 
 USER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._@-]{0,63}")
-PASSWORD_MIN = 10  # characters
-PASSWORD_MAX = 256  # characters; argon2 would take any length, and any time
 
 # One lane, 32 MiB, above OWASP's 19 MiB: a small board must be able to verify without stalling the
 # data's way.
@@ -118,18 +117,29 @@ def add_user(path: Path, name: str, password: str, role: str | Role) -> User:
         raise UsersError(
             f"user name {name!r}: want letters, digits and . _ @ -, at most 64 characters"
         )
-    if not PASSWORD_MIN <= len(password) <= PASSWORD_MAX:
-        raise UsersError(
-            f"password has {len(password)} characters: want {PASSWORD_MIN} to {PASSWORD_MAX}"
-        )
-    if password.lower() == name.lower():
-        raise UsersError("password equals the user name: choose another")
-    try:
-        rank = role if isinstance(role, Role) else Role[role]
-    except KeyError:
-        raise UsersError(f"role {role!r}: want one of {', '.join(r.name for r in Role)}") from None
+    if fault := fault_of(password, name):
+        raise UsersError(fault)
+    rank = role_of(role)
     users = load_users(path)
     users[name] = User(name, rank, _hasher.hash(password), round(time.time()))
+    _save(path, users)
+    return users[name]
+
+
+def role_of(role: str | Role) -> Role:
+    """The role of that name; raises UsersError."""
+    try:
+        return role if isinstance(role, Role) else Role[role]
+    except KeyError:
+        raise UsersError(f"role {role!r}: want one of {', '.join(r.name for r in Role)}") from None
+
+
+def set_role(path: Path, name: str, role: str | Role) -> User:
+    """Another role with the same password; raises UsersError when there is no such user or role."""
+    rank, users = role_of(role), load_users(path)
+    if name not in users:
+        raise UsersError(f"{path}: no user {name!r}; there are {', '.join(sorted(users))}")
+    users[name] = replace(users[name], role=rank)
     _save(path, users)
     return users[name]
 

@@ -9,7 +9,7 @@ from gyrofree.commands import calibrate, handover, layout, procedure, sessions, 
 from gyrofree.commands import run as logs
 from gyrofree.commands.board import board
 from gyrofree.commands.demo import demo, play
-from gyrofree.commands.installation import config
+from gyrofree.commands.installation import alarms, certs, config, site
 from gyrofree.commands.installation.completion import answer_the_shell, completion
 from gyrofree.commands.installation.doctor import doctor
 from gyrofree.commands.installation.setup import setup
@@ -39,7 +39,10 @@ app = Commands(
 )
 
 app.add_typer(users.app, name="users")
+app.add_typer(alarms.app, name="alarms")
 app.add_typer(config.app, name="config")
+app.add_typer(site.app, name="site")
+app.add_typer(certs.app, name="certs")
 app.add_typer(layout.app, name="layout")
 app.add_typer(sessions.app, name="sessions")
 app.add_typer(procedure.app, name="procedure")

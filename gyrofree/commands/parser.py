@@ -13,11 +13,12 @@ from typing import Any
 import typer
 from typer.core import TyperCommand
 
-from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
+from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, ending, fail
 from messages.text import reason
 
 ROOMS = frozenset(  # an error of theirs is a sentence for people
-    "dashboard estimator firmware_protocol gateway gyrofree inertial logs messages sessions".split()
+    "dashboard estimator firmware_protocol gateway gyrofree inertial logs messages sessions"
+    " sites".split()
 )
 PICTURES = (".png", ".svg", ".pdf")
 Look = Callable[[Path | None], Path | None]
@@ -192,6 +193,7 @@ def run_main(app: Any) -> None:
         if not code and error.errno != errno.EPIPE:
             fail(error)
         code = code or EXIT_FAILED
+    ending(code)
     raise SystemExit(code)
 
 

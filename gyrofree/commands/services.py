@@ -24,10 +24,14 @@ def router(config: Config = None, verbose: Verbose = False) -> None:
     settings = settings_of(config)
 
     def body(stop: threading.Event) -> None:
+        from gyrofree.setup.site import router_rules
         from messages.bus.session import open_router
 
-        with open_router(settings.bus):
+        rules, mesh = router_rules(settings)
+        with open_router(settings.bus.acting_as("router"), rules, mesh):
             log.info("router listens on %s", ", ".join(settings.bus.listen))
+            if mesh:
+                log.info("and calls %s", ", ".join(mesh))
             stop.wait()
 
     run_service(body, verbose)
@@ -43,7 +47,7 @@ def gateway(config: Config = None, verbose: Verbose = False) -> None:
 
     def body(stop: threading.Event, keeper: Keeper) -> None:
         leave_when_alone(stop)
-        service.run(settings.gateway, settings.bus, stop, keeper)
+        service.run(settings.gateway, settings.bus.acting_as("gateway"), stop, keeper)
 
     guard(lambda keeper: run_service(lambda stop: body(stop, keeper), verbose))
 
@@ -59,7 +63,7 @@ def estimator(config: Config = None, verbose: Verbose = False) -> None:
         from estimator.choice import UnknownEstimator
 
         try:
-            service.run(settings.estimator, settings.bus, stop)
+            service.run(settings.estimator, settings.bus.acting_as("estimator"), stop)
         except UnknownEstimator as error:
             raise ConfigError(str(error)) from None
 
@@ -75,7 +79,9 @@ def record(config: Config = None, verbose: Verbose = False) -> None:
     def body(stop: threading.Event) -> None:
         from sessions.recording import service
 
-        service.run(settings.recorder, settings.bus, stop, settings.model_dump(mode="json"))
+        # who is told of alarms, and where, is nobody's business who gets a recording
+        kept = settings.model_dump(mode="json", exclude={"alarms": {"webhook", "mail"}})
+        service.run(settings.recorder, settings.bus.acting_as("recorder"), stop, kept)
 
     run_service(body, verbose)
 
@@ -89,7 +95,7 @@ def procedures(config: Config = None, verbose: Verbose = False) -> None:
         from sessions.procedure.driven.description import TableError
 
         try:
-            service.run(settings.procedures, settings.bus, stop)
+            service.run(settings.procedures, settings.bus.acting_as("procedures"), stop)
         except TableError as error:
             raise ConfigError(str(error)) from None
 
@@ -111,12 +117,20 @@ def dashboard(
         from dashboard.web.control import ProcessReplay
         from dashboard.web.first.control import FirstRun
         from dashboard.web.jobs import Jobs
+        from dashboard.web.tls.certificate import CertificateError
+        from dashboard.web.users import UsersError
+        from gyrofree.setup.site import only_watching
 
         options = ["--config", str(config)] if config else []
         replayer = command("replay", "--stay", *options)
         jobs = Jobs(command(), options)
         first = FirstRun(command("setup", *options)) if setup else None
         replay = ProcessReplay(replayer)
-        service.run(settings.dashboard, settings.bus, stop, replay, jobs, first)
+        bus = settings.bus.acting_as("dashboard")
+        watching = only_watching(settings)
+        try:
+            service.run(settings.dashboard, bus, stop, replay, jobs, first, watching)
+        except (CertificateError, UsersError) as error:
+            raise ConfigError(str(error)) from None
 
     run_service(body, verbose)

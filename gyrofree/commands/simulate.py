@@ -126,6 +126,7 @@ def simulate(
         options = simulator.Options(
             link, tcp, motion, seed, device, once, faults, arm or 0.0, table_link, table_tcp, slips
         )
-        (simulate_hand if tilt else simulator).run(options, settings.bus, stop)
+        bus = settings.bus.acting_as("simulator")
+        (simulate_hand if tilt else simulator).run(options, bus, stop)
 
     run_service(body, verbose)

@@ -1,12 +1,15 @@
 """`gyrofree users`: who may sign in to the dashboard."""
 
 import json
+import os
 import sys
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from dashboard.web.accounts.audit import Audit
 from dashboard.web.programs.tokens import issue_token, load_tokens, revoke_token
 from dashboard.web.users import UsersError, add_user, load_users, remove_user
 from gyrofree.commands.options import AsJson, Config, say, settings_of
@@ -41,6 +44,7 @@ def users_add(
         add_user(settings.dashboard.users, name, password, role)
     except UsersError as error:
         raise fail(error, EXIT_CONFIG) from None
+    _written(settings.dashboard.users, f"user made or changed, {role}", name)
     say(f"{name} may sign in as {role}")
 
 
@@ -64,6 +68,7 @@ def token_create(
         secret, entry = issue_token(users_file, user, name, role, days)
     except UsersError as error:
         raise fail(error, EXIT_CONFIG) from None
+    _written(users_file, "token made", f"{entry.id} ({name}) of {user}, {role}")
     say(f"token {entry.id} of {user} ({role}) ends {_day(entry.ends)}", file=sys.stderr)
     say(secret)
 
@@ -93,10 +98,17 @@ def token_revoke(
 ) -> None:
     """Take a token back; it is of no use at once."""
     try:
-        gone = revoke_token(settings_of(config).dashboard.users, token)
+        users_file = settings_of(config).dashboard.users
+        gone = revoke_token(users_file, token)
     except UsersError as error:
         raise fail(error) from None
+    _written(users_file, "token revoked", f"{gone.id} ({gone.name}) of {gone.user}")
     say(f"token {gone.id} ({gone.name}) of {gone.user} is revoked")
+
+
+def _written(users_file: Path, what: str, detail: str) -> None:
+    """In the page's log of who did what; the account of this machine is who."""
+    Audit(users_file).done(what, f"command line, account {os.getuid()}", detail=detail)
 
 
 def _day(seconds: float) -> str:
@@ -128,7 +140,9 @@ def users_remove(
     name: Annotated[str, typer.Argument(help="User name.")], config: Config = None
 ) -> None:
     """Take a user's right to sign in."""
+    users_file = settings_of(config).dashboard.users
     try:
-        remove_user(settings_of(config).dashboard.users, name)
+        remove_user(users_file, name)
     except UsersError as error:
         raise fail(error) from None
+    _written(users_file, "user removed", name)

@@ -85,6 +85,9 @@ auto_start = {str(plan.record).lower()}
 root = "{plan.folder / "procedures"}"
 folder = "{plan.folder / "own-procedures"}"
 {_table(plan)}
+[alarms]
+state = "{plan.folder / "alarms.json"}"
+
 [dashboard]
 host = "{plan.host}"
 port = {plan.port}

@@ -10,6 +10,7 @@ import importlib.metadata
 import os
 import shutil
 import socket
+import ssl
 import struct
 import sys
 import time
@@ -20,10 +21,12 @@ from pathlib import Path
 from queue import Empty, Queue
 from urllib.parse import urlsplit
 
+from dashboard.web.tls.certificate import CertificateError, open_certificate
 from gyrofree.config import Settings
-from messages.bus.session import BusUnavailable, open_client, subscribe
+from messages.bus.faults import BusUnavailable
+from messages.bus.session import open_client, subscribe
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import ESTIMATOR, LINK, PROCEDURE, STATUS
+from messages.contract.topics import ALARM, ESTIMATOR, LINK, PROCEDURE, STATUS
 from messages.text import plain
 
 LEAST_FREE = 1 << 30  # bytes of disk below which recording is at risk
@@ -36,6 +39,7 @@ SIGN_OF_LIFE = {
     "estimator": ESTIMATOR,
     "recorder": STATUS,
     "procedures": PROCEDURE,
+    "alarms": ALARM,
 }
 
 
@@ -63,6 +67,7 @@ def examine(settings: Settings) -> list[Finding]:
         ),
         _folder("journal folder", Path(settings.gateway.journal)),
         _folder("recordings folder", Path(settings.recorder.root)),
+        *_certificate(settings),
         *_settings(settings),
     ]
 
@@ -71,7 +76,7 @@ def _settings(settings: Settings) -> list[Finding]:
     """What running estimators say of settings that their data contradict; nothing where no bus
     runs.
     """
-    host, _, port = settings.bus.listen[0].removeprefix("tcp/").rpartition(":")
+    host, _, port = settings.bus.listen[0].partition("/")[2].rpartition(":")
     if not port_taken(host.strip("[]"), int(port)):
         return []
     try:
@@ -215,9 +220,43 @@ def health(service: str, settings: Settings) -> Finding:
 
 def _dashboard_health(settings: Settings) -> Finding:
     host = "127.0.0.1" if settings.dashboard.host in ("0.0.0.0", "::") else settings.dashboard.host
-    url = f"http://{host}:{settings.dashboard.port}/api/health"
+    tls = settings.dashboard.tls_certificate
+    url = f"{'https' if tls else 'http'}://{host}:{settings.dashboard.port}/api/health"
     try:
-        with urllib.request.urlopen(url, timeout=HEALTH_WAIT) as answer:
+        with urllib.request.urlopen(
+            url, timeout=HEALTH_WAIT, context=_only(tls) if tls else None
+        ) as answer:
             return Finding("dashboard", "ok", f"{url} answers {answer.status}")
     except (urllib.error.URLError, OSError) as error:
         return Finding("dashboard", "fail", f"{url}: {error}")
+
+
+def _only(certificate: Path) -> ssl.SSLContext:
+    """Trust in the one certificate of the file, whatever name it is for: the asked host is ours."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname = False
+    context.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
+    context.load_verify_locations(certificate)
+    return context
+
+
+def _certificate(settings: Settings) -> list[Finding]:
+    """What the web port's own certificate says, where it has one."""
+    try:
+        found = open_certificate(settings.dashboard)
+    except CertificateError as error:
+        return [
+            Finding(
+                "certificate of the page",
+                "fail",
+                str(error),
+                "want PEM files of a certificate and its key",
+            )
+        ]
+    if found is None:
+        return []
+    text = f"for {', '.join(found.names) or 'no host'}, ends {found.ends:%Y-%m-%d %H:%M} UTC"
+    if found.left_s <= 0.0:
+        return [Finding("certificate of the page", "fail", text, "browsers refuse it: renew it")]
+    state = "warn" if found.near_its_end else "ok"
+    return [Finding("certificate of the page", state, text, "renew it" if state == "warn" else "")]

@@ -12,7 +12,8 @@ from rich.text import Text
 
 from logs.figures.numbers import with_half_width
 from messages.bus import orders
-from messages.bus.session import BusSettings, BusUnavailable, open_client, subscribe
+from messages.bus.faults import BusUnavailable
+from messages.bus.session import BusSettings, open_client, subscribe
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import PROCEDURE
 from messages.text import plain

@@ -5,6 +5,7 @@ why), 2 wrong command line or configuration, 3 a port or device name is taken.
 """
 
 import atexit
+import contextlib
 import errno
 import gc
 import logging
@@ -18,7 +19,7 @@ import typer
 import zenoh
 
 from gyrofree.config import ConfigError
-from messages.bus.session import BusUnavailable
+from messages.bus.faults import BusUnavailable, IdentityError
 from messages.text import plain, printed, reason
 
 EXIT_FAILED = 1
@@ -74,6 +75,7 @@ def stop_on_signals() -> threading.Event:
     event's lock, for which set() would then wait for good. What the interpreter writes into a pipe
     at once, in whichever thread, is read by one of ours.
     """
+    global _service
     stop = threading.Event()
     told, tell = os.pipe2(os.O_CLOEXEC)
     os.set_blocking(tell, False)
@@ -87,6 +89,7 @@ def stop_on_signals() -> threading.Event:
         signal.signal(number, lambda *_: None)
     signal.set_wakeup_fd(tell, warn_on_full_buffer=False)
     atexit.register(_end_in_peace)
+    _service = True
     return stop
 
 
@@ -96,6 +99,31 @@ def _end_in_peace() -> None:
     """
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, signal.SIG_IGN)
+
+
+_service, _code = False, 0  # this process is one, and what the command line ends with
+
+
+@atexit.register  # when this is read, so that it comes after all that is registered later
+def _leave() -> None:
+    """A service does not take its interpreter down: a thread of the bus that lets go of what it
+    held asks for it, late, and would end the process by SIGABRT ("exception not rethrown"). All of
+    ours has ended by now.
+    """
+    if not _service:
+        return
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(
+            OSError, ValueError, AttributeError
+        ):  # a broken pipe, closed, none
+            stream.flush()
+    os._exit(EXIT_FAILED if hasattr(sys, "last_value") else _code)
+
+
+def ending(code: int | str | None) -> None:
+    """The command line ends so, as SystemExit says it."""
+    global _code
+    _code = code if isinstance(code, int) else EXIT_FAILED if code else 0
 
 
 def fail(why: str | Exception, code: int = EXIT_FAILED) -> typer.Exit:
@@ -115,6 +143,8 @@ def run_service(body: Callable[[threading.Event], None], verbose: bool = False) 
     try:
         body(stop)
     except ConfigError as error:
+        raise fail(error, EXIT_CONFIG) from None
+    except IdentityError as error:
         raise fail(error, EXIT_CONFIG) from None
     except BusUnavailable as error:
         if not stop.is_set():

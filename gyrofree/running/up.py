@@ -30,7 +30,9 @@ from gyrofree.running.process import (
 )
 from gyrofree.running.supervisor import Supervisor
 from gyrofree.running.watch import SERVICES, Watch
+from gyrofree.setup.site import Renewed, chain, endings
 
+COMMANDS = {"site": ("site", "serve")}  # of a service that is not called as its command
 FIRST = "first"  # administrator by a one-time link, while there is no other
 
 
@@ -91,13 +93,18 @@ def run(plan: Plan) -> None:
     settings = plan.settings
     supervisor = Supervisor(name="up")
     for service in plan.services:
+        words = COMMANDS.get(service, (service,))
         options = ["--config", str(plan.config)] if plan.config else []
         options += ["--setup"] if service == "dashboard" and plan.asks else []
-        supervisor.add(service, service, *options)
+        supervisor.add(service, *words, *options)
     welcome = _welcome(settings) if "dashboard" in plan.services else list
     supervisor.say(f"starting {', '.join(plan.services)}; {_boards(plan)}")
-    each = FirstBoard(plan, supervisor).look if plan.asks else lambda: None
-    Watch(supervisor, settings, welcome, each).run(stop)
+    looks = [FirstBoard(plan, supervisor).look] if plan.asks else []
+    if settings.bus.tls is not None:
+        looks.append(Renewed(settings, supervisor).look)
+        for line in endings(settings.bus.tls):
+            supervisor.say(line, "yellow")
+    Watch(supervisor, settings, welcome, chain(*looks)).run(stop)
 
 
 def _boards(plan: Plan) -> str:

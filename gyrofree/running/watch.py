@@ -18,6 +18,7 @@ SERVICES = (
     "estimator",
     "record",
     "procedures",
+    "alarms",
     "dashboard",
 )  # in the order of their start
 TICK = 0.1  # s between two looks at the children

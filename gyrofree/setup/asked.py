@@ -10,7 +10,7 @@ from rich.prompt import Confirm, Prompt
 from rich.table import Table
 from rich.text import Text
 
-from dashboard.web.users import PASSWORD_MIN
+from dashboard.web.accounts.passwords import PASSWORD_MIN, fault_of
 from gyrofree.commands.options import Terminal
 from gyrofree.running.process import EXIT_CONFIG, fail
 from gyrofree.setup.ports import Found
@@ -77,10 +77,8 @@ class Asker:
         """A new password, twice."""
         while True:
             first = self._hidden(f"Password of {user}, {PASSWORD_MIN} characters at least: ")
-            if len(first) < PASSWORD_MIN:
-                self.say(f"{len(first)} characters: want {PASSWORD_MIN} at least", "red")
-            elif first.lower() == user.lower():
-                self.say("that is the user's name: choose another", "red")
+            if fault := fault_of(first, user):
+                self.say(fault, "red")
             elif self._hidden("Once more: ") == first:
                 return first
             else:

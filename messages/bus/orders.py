@@ -19,6 +19,7 @@ from messages.contract import topics as tp
 from messages.contract.checks import MESSAGE_BYTES, check
 from messages.contract.topics import (
     TopicError,
+    alarms_control_key,
     check_name,
     control_key,
     recorder_control_key,
@@ -102,6 +103,15 @@ REPLAY = Kind(
     5.0,
     lambda prefix, device: replay_control_key(prefix),
     tp.REPLAY.source,
+)
+ALARMS = Kind(
+    "the alarms",
+    pb.AlarmCommand,
+    pb.AlarmReply,
+    "see that `gyrofree alarms` runs and reaches the router",
+    15.0,  # a notice that is tried out waits for somebody else's server
+    lambda prefix, device: alarms_control_key(prefix),
+    tp.ALARMS,
 )
 
 

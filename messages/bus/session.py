@@ -10,13 +10,16 @@ import json
 import logging
 import threading
 import time
-from collections.abc import Callable
-from typing import TypeVar
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, Self, TypeVar
 
 import zenoh
 from google.protobuf.message import Message
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, PrivateAttr
 
+from messages.bus import tls
+from messages.bus.faults import BusUnavailable
 from messages.bus.fencing import packed
 from messages.contract.door import read
 from messages.contract.names import Name
@@ -49,14 +52,33 @@ class BusSettings(BaseModel):
         "where the router listens; beyond loopback read docs/deployment.md first",
         shown=True,
     )
+    tls: Path | None = setting(
+        None,
+        "folder of this place's certificates, which `gyrofree site` makes: every link is then"
+        " encrypted, and each process may say only what its role needs; without it plain TCP, for"
+        " the loopback of one machine",
+    )
     # 2 s noticed a frozen process sooner, but on a machine busy with drawing in software it also
     # cut off live ones, and lost 3 % of all messages.
     lease_ms: int = setting(
         10_000, "a peer that shows no life for so long is cut off", unit="ms", ge=200, le=60_000
     )
 
+    _role: str = PrivateAttr("operator")
 
-def _config(settings: BusSettings, mode: str) -> zenoh.Config:
+    def acting_as(self, role: str) -> Self:
+        """The same for a process of this role, which shows its certificate."""
+        copy = self.model_copy()
+        copy._role = role
+        return copy
+
+    @property
+    def role(self) -> str:
+        """What this process is; a person's command is an operator's."""
+        return self._role
+
+
+def _config(settings: BusSettings, mode: str, mesh: Iterable[str] = ()) -> zenoh.Config:
     config = zenoh.Config()
     patience_us = 100_000
     values = {
@@ -77,8 +99,13 @@ def _config(settings: BusSettings, mode: str) -> zenoh.Config:
         "transport/link/rx/max_message_size": LARGEST,
         "transport/link/tx/queue/congestion_control/drop/wait_before_drop": patience_us,
     }
+    if settings.tls is not None:
+        values |= tls.values(settings.tls, settings.role)
     if mode == "router":
         values["listen/endpoints"] = settings.listen
+        values["connect/endpoints"] = list(mesh)
+        values["connect/timeout_ms"] = -1  # another site may come later
+        values["connect/exit_on_failure"] = False
     else:
         values["connect/endpoints"] = [settings.router]
         values["connect/timeout_ms"] = 1000
@@ -95,15 +122,17 @@ def _config(settings: BusSettings, mode: str) -> zenoh.Config:
     return config
 
 
-def open_router(settings: BusSettings) -> zenoh.Session:
-    """A session that routes for all others; raises zenoh.ZError when an endpoint cannot be
-    bound.
+def open_router(
+    settings: BusSettings, access: dict[str, Any] | None = None, mesh: Iterable[str] = ()
+) -> zenoh.Session:
+    """A session that routes for all others, by the rules of `access` where there are any, and
+    keeps calling the routers of `mesh`. Raises zenoh.ZError when an endpoint cannot be bound,
+    IdentityError without a certificate.
     """
-    return zenoh.open(_config(settings, "router"))
-
-
-class BusUnavailable(ConnectionError):
-    """No router answered in the time given."""
+    config = _config(settings, "router", mesh)
+    if access is not None:
+        config.insert_json5("access_control", json.dumps(access))
+    return zenoh.open(config)
 
 
 def open_client(
@@ -123,12 +152,20 @@ def open_client(
             if stop.is_set() or (end is not None and time.monotonic() > end):
                 raise BusUnavailable(
                     f"[bus] router {settings.router}: nobody answers; start one with `gyrofree"
-                    " router`"
+                    f" router`{_why(settings)}"
                 ) from None
         if not said and time.monotonic() - start > PATIENCE_S:
-            log.warning("router %s does not answer yet: trying on", settings.router)
+            log.warning(
+                "router %s does not answer yet: trying on%s", settings.router, _why(settings)
+            )
             said = True
         stop.wait(0.25)
+
+
+def _why(settings: BusSettings) -> str:
+    """What is wrong with this process's certificate, where that may be why nobody answers."""
+    wrong = tls.trouble(settings.tls, settings.role) if settings.tls is not None else ""
+    return f" ({wrong})" if wrong else ""
 
 
 def connected(session: zenoh.Session) -> bool:

@@ -7,8 +7,9 @@ import time
 from collections.abc import Callable, Iterator
 
 from messages.bus.claiming import Claim, Claimant, claim
+from messages.bus.faults import BusUnavailable
 from messages.bus.fencing import heard_of
-from messages.bus.session import BusSettings, BusUnavailable, open_client
+from messages.bus.session import BusSettings, open_client
 from messages.contract.topics import claim_key
 
 log = logging.getLogger(__name__)

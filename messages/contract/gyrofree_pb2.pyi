@@ -1341,3 +1341,212 @@ class ProcedureStatus(_message.Message):
     reference: _containers.RepeatedScalarFieldContainer[str]
     alarm: str
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., state: _Optional[_Union[ProcedureStatus.State, str]] = ..., run: _Optional[str] = ..., procedure: _Optional[str] = ..., title: _Optional[str] = ..., sha256: _Optional[str] = ..., toml: _Optional[str] = ..., unit: _Optional[str] = ..., operator: _Optional[str] = ..., session: _Optional[str] = ..., step: _Optional[int] = ..., instruction: _Optional[str] = ..., progress: _Optional[float] = ..., message: _Optional[str] = ..., steps: _Optional[_Iterable[_Union[ProcedureStatus.Step, _Mapping]]] = ..., table: _Optional[str] = ..., table_radps: _Optional[float] = ..., offered: _Optional[_Iterable[str]] = ..., started_utc_ns: _Optional[int] = ..., up_b: _Optional[_Iterable[float]] = ..., reference: _Optional[_Iterable[str]] = ..., alarm: _Optional[str] = ...) -> None: ...
+
+class Alarm(_message.Message):
+    __slots__ = ("id", "device", "kind", "title", "text", "page", "level", "state", "active", "unknown", "value", "limit", "unit", "raised_utc_ns", "returned_utc_ns", "acknowledged_by", "acknowledged_utc_ns", "note", "shelved_by", "shelved_s", "reason", "times", "chattering", "first_out")
+    class Level(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        LEVEL_NONE: _ClassVar[Alarm.Level]
+        LEVEL_WATCH: _ClassVar[Alarm.Level]
+        LEVEL_WARNING: _ClassVar[Alarm.Level]
+        LEVEL_CRITICAL: _ClassVar[Alarm.Level]
+    LEVEL_NONE: Alarm.Level
+    LEVEL_WATCH: Alarm.Level
+    LEVEL_WARNING: Alarm.Level
+    LEVEL_CRITICAL: Alarm.Level
+    class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        STATE_NORMAL: _ClassVar[Alarm.State]
+        STATE_UNACKNOWLEDGED: _ClassVar[Alarm.State]
+        STATE_ACKNOWLEDGED: _ClassVar[Alarm.State]
+        STATE_RETURNED: _ClassVar[Alarm.State]
+        STATE_SHELVED: _ClassVar[Alarm.State]
+    STATE_NORMAL: Alarm.State
+    STATE_UNACKNOWLEDGED: Alarm.State
+    STATE_ACKNOWLEDGED: Alarm.State
+    STATE_RETURNED: Alarm.State
+    STATE_SHELVED: Alarm.State
+    ID_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    KIND_FIELD_NUMBER: _ClassVar[int]
+    TITLE_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    PAGE_FIELD_NUMBER: _ClassVar[int]
+    LEVEL_FIELD_NUMBER: _ClassVar[int]
+    STATE_FIELD_NUMBER: _ClassVar[int]
+    ACTIVE_FIELD_NUMBER: _ClassVar[int]
+    UNKNOWN_FIELD_NUMBER: _ClassVar[int]
+    VALUE_FIELD_NUMBER: _ClassVar[int]
+    LIMIT_FIELD_NUMBER: _ClassVar[int]
+    UNIT_FIELD_NUMBER: _ClassVar[int]
+    RAISED_UTC_NS_FIELD_NUMBER: _ClassVar[int]
+    RETURNED_UTC_NS_FIELD_NUMBER: _ClassVar[int]
+    ACKNOWLEDGED_BY_FIELD_NUMBER: _ClassVar[int]
+    ACKNOWLEDGED_UTC_NS_FIELD_NUMBER: _ClassVar[int]
+    NOTE_FIELD_NUMBER: _ClassVar[int]
+    SHELVED_BY_FIELD_NUMBER: _ClassVar[int]
+    SHELVED_S_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    TIMES_FIELD_NUMBER: _ClassVar[int]
+    CHATTERING_FIELD_NUMBER: _ClassVar[int]
+    FIRST_OUT_FIELD_NUMBER: _ClassVar[int]
+    id: str
+    device: str
+    kind: str
+    title: str
+    text: str
+    page: str
+    level: Alarm.Level
+    state: Alarm.State
+    active: bool
+    unknown: bool
+    value: float
+    limit: float
+    unit: str
+    raised_utc_ns: int
+    returned_utc_ns: int
+    acknowledged_by: str
+    acknowledged_utc_ns: int
+    note: str
+    shelved_by: str
+    shelved_s: float
+    reason: str
+    times: int
+    chattering: bool
+    first_out: bool
+    def __init__(self, id: _Optional[str] = ..., device: _Optional[str] = ..., kind: _Optional[str] = ..., title: _Optional[str] = ..., text: _Optional[str] = ..., page: _Optional[str] = ..., level: _Optional[_Union[Alarm.Level, str]] = ..., state: _Optional[_Union[Alarm.State, str]] = ..., active: _Optional[bool] = ..., unknown: _Optional[bool] = ..., value: _Optional[float] = ..., limit: _Optional[float] = ..., unit: _Optional[str] = ..., raised_utc_ns: _Optional[int] = ..., returned_utc_ns: _Optional[int] = ..., acknowledged_by: _Optional[str] = ..., acknowledged_utc_ns: _Optional[int] = ..., note: _Optional[str] = ..., shelved_by: _Optional[str] = ..., shelved_s: _Optional[float] = ..., reason: _Optional[str] = ..., times: _Optional[int] = ..., chattering: _Optional[bool] = ..., first_out: _Optional[bool] = ...) -> None: ...
+
+class AlarmStatus(_message.Message):
+    __slots__ = ("header", "alarms")
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    ALARMS_FIELD_NUMBER: _ClassVar[int]
+    header: Header
+    alarms: _containers.RepeatedCompositeFieldContainer[Alarm]
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., alarms: _Optional[_Iterable[_Union[Alarm, _Mapping]]] = ...) -> None: ...
+
+class AlarmLimit(_message.Message):
+    __slots__ = ("name", "field", "device", "above", "below", "dead_band", "on_delay_s", "off_delay_s", "level", "unknown", "unit", "fixed", "user", "readings")
+    class Reading(_message.Message):
+        __slots__ = ("device", "value", "unit", "said")
+        DEVICE_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        UNIT_FIELD_NUMBER: _ClassVar[int]
+        SAID_FIELD_NUMBER: _ClassVar[int]
+        device: str
+        value: float
+        unit: str
+        said: str
+        def __init__(self, device: _Optional[str] = ..., value: _Optional[float] = ..., unit: _Optional[str] = ..., said: _Optional[str] = ...) -> None: ...
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    FIELD_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    ABOVE_FIELD_NUMBER: _ClassVar[int]
+    BELOW_FIELD_NUMBER: _ClassVar[int]
+    DEAD_BAND_FIELD_NUMBER: _ClassVar[int]
+    ON_DELAY_S_FIELD_NUMBER: _ClassVar[int]
+    OFF_DELAY_S_FIELD_NUMBER: _ClassVar[int]
+    LEVEL_FIELD_NUMBER: _ClassVar[int]
+    UNKNOWN_FIELD_NUMBER: _ClassVar[int]
+    UNIT_FIELD_NUMBER: _ClassVar[int]
+    FIXED_FIELD_NUMBER: _ClassVar[int]
+    USER_FIELD_NUMBER: _ClassVar[int]
+    READINGS_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    field: str
+    device: str
+    above: float
+    below: float
+    dead_band: float
+    on_delay_s: float
+    off_delay_s: float
+    level: str
+    unknown: str
+    unit: str
+    fixed: bool
+    user: str
+    readings: _containers.RepeatedCompositeFieldContainer[AlarmLimit.Reading]
+    def __init__(self, name: _Optional[str] = ..., field: _Optional[str] = ..., device: _Optional[str] = ..., above: _Optional[float] = ..., below: _Optional[float] = ..., dead_band: _Optional[float] = ..., on_delay_s: _Optional[float] = ..., off_delay_s: _Optional[float] = ..., level: _Optional[str] = ..., unknown: _Optional[str] = ..., unit: _Optional[str] = ..., fixed: _Optional[bool] = ..., user: _Optional[str] = ..., readings: _Optional[_Iterable[_Union[AlarmLimit.Reading, _Mapping]]] = ...) -> None: ...
+
+class AlarmCommand(_message.Message):
+    __slots__ = ("action", "device", "id", "user", "text", "seconds", "limit")
+    class Action(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        ACTION_LIST: _ClassVar[AlarmCommand.Action]
+        ACTION_ACKNOWLEDGE: _ClassVar[AlarmCommand.Action]
+        ACTION_SHELVE: _ClassVar[AlarmCommand.Action]
+        ACTION_UNSHELVE: _ClassVar[AlarmCommand.Action]
+        ACTION_SET_LIMIT: _ClassVar[AlarmCommand.Action]
+        ACTION_REMOVE_LIMIT: _ClassVar[AlarmCommand.Action]
+        ACTION_TEST: _ClassVar[AlarmCommand.Action]
+    ACTION_LIST: AlarmCommand.Action
+    ACTION_ACKNOWLEDGE: AlarmCommand.Action
+    ACTION_SHELVE: AlarmCommand.Action
+    ACTION_UNSHELVE: AlarmCommand.Action
+    ACTION_SET_LIMIT: AlarmCommand.Action
+    ACTION_REMOVE_LIMIT: AlarmCommand.Action
+    ACTION_TEST: AlarmCommand.Action
+    ACTION_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    ID_FIELD_NUMBER: _ClassVar[int]
+    USER_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    SECONDS_FIELD_NUMBER: _ClassVar[int]
+    LIMIT_FIELD_NUMBER: _ClassVar[int]
+    action: AlarmCommand.Action
+    device: str
+    id: str
+    user: str
+    text: str
+    seconds: float
+    limit: AlarmLimit
+    def __init__(self, action: _Optional[_Union[AlarmCommand.Action, str]] = ..., device: _Optional[str] = ..., id: _Optional[str] = ..., user: _Optional[str] = ..., text: _Optional[str] = ..., seconds: _Optional[float] = ..., limit: _Optional[_Union[AlarmLimit, _Mapping]] = ...) -> None: ...
+
+class AlarmReply(_message.Message):
+    __slots__ = ("ok", "message", "alarms", "limits", "history", "ways", "trouble")
+    class Event(_message.Message):
+        __slots__ = ("utc_ns", "device", "id", "title", "level", "what", "who", "text")
+        UTC_NS_FIELD_NUMBER: _ClassVar[int]
+        DEVICE_FIELD_NUMBER: _ClassVar[int]
+        ID_FIELD_NUMBER: _ClassVar[int]
+        TITLE_FIELD_NUMBER: _ClassVar[int]
+        LEVEL_FIELD_NUMBER: _ClassVar[int]
+        WHAT_FIELD_NUMBER: _ClassVar[int]
+        WHO_FIELD_NUMBER: _ClassVar[int]
+        TEXT_FIELD_NUMBER: _ClassVar[int]
+        utc_ns: int
+        device: str
+        id: str
+        title: str
+        level: Alarm.Level
+        what: str
+        who: str
+        text: str
+        def __init__(self, utc_ns: _Optional[int] = ..., device: _Optional[str] = ..., id: _Optional[str] = ..., title: _Optional[str] = ..., level: _Optional[_Union[Alarm.Level, str]] = ..., what: _Optional[str] = ..., who: _Optional[str] = ..., text: _Optional[str] = ...) -> None: ...
+    class Way(_message.Message):
+        __slots__ = ("name", "sent", "waiting", "given_up", "fault")
+        NAME_FIELD_NUMBER: _ClassVar[int]
+        SENT_FIELD_NUMBER: _ClassVar[int]
+        WAITING_FIELD_NUMBER: _ClassVar[int]
+        GIVEN_UP_FIELD_NUMBER: _ClassVar[int]
+        FAULT_FIELD_NUMBER: _ClassVar[int]
+        name: str
+        sent: int
+        waiting: int
+        given_up: int
+        fault: str
+        def __init__(self, name: _Optional[str] = ..., sent: _Optional[int] = ..., waiting: _Optional[int] = ..., given_up: _Optional[int] = ..., fault: _Optional[str] = ...) -> None: ...
+    OK_FIELD_NUMBER: _ClassVar[int]
+    MESSAGE_FIELD_NUMBER: _ClassVar[int]
+    ALARMS_FIELD_NUMBER: _ClassVar[int]
+    LIMITS_FIELD_NUMBER: _ClassVar[int]
+    HISTORY_FIELD_NUMBER: _ClassVar[int]
+    WAYS_FIELD_NUMBER: _ClassVar[int]
+    TROUBLE_FIELD_NUMBER: _ClassVar[int]
+    ok: bool
+    message: str
+    alarms: _containers.RepeatedCompositeFieldContainer[Alarm]
+    limits: _containers.RepeatedCompositeFieldContainer[AlarmLimit]
+    history: _containers.RepeatedCompositeFieldContainer[AlarmReply.Event]
+    ways: _containers.RepeatedCompositeFieldContainer[AlarmReply.Way]
+    trouble: str
+    def __init__(self, ok: _Optional[bool] = ..., message: _Optional[str] = ..., alarms: _Optional[_Iterable[_Union[Alarm, _Mapping]]] = ..., limits: _Optional[_Iterable[_Union[AlarmLimit, _Mapping]]] = ..., history: _Optional[_Iterable[_Union[AlarmReply.Event, _Mapping]]] = ..., ways: _Optional[_Iterable[_Union[AlarmReply.Way, _Mapping]]] = ..., trouble: _Optional[str] = ...) -> None: ...

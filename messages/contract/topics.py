@@ -23,7 +23,8 @@ RECORDER = "recorder"  # the device name under which the recorder speaks
 
 # processes by the topics' `source`: those that keep what they publish, and all of which one serves
 GATEWAY, ESTIMATES, PROCEDURES = "gateway", "estimator", "procedures"
-CLAIMED = (GATEWAY, ESTIMATES, PROCEDURES, RECORDER, "replay")
+ALARMS = "alarms"
+CLAIMED = (GATEWAY, ESTIMATES, PROCEDURES, RECORDER, "replay", ALARMS)
 
 
 class TopicError(ValueError):
@@ -93,6 +94,7 @@ MUTE = Topic(
 PROCEDURE = Topic(
     "procedure", pb.ProcedureStatus, 4, "procedures", "a test as it runs, step by step"
 )
+ALARM = Topic("alarm", pb.AlarmStatus, 0.5, "alarms", "what is wrong, and who took note of it")
 NOTE = Topic("note", pb.Note, 0, "any", "remarks on the data by people and programs")
 REPLAY = Topic("replay", pb.ReplayStatus, 5, "replay", "where a replay stands", recorded=False)
 STATUS = Topic("status", pb.RecorderStatus, 1, "recorder", "state of the recording", recorded=False)
@@ -119,6 +121,7 @@ TOPICS: tuple[Topic, ...] = (
     CALIBRATION,
     WIRING,
     PROCEDURE,
+    ALARM,
     NOTE,
     REPLAY,
     STATUS,
@@ -216,6 +219,11 @@ def control_key(prefix: str, device: str, what: str) -> str:
 def replay_control_key(prefix: str) -> str:
     """Key of a replay's queryable: ReplayCommand in, ReplayStatus out."""
     return f"{check_name(prefix)}/{REPLAY.name}/control"
+
+
+def alarms_control_key(prefix: str) -> str:
+    """Key of the alarms' queryable: AlarmCommand in, AlarmReply out."""
+    return f"{check_name(prefix)}/{ALARMS}/control"
 
 
 def markdown() -> str:

@@ -16,7 +16,21 @@ from numpy.typing import NDArray
 
 from inertial.rate.names import LEADER
 from logs.figures.names import axis_channel
-from messages.contract.topics import ACCEL, GNSS, IMU, NAV, NOTE, RATE, TACHO, TRUTH, Topic, parse
+from messages.contract.topics import (
+    ACCEL,
+    ALARM,
+    ALARMS,
+    GNSS,
+    IMU,
+    NAV,
+    NOTE,
+    RATE,
+    TACHO,
+    TRUTH,
+    Topic,
+    parse,
+)
+from sessions.library.alarmed import Episodes
 from sessions.library.curves import Curves, Line, Mark, bin_for, bins_of, load, save
 from sessions.library.curves_bins import UNTOLD, Binner, PulseLine, TrackLine
 from sessions.library.scan import Block, Extent, Progress, extent, scan
@@ -57,7 +71,7 @@ def build(path: Path, coarse: bool = False, on_progress: Progress = lambda _: No
     stride = max(1, found.chunks // COARSE_CHUNKS) if coarse else 1
     reading = _Reading(path, found, stride)
     damage = Damage()
-    for block in scan(path, tuple(WANTED), stride, on_progress, damage):
+    for block in scan(path, (*WANTED, ALARM), stride, on_progress, damage):
         reading.take(
             block
             if stride == 1
@@ -93,6 +107,7 @@ class _Reading:
         self._axes: dict[str, tuple[Binner, tuple[str, ...]]] = {}
         self._tracks: dict[str, TrackLine] = {}
         self._marks: list[Mark] = []
+        self._alarms = Episodes()
         self._clocks: set[str] = set()
         self._take: dict[str, Callable[[str, Samples, Array], None]] = {
             RATE.name: self._rate,
@@ -112,6 +127,10 @@ class _Reading:
         if not decoded:
             return
         topic, (log_ns, found) = address.topic, zip(*decoded, strict=True)
+        if topic is ALARM:
+            for status in found:
+                self._alarms.take(status)
+            return
         read = samples(topic, found, log_ns, (*WANTED[topic], "run", "epoch"))
         name = f"{address.device}/{topic.name}" + (
             f"/{address.estimator}" if address.estimator else ""
@@ -140,12 +159,16 @@ class _Reading:
             width,
             dict(sorted(lines.items())),
             dict(sorted(tracks.items())),
-            tuple(sorted(self._marks, key=lambda mark: mark.t)),
+            tuple(sorted(self._marks + self._alarmed(), key=lambda mark: mark.t)),
             tuple(sorted(self._clocks)),
             self._coarse,
             leader_of(self._path),
             {key: _means(*one, n) for key, one in self._axes.items()},
         )
+
+    def _alarmed(self) -> list[Mark]:
+        ranges = self._alarms.ranges(self._extent.first_ns, self._extent.last_ns)
+        return [Mark(t, text, ALARMS, seconds) for t, text, seconds in ranges]
 
     def _times(self, read: Samples) -> Array:
         """The samples' own times, s from the first message; receive times where those cannot be."""

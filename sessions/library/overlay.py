@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from logs.figures.names import line_colour, line_title
 from logs.figures.sight import WORDS, vouched
 from logs.figures.stretch import stretch
+from messages.contract.topics import ALARMS
 from sessions.library.compare import XYZ, Comparison, Overlaid, moved
 from sessions.library.curves import RATE, TACHO, TRUTH, Line, Mark
 from sessions.library.derived import Made, derive
@@ -22,6 +23,7 @@ POINTS = 1200  # per line, two for each bin of the window
 TRACK_POINTS = 1500
 DEG = float(np.degrees(1.0))
 PROCEDURE = "procedure"  # author of what a procedure says in a recording
+RANGES = {PROCEDURE: "step", ALARMS: "alarm"}  # what is drawn for what lasts, by its author
 
 
 def drawing(
@@ -163,9 +165,11 @@ def _unsure(
 
 
 def _mark(mark: Mark, offset_s: float) -> dict[str, Any]:
-    """A remark; one about some time is a range of the plots, a procedure's is one of its steps."""
+    """A remark; one about some time is a range of the plots, a procedure's is one of its steps, an
+    alarm is there from its beginning to its end.
+    """
     begin = mark.t + offset_s
-    kind = "step" if mark.author == PROCEDURE and mark.seconds > 0 else "mark"
+    kind = RANGES.get(mark.author, "mark") if mark.seconds > 0 else "mark"
     until = begin + max(mark.seconds, 0.0)
     return {"t": begin, "until": until, "kind": kind, "text": mark.text, "author": mark.author}
 

@@ -81,13 +81,14 @@ class Run:
             case "step":
                 self.at, self.state = k, RUNNING
                 step.state, step.attempts, step.reason = "active", step.attempts + 1, ""
+                step.window, step.figures = {}, []  # of an attempt that does not count any more
             case "spoilt":
                 step.spoilt, step.reason = step.spoilt + 1, event["reason"]
                 step.went_wrong(event["reason"])
                 self.message = f"{self.plan.steps[k].name}: spoilt: {event['reason']}"
             case "anew":
                 for one in self.steps:
-                    if one.state == "done" and one.window:
+                    if one.window:
                         one.state, one.window, one.figures = "todo", {}, []
                         one.spoilt, one.reference = one.spoilt + 1, ""
                         one.went_wrong(event["reason"])

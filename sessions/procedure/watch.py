@@ -32,6 +32,9 @@ TICK = 0.05  # s, of the board's clock
 LAG = 0.15  # s, pulses wait for company and estimates are computed
 HOLE = 0.25  # s without samples that spoil a dwell
 FACE = 20.0 * DEG  # rad, between a face and the vertical
+# the same in a dwell: of a table that stops at once the last pulse is earlier than the last turn,
+# and of what comes in one rush, after this process was held up, the pulses may be the last
+AGAINST_DWELL_S = 0.4
 AGAINST_S = 1.5  # s that others may contradict it: its first pulse is late, a table's word is old
 GRAVITY_OFF = 0.15  # of 1, of the specific force of a body at rest
 
@@ -209,8 +212,11 @@ class Watch:
             return "the rate is not known: no tachometer has pulsed and no estimator is sure"
         if contradicted := self._contradicted(t, found):
             self._against = t if np.isnan(self._against) else self._against
-            if self.state is State.DWELL or t - self._against > AGAINST_S:
+            in_dwell = self.state is State.DWELL
+            if t - self._against > (AGAINST_DWELL_S if in_dwell else AGAINST_S):
                 return contradicted
+            if in_dwell:
+                return ""  # not yet; at its end the recording is asked again
         else:
             self._against = np.nan
         omega, target = found.omega, want

@@ -14,6 +14,7 @@ import numpy as np
 from inertial.whole_file import whole_files
 from messages.contract import gyrofree_pb2 as pb
 from sessions.export.table import Progress, silent
+from sessions.library.alarmed import Episode
 from sessions.procedure.evaluate import (
     Held,
     Outcome,
@@ -25,6 +26,7 @@ from sessions.procedure.evaluate import (
 )
 from sessions.procedure.pages import facts, provenance, steps, troubles
 from sessions.recording.manifest import Manifest, SessionError, read_manifest, whole
+from sessions.report import alarms
 from sessions.report.analysis import Analysis, analyse
 from sessions.report.data import Run, load_run
 from sessions.report.document import Extra, compose
@@ -69,6 +71,7 @@ class Judged:
     held: Held | None
     outcome: Outcome | None
     before: dict[Path, Manifest] = field(default_factory=dict)  # files that this one goes on with
+    episodes: list[Episode] = field(default_factory=list)  # alarms of its run
 
 
 def judged(
@@ -89,9 +92,9 @@ def judged(
     if held is not None:
         outcome = evaluate(held, found, figures)
         figures, checks = [*figures, *outcome.figures], outcome.checks + checks
-    return Judged(
-        whole(manifest, *before.values()), found, spec, figures, checks, held, outcome, before
-    )
+    there = alarms.of_run(alarms.in_files({**before, path: manifest}), run)
+    one = whole(manifest, *before.values())
+    return Judged(one, found, spec, figures, checks, held, outcome, before, there)
 
 
 def build(
@@ -112,6 +115,8 @@ def build(
             provenance(one.outcome),
             one.outcome.held.status.operator,
         )
+    grid = alarms.alarms(one.episodes, one.found.run)
+    extra.grids.extend([grid] if grid is not None else [])
     extra.provenance.extend(
         (f"SHA-256 of {manifest.id}, which it goes on with", sha256_of(file))
         for file, manifest in one.before.items()
@@ -170,6 +175,7 @@ def _json(one: Judged, sha256: str, photo: Photo | None) -> str:
         "navigation": {nav.name: asdict(nav) for nav in found.navigation},
         "link": found.run.link,
         "damage": list(found.run.said),
+        "alarms": alarms.as_json(one.episodes, found.run),
     }
     if outcome is not None:
         status = outcome.held.status

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from sessions.report.data import Accel
+from sessions.report.nis import nis_verdict
 from sessions.report.segments import Segment
 
 Array = NDArray[np.float64]
@@ -83,12 +84,6 @@ def allan_axes(accel: Accel, rest: Segment) -> list[Allan]:
     return [one for one in found if one is not None]
 
 
-FEWEST = 20  # corrections that a verdict takes
-MATTERS = 0.25  # share by which NIS may be off its degrees of freedom
-TOO_FEW, HONEST = "too few to judge", "honest"
-TOO_SURE, TOO_CAREFUL = "too sure of itself", "too careful"
-
-
 @dataclass(frozen=True)
 class Consistency:
     """Normalised innovation squared over its degrees of freedom; 1 is what a consistent filter
@@ -102,20 +97,6 @@ class Consistency:
     high: float
     beyond: float  # share of corrections beyond their own 95 % bound
     verdict: str  # see nis_verdict
-
-
-def nis_verdict(nis: Array, dof: Array | float) -> str:
-    """What values of NIS (n,) with their degrees of freedom say of a filter, for people: beyond
-    the band that chance leaves them, and by so much that it matters.
-    """
-    total = float(np.sum(np.broadcast_to(np.maximum(dof, 1), np.shape(nis))))
-    if len(nis) < FEWEST:
-        return TOO_FEW
-    mean = float(np.sum(nis)) / total
-    low, high = chi2.interval(0.95, total)
-    if mean > max(high / total, 1.0 + MATTERS):
-        return TOO_SURE
-    return TOO_CAREFUL if mean < min(low / total, 1.0 - MATTERS) else HONEST
 
 
 def consistency(name: str, nis: Array, dof: Array) -> Consistency | None:

@@ -142,7 +142,7 @@ def test_an_unused_or_old_session_ends(door: Door, hours):
         if hours > 12:
             for _ in range(8):  # used all the time
                 door.ahead += 1.49 * 3600
-                assert client.get("/api/me").status_code == 200
+                assert client.get("/sessions").status_code == 200
             hours -= 8 * 1.49
         door.ahead += hours * 3600
         assert client.get("/api/me").status_code == 401

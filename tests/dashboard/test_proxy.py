@@ -366,7 +366,7 @@ def test_browser_that_takes_nothing_is_dropped_and_does_not_fill_the_memory(tmp_
         colors = np.zeros((300_000, 3), np.uint8)
         for i in range(12):  # far more than the kernel's buffers take
             door.viser.scene.add_point_cloud(f"/p{i}", points, colors, precision="float32")
-        wait_for(lambda: not door.viser.get_clients(), "the slow browser is gone")
+        wait_for(lambda: not door.viser.get_clients(), "the slow browser is gone", 120.0)
         with pytest.raises(ConnectionClosed):
             while True:
                 slow.recv(timeout=20.0)

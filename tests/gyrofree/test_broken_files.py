@@ -33,6 +33,11 @@ VALUES = {  # of what is no file
     "text": "a remark",
     "user": "anna",
     "token": "0123456789ab",
+    "common_name": "viewer.anna",
+    "place": "office",
+    "address": "127.0.0.1",
+    "id": "link/cube",
+    "minutes": "5",
 }
 GOOD = {  # of a file that is wanted beside the broken one
     "log": "cube.csv",

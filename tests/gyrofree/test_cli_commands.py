@@ -23,6 +23,7 @@ SERVICES = {
     "simulate",
     "play",
     "procedures",
+    "site serve",
 }
 ORDERS = {
     "users add",
@@ -33,6 +34,7 @@ ORDERS = {
     "completion",
     "users token create",
     "users token revoke",
+    *(f"alarms {verb}" for verb in ("acknowledge", "shelve", "test", "unshelve")),
     *(f"procedure {verb}" for verb in ("abort", "next", "repeat", "run", "stop")),
     "procedure check",
     "procedure show",

@@ -26,13 +26,18 @@ GOOD = {
     "layout": "layout.toml",
     "layouts": "layout.toml",
 }
-VALUES = {"name": "published"}
+VALUES = {"name": "published", "role": "viewer", "common_name": "x", "place": "x", "address": "x"}
 OF_ITSELF = {"calibrate axes": {"log": "adc.csv"}, "run": {}}
 MORE = {"export": ["--to=1"], "layout optimise": ["--axes=6", "--starts=1"]}
 MAKES = {"reprocess", "calibrate axes", "calibrate fit"}  # the folder of their file
 LONG = {"report", "reprocess", "procedure run", "procedure compare", "board", "demo", "play"}
 LONG |= {"reproduce gyro-free", "reproduce in-motion", "sessions compare", "calibrate fit"}
-LONG |= {"calibrate apply", "calibrate axes"}  # want inputs that are long to make
+LONG |= {
+    "calibrate apply",
+    "calibrate axes",
+    "certs issue",
+    "site join",
+}  # want inputs that are long to make
 
 
 def outputs():

@@ -25,6 +25,7 @@ from tests.support.stack import RunningDemo
 M = pb.ProcedureStatus
 SHORT = """
 title = "Short"
+repeats = 9
 settle_s = 0.3
 [[steps]]
 kind = "still"
@@ -86,7 +87,7 @@ class Bench:
         command = pb.ProcedureCommand(action=number, device="cube", user="anna", **more)
         return orders.give(self.session, self.prefix, orders.PROCEDURES, command, "cube")
 
-    def until(self, wanted, seconds: float = 60.0) -> M:
+    def until(self, wanted, seconds: float = 120.0) -> M:
         """The first status that is as wanted."""
         end, seen = time.monotonic() + seconds, 0
         while time.monotonic() < end:

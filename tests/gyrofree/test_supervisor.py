@@ -105,6 +105,32 @@ def test_a_signal_may_come_at_any_moment():
     assert done.stdout == "ended\n", done.stderr
 
 
+ENDS = """
+import sys, weakref
+from gyrofree.running import process
+process.stop_on_signals()
+class Held: pass
+held = Held()
+weakref.finalize(held, print, "let go")
+sys.stdout.write("said")
+try:
+    {how}
+except SystemExit as end:
+    process.ending(end.code)
+    raise
+"""
+
+
+@pytest.mark.parametrize(
+    ("how", "code"), [("pass", 0), ("raise SystemExit(3)", 3), ("raise ValueError", 1)]
+)
+def test_a_service_ends_with_its_code_and_all_that_it_said(how, code):
+    """Though its interpreter is not taken down, which a thread of the bus would not survive."""
+    child = [sys.executable, "-c", ENDS.format(how=how)]
+    done = subprocess.run(child, cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert (done.stdout, done.returncode) == ("saidlet go\n", code), done.stderr
+
+
 ASLEEP = """
 from gyrofree.running.process import stop_on_signals
 stop = stop_on_signals()

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 from support.procedures import start
 
@@ -325,6 +325,7 @@ HAPPENS = st.lists(
 
 @settings(max_examples=30, deadline=None, phases=QUICK)
 @given(HAPPENS)
+@example([("", 1.7), ("unfit", 0.3), ("reboot", 0.9), ("reboot", 1.7), ("tacho", 0.9)])
 def test_whatever_happens_a_run_that_is_done_was_measured_well(tmp_path_factory, happens):
     """No window of a step that counts touches a fault, and all are of one boot."""
     with pytest.MonkeyPatch.context() as patch:

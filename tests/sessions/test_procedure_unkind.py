@@ -115,6 +115,27 @@ def test_a_table_that_pours_or_takes_nothing_holds_nobody_up():
     os.close(other)
 
 
+def test_two_on_one_line_do_not_take_each_others_answers():
+    """As the guard, which stops the table of a service that was killed, and its next life."""
+    slow = SlowTable(timeout_s=5.0)
+    slow.line.pause_s = 0.2
+    other = TextTable(described("simulated"), slow.line.path)
+    told: list[str] = []
+
+    def leave() -> None:
+        other.stop()
+        other.close()
+        told.append("stopped")
+
+    other._open()
+    leaving = threading.Thread(target=leave)
+    leaving.start()
+    slow.table.take()
+    leaving.join(30.0)
+    assert told == ["stopped"] and slow.line.lines[:2] == ["OUTP:STOP", "*IDN?"]
+    slow.table.release()
+
+
 def test_a_table_is_told_to_stand_until_it_takes_it(tmp_path):
     slow = SlowTable(**{"SENS:RATE?": "90.0"})
     one = conductor(tmp_path, slow.table)

@@ -5,6 +5,7 @@ it.
 import contextlib
 import functools
 import re
+import ssl
 import tempfile
 import threading
 import time
@@ -21,10 +22,11 @@ from dashboard.service import listen, serve
 from dashboard.settings import DashboardSettings
 from dashboard.web.auth import Gate, UserStore, add_user
 from dashboard.web.front import Front
+from dashboard.web.tls.certificate import open_certificate
 from dashboard.web.users import issue_link_token, write_private
 from sessions.library.catalogue import Catalogue
 
-PASSWORDS = {"vera": "looks only 1", "otto": "operates 22", "anna": "administers 3"}
+PASSWORDS = {"vera": "looks only 1", "otto": "operates 222", "anna": "administers 3"}
 SERVICES = ("store", "desk", "replay", "jobs", "first_run", "open_labels")
 ROLES = {"vera": "viewer", "otto": "operator", "anna": "admin"}
 
@@ -71,6 +73,7 @@ class Door:
         self, folder: Path, port: int, scene: bool = True, scene_at: int = 0, **options: Any
     ) -> None:
         services = {key: options.pop(key) for key in SERVICES if key in options}
+        options = {"idle_hours": 2.0} | options
         self.settings = DashboardSettings(
             port=port, users=folder / "users.json", sessions_root=folder / "sessions", **options
         )
@@ -83,9 +86,11 @@ class Door:
             gate=self.new_gate(),
             catalogue=Catalogue(self.settings.sessions_root),
             scene_port=self.viser.get_port if self.viser else lambda: scene_at,
+            certificate=open_certificate(self.settings),
             **services,
         )
-        self.url = f"http://127.0.0.1:{port}"
+        self.url = self.settings.url if self.settings.tls_key else f"http://127.0.0.1:{port}"
+        self.trust = trust_in(self.settings.tls_certificate)
 
     def new_gate(self) -> Gate:
         """A gate as a fresh process would make it."""
@@ -98,7 +103,9 @@ class Door:
     @contextlib.contextmanager
     def client(self, name: str = "") -> Iterator[httpx.Client]:
         """A browser, signed in as `name` by a link, with the CSRF header that our pages send."""
-        with httpx.Client(base_url=self.url, timeout=30.0, headers={"origin": self.url}) as client:
+        with httpx.Client(
+            base_url=self.url, timeout=30.0, headers={"origin": self.url}, verify=self.trust
+        ) as client:
             if name:
                 token = issue_link_token(self.settings.users, name)
                 assert client.post("/login/link", data={"token": token}).status_code == 303
@@ -119,8 +126,15 @@ class Door:
             self.url.replace("http", "ws") + "/scene",
             additional_headers={"cookie": cookies},
             proxy=None,
+            ssl=self.trust if self.settings.tls_key else None,
             **options,
         )
+
+
+@functools.cache
+def trust_in(certificate: Path | None) -> ssl.SSLContext:
+    """What a browser goes by that knows this certificate."""
+    return ssl.create_default_context(cafile=certificate)
 
 
 @contextlib.contextmanager
@@ -133,7 +147,8 @@ def open_door(folder: Path, **options: Any) -> Iterator[Door]:
         thread.start()
         try:
             wait_for(
-                lambda: httpx.get(door.url + "/api/health").status_code == 200, "the door answers"
+                lambda: httpx.get(door.url + "/api/health", verify=door.trust).status_code == 200,
+                "the door answers",
             )
             yield door
         finally:

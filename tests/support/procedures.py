@@ -2,6 +2,7 @@
 
 import os
 import threading
+import time
 import tty
 
 STILL = 'title = "a"\n[[steps]]\nkind = "still"\nseconds = 1\n'
@@ -13,7 +14,9 @@ def start(**more) -> dict:
 
 
 class Answers:
-    """The other end of a serial line; `answer` makes the reply to each line."""
+    """The other end of a serial line; `answer` makes the reply to each line, `pause_s` later."""
+
+    pause_s = 0.0
 
     def __init__(self, answer) -> None:
         self.fd, slave = os.openpty()
@@ -32,5 +35,6 @@ class Answers:
                 line, said = said.split(b"\n", 1)
                 self.lines.append(line.decode())
                 reply = answer(line.decode())
+                time.sleep(self.pause_s)
                 if reply is not None:
                     os.write(self.fd, reply.encode() + b"\n")

@@ -39,7 +39,7 @@ def test_every_picture_of_the_guide_is_there_and_says_what_it_shows(page):
 
 
 def test_no_picture_is_left_over():
-    used = "".join(page.read_text() for page in [*GUIDE, DOCS / "index.md"])
+    used = "".join(page.read_text() for page in DOCS.rglob("*.md"))
     assert not [p.name for p in (DOCS / "guide" / "pictures").iterdir() if p.name not in used]
 
 
@@ -47,7 +47,7 @@ def test_no_picture_is_left_over():
 def source() -> str:
     """All Python of the product, adjacent parts of a text joined."""
     rooms = ("gyrofree", "gateway", "estimator", "inertial", "logs", "sessions", "dashboard")
-    rooms += ("messages",)
+    rooms += ("messages", "sites")
     text = "\n".join(
         path.read_text(encoding="utf-8")
         for room in rooms

@@ -78,7 +78,7 @@ class Range:
     t0: float
     t1: float
     text: str
-    kind: str = "mark"  # mark, step or late
+    kind: str = "mark"  # mark, step, late or alarm
 
 
 @dataclass(frozen=True)

@@ -250,6 +250,18 @@ def ranges(device: Device) -> list[Range]:
                 (at - device.utc0_ns) * 1e-9 for at in (step.from_utc_ns, step.until_utc_ns)
             )
             found.append(Range(begin, end, step.name[:60], "step"))
+    return found + alarm_ranges(device)
+
+
+def alarm_ranges(device: Device) -> list[Range]:
+    """What is wrong, or was within the last minutes."""
+    heard, found = device.get("alarm"), []
+    for one in heard.message.alarms if heard is not None else ():
+        begin = (one.raised_utc_ns - device.utc0_ns) * 1e-9
+        until = (one.returned_utc_ns - device.utc0_ns) * 1e-9
+        end = until if one.returned_utc_ns else max(begin, device.t_newest)
+        if one.raised_utc_ns and end >= begin:
+            found.append(Range(begin, end, plain(one.title, 60), "alarm"))
     return found
 
 

@@ -8,7 +8,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from dashboard.web.auth import Role
 from dashboard.web.control import ControlError
 from dashboard.web.first.control import FirstRun
-from dashboard.web.front import Asker, check_role, front_of
+from dashboard.web.front import Asker, audit_of, check_role, front_of
 from dashboard.web.pages import SignedIn, render, signed_form
 from dashboard.web.users import UsersError, add_user
 
@@ -56,6 +56,7 @@ async def act(request: Request) -> Response:
             await asyncio.to_thread(
                 add_user, users, fields["user"], fields.get("password", ""), Role.admin
             )
+            audit_of(request).done("user made, admin", who.name, detail=fields["user"])
         if fields.get("port", "").strip().startswith("file:"):
             raise ControlError("a file is no board: `gyrofree setup` in a terminal takes one")
         answers = {name: fields[name].strip() for name in FIELDS if fields.get(name, "").strip()}

@@ -21,6 +21,8 @@ from dashboard.settings import DashboardSettings
 from dashboard.web.auth import Gate, Role
 from dashboard.web.frame.scene_messages import (
     DROPPED_QUIETLY,
+    OPERATOR_MAY,
+    VIEWER_MAY,
     BadMessage,
     Widgets,
     may_send,
@@ -36,6 +38,9 @@ FOREIGN_PARAMETERS = {
     "websocket",
     "playbackPath",
 }  # they point viser's page at other servers and files
+RIGHTS_S = 1.0  # between two looks at rights that another process may have changed
+# A camera may follow the cube by itself, and what counts a download is no person.
+BY_A_PERSON = OPERATOR_MAY.keys() - VIEWER_MAY.keys()
 
 
 class Rate:
@@ -74,7 +79,7 @@ def router(
         if clean != query:
             return RedirectResponse("/scene/" + (f"?{urlencode(clean)}" if clean else ""), 303)
         headers = {
-            "content-security-policy": policy(request.headers["host"]),
+            "content-security-policy": policy(request.headers["host"], settings.secure),
             "x-frame-options": "SAMEORIGIN",
             "cache-control": "private, max-age=3600",
             "etag": f'"viser-{version}"',
@@ -227,6 +232,7 @@ class Relay:
                 self._count("a scene sent what is no message")
                 return 1007, "not a message of viser's"
             if may_send(role, name, fields, self._widgets):
+                self._gate.look_up(self._key, used=name in BY_A_PERSON)
                 await scene.send(data)
             else:
                 self._note(role, name)
@@ -252,9 +258,10 @@ class Relay:
     async def _watch(self, scene: websockets.ClientConnection) -> tuple[int, str]:
         """Ends the connection of a browser that was signed out, also when it sends nothing."""
         while True:
+            rung = self._gate.bell.rung
             found = self._gate.look_up(self._key)
             if found is None:
                 return 1008, "signed out"
             self._who = found[1].name
             await self._tell_role(scene)
-            await asyncio.sleep(2.0)
+            await self._gate.bell.wait(rung, RIGHTS_S)

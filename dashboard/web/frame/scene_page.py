@@ -42,7 +42,7 @@ ALPHABET = (
 POLICY = (
     "default-src 'none'; script-src 'wasm-unsafe-eval' blob: {scripts};"
     " style-src 'unsafe-inline'; img-src 'self' data: blob:; font-src data:; worker-src blob:;"
-    " connect-src data: blob: ws://{host} wss://{host}; base-uri 'none'; form-action 'none';"
+    " connect-src data: blob: {sockets}; base-uri 'none'; form-action 'none';"
     " frame-src 'none'; object-src 'none'; frame-ancestors 'self'"
 )
 
@@ -54,9 +54,12 @@ def scene_page() -> tuple[bytes, str]:
     return page.replace(b"<head>", b"<head>" + NO_TEXTS, 1), viser.__version__
 
 
-def policy(host: str) -> str:
-    """The Content-Security-Policy of the page; host as in the request's header."""
-    return POLICY.format(host=host, scripts=" ".join(script_hashes()))
+def policy(host: str, secure: bool = False) -> str:
+    """The Content-Security-Policy of the page; host as in the request's header. secure: reached by
+    https only.
+    """
+    sockets = f"wss://{host}" if secure else f"ws://{host} wss://{host}"
+    return POLICY.format(sockets=sockets, scripts=" ".join(script_hashes()))
 
 
 @cache

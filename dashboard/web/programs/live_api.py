@@ -1,6 +1,5 @@
 """Live values for programs: the newest by REST, and a stream of them as server-sent events."""
 
-import asyncio
 import json
 import time
 from collections import Counter
@@ -23,7 +22,7 @@ Estimator = Annotated[str, Query(max_length=64, description="its name; empty: th
 Three = list[float | None]
 STREAMS, STREAMS_EACH = 64, 8  # at a time: of all, of one user
 QUIET_S = 10.0  # without an event after which a comment says that the line still stands
-RIGHTS_S = 2.0  # between two looks whether whoever listens still may
+RIGHTS_S = 1.0  # between two looks at rights that another process may have changed
 
 
 class _Said(BaseModel):
@@ -129,17 +128,19 @@ async def _events(
     listeners: Counter[str] = request.app.state.listeners
     listeners[who.name] += 1
     sent: dict[str, float] = {}
-    spoke = looked = time.monotonic()
+    spoke = looked = due = time.monotonic()
+    bell = front_of(request).gate.bell
+    seen = bell.rung
     try:
         yield "retry: 2000\n\n"
         while True:
-            now = time.monotonic()
-            if now - looked > RIGHTS_S:
-                looked = now
+            now, rung = time.monotonic(), bell.rung
+            if now - looked > RIGHTS_S or rung != seen:
+                looked, seen = now, rung
                 if not _still_may(request, who):
                     yield 'event: end\ndata: {"why": "signed out, revoked or past its end"}\n\n'
                     return
-            for topic in topics:
+            for topic in topics if now >= due else ():
                 with store.lock:
                     found = store.device(device)
                     said = live(found, topic, estimator) if found else None
@@ -149,7 +150,8 @@ async def _events(
             if now - spoke > QUIET_S:
                 spoke = now
                 yield ": nothing new\n\n"
-            await asyncio.sleep(period_s)
+            due = due if now < due else now + period_s
+            await bell.wait(seen, min(due - now, RIGHTS_S))
     finally:
         listeners[who.name] -= 1
         if not listeners[who.name]:

@@ -6,7 +6,7 @@ const FAR = 4; // widths of the bulk that a point is away from it before it coun
 const FEW = 4; // of them at one side; more are a signal
 const FRESH = 0.04; // newest share of the window, in which a jump may be the beginning of something
 export const SHADES = { blind: "#d55e00", ambiguous: "#c9b400" }; // what a filter does not vouch for: no lines, few names
-const TINT = { ...SHADES, mark: "#c564a0", step: "#3296d8", late: "#b08000" };
+const TINT = { ...SHADES, mark: "#c564a0", step: "#3296d8", late: "#b08000", alarm: "#d6404e" };
 const FACE = "system-ui, 'DejaVu Sans', sans-serif";
 
 const number = (v) => (v === 0 ? "0" : Math.abs(v) >= 1e5 || Math.abs(v) < 1e-3 ? v.toExponential(2) : String(Number(v.toPrecision(4))));

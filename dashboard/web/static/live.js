@@ -2,6 +2,7 @@
 import "/static/live_charts.js";
 import { call, toast } from "/static/rest.js";
 import { mayOperate, turnTo } from "/static/desk.js";
+import { tell } from "/static/told.js";
 import { state } from "/static/view.js";
 
 const byId = (id) => document.getElementById(id);
@@ -56,6 +57,7 @@ function showAlarms(devices, bench) {
   const mine = (d) => d.name === state?.device;
   const found = [...bench, ...devices.slice().sort((a, b) => mine(b) - mine(a))
     .flatMap((d) => d.alarms.map((alarm) => ({ ...alarm, device: d.name, other: !mine(d) })))];
+  tell(found);
   const key = JSON.stringify(found);
   if (alarms.dataset.drawn === key) return;
   alarms.dataset.drawn = key;
@@ -90,8 +92,9 @@ function alarmButton(alarm) {
   const strong = document.createElement("b"), text = document.createElement("span"), words = Object.entries(alarm.words);
   strong.append(...explained(`▲ ${alarm.other ? `${alarm.device}: ` : ""}${alarm.title}`, words));
   text.append(...explained(alarm.text, words));
-  button.className = "alarm";
-  button.title = [alarm.text, ...words.map(([word, meaning]) => `${word}: ${meaning}`)].join("\n");
+  button.className = `alarm ${alarm.level} ${alarm.state}`;
+  const noted = alarm.state === "acknowledged" ? ["acknowledged"] : [];
+  button.title = [alarm.text, ...noted, ...words.map(([word, meaning]) => `${word}: ${meaning}`)].join("\n");
   button.append(strong, text);
   if (alarm.page) {
     button.type = "button";

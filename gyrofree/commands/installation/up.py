@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from gyrofree.commands.options import Config, say, settings_of
-from gyrofree.config import DEFAULT_PATH
+from gyrofree.config import DEFAULT_PATH, ConfigError
 from gyrofree.running.process import EXIT_CONFIG, fail
 from gyrofree.running.watch import SERVICES
 
@@ -31,8 +31,13 @@ def up(
     """
     settings = settings_of(config)
     from gyrofree.running import up as running
+    from gyrofree.setup.site import services
 
-    chosen = _chosen(SERVICES, only or [], without or [])
+    try:
+        there = services(settings)
+    except ConfigError as error:
+        raise fail(error, EXIT_CONFIG) from None
+    chosen = _chosen(there, only or [], without or [])
     source = config or (DEFAULT_PATH if DEFAULT_PATH.exists() else None)
     if systemd:
         from gyrofree.running.systemd import unit

@@ -1,5 +1,6 @@
 """Rate tables: what a procedure asks of one, and one that takes text commands over a line."""
 
+import fcntl
 import math
 import re
 import threading
@@ -13,6 +14,7 @@ from sessions.procedure.driven.guard import Guard
 
 LONGEST = 4096  # bytes of one reply
 DRAIN_S = 0.2
+BUSY_S = 3.0  # that a line may be held by another
 PER_UNIT = {"deg/s": math.pi / 180.0, "rad/s": 1.0, "rpm": 2.0 * math.pi / 60.0}  # rad/s
 
 
@@ -229,12 +231,27 @@ class TextTable:
             self._line = serial.serial_for_url(
                 url, baudrate=self._said.baud, timeout=0.1, write_timeout=self._said.timeout_s
             )
+            _alone(self._line)
         return self._line
 
     def _close(self) -> None:
         if self._line is not None:
             self._line.close()
             self._line = None
+
+
+def _alone(line: serial.SerialBase) -> None:
+    """Have a line to oneself: who is about to leave it, as the guard after a stop, still gets its
+    answer and takes none of ours. One that hangs is not waited for long: a stop must get through.
+    """
+    until = time.monotonic() + BUSY_S
+    while isinstance(line, serial.Serial) and time.monotonic() < until:
+        try:
+            fcntl.flock(line.fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            time.sleep(0.02)
+        else:
+            return
 
 
 def _drain(line: serial.SerialBase) -> None:

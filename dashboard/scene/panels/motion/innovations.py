@@ -12,7 +12,7 @@ from dashboard.scene.drawing.page import Markup, bad, joined, note, rows, sub, t
 from dashboard.scene.drawing.palette import AXES, GREY, estimator_title, number
 from dashboard.scene.panels.base import Panel, Snapshot, estimator_curve
 from inertial.layouts.layout import PRODUCTS
-from sessions.report.stability import TOO_CAREFUL, TOO_SURE, nis_verdict
+from sessions.report.nis import TOO_CAREFUL, TOO_SURE, nis_verdict
 
 INSIDE = 0.95  # share of NIS values that an honest filter has between the two bounds
 

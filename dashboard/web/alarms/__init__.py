@@ -1,0 +1,1 @@
+"""Alarms on a page of their own, and by REST."""

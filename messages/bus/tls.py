@@ -1,0 +1,66 @@
+"""Who a process is on the bus: its certificate, its key, and whom it trusts.
+
+The files lie in one folder, `<role>.pem` and `<role>.key` beside `ca.pem`, as `gyrofree site`
+writes them. With a folder every link is TLS with certificates on both sides; there is no mixture.
+"""
+
+import datetime as dt
+from pathlib import Path
+from typing import Any
+
+from cryptography import x509
+
+from messages.bus.faults import IdentityError
+
+TRUSTED = "ca.pem"
+
+
+def values(folder: Path, role: str) -> dict[str, Any]:
+    """Zenoh's settings for a process of this role; raises IdentityError where a file is missing."""
+    certificate, key = folder / f"{role}.pem", folder / f"{role}.key"
+    for path in (folder / TRUSTED, certificate, key):
+        if not path.is_file():
+            raise IdentityError(
+                f"[bus] tls = {str(folder)!r}: {path.name} is not there, which the {role} needs;"
+                f" `gyrofree certs list` shows what this place has"
+            )
+    tls = {
+        "root_ca_certificate": folder / TRUSTED,
+        "listen_certificate": certificate,
+        "listen_private_key": key,
+        "connect_certificate": certificate,
+        "connect_private_key": key,
+    }
+    return {
+        "transport/link/protocols": ["tls"],
+        "transport/link/tls": {name: str(path) for name, path in tls.items()}
+        | {
+            "enable_mtls": True,
+            "verify_name_on_connect": True,
+            # of a certificate that ends in mid-session: its rights end with it
+            "close_link_on_expiration": True,
+        },
+    }
+
+
+def trouble(folder: Path, role: str) -> str:
+    """What is wrong with a certificate at this moment, in words; empty: nothing that is seen."""
+    try:
+        certificate = x509.load_pem_x509_certificate((folder / f"{role}.pem").read_bytes())
+        authority = x509.load_pem_x509_certificate((folder / TRUSTED).read_bytes())
+    except (OSError, ValueError) as error:
+        return f"{folder / role}.pem or {TRUSTED} cannot be read: {error}"
+    now, form = dt.datetime.now(dt.UTC), "%Y-%m-%d %H:%M UTC"
+    if now >= certificate.not_valid_after_utc:
+        return (
+            f"its certificate ended {certificate.not_valid_after_utc.strftime(form)}:"
+            " `gyrofree certs renew` makes a new one"
+        )
+    if now < certificate.not_valid_before_utc:
+        return (
+            f"its certificate begins {certificate.not_valid_before_utc.strftime(form)}: is this"
+            " machine's clock right?"
+        )
+    if certificate.issuer != authority.subject:
+        return f"its certificate is not of the authority in {TRUSTED}: join the site again"
+    return ""

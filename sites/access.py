@@ -1,0 +1,131 @@
+"""The router's rules of access: by common name, and what no rule allows is denied.
+
+Zenoh refuses silently: a denied message is dropped at the router, and who sent it hears nothing.
+`gyrofree site check` finds out, and says which rule is missing.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from sites.authority import Issued
+from sites.place import Peer, Place
+from sites.roles import (
+    Rights,
+    claim_keys,
+    join_key,
+    listening,
+    order_keys,
+    renew_key,
+    rights,
+    segment_key,
+    topic_keys,
+)
+
+SAY = ("put", "delete", "declare_queryable", "reply", "liveliness_token")
+HEAR = ("declare_subscriber", "query", "liveliness_query", "declare_liveliness_subscriber")
+ALL = (*SAY, *HEAR)
+
+
+class Rules:
+    """Collects rules, subjects and policies in the form that Zenoh reads."""
+
+    def __init__(self) -> None:
+        self._rules: list[dict[str, Any]] = []
+        self._policies: list[dict[str, Any]] = []
+        self._subjects: list[dict[str, Any]] = []
+
+    def allow(self, names: Iterable[str], said: Rights, hears: Iterable[str] = ()) -> None:
+        """What the holders of these common names may say, and what keys they may hear."""
+        names = sorted(set(names))
+        if not names:
+            return
+        hears, number = list(hears), len(self._subjects)
+        allowed = [
+            ("ingress", ("put", "delete"), said.put),
+            ("ingress", ("liveliness_token",), said.token),
+            ("ingress", ("declare_queryable", "reply"), said.answer),
+            ("ingress", ("query",), said.ask),
+            ("egress", ("query",), said.answer),
+            ("egress", ("reply", "declare_queryable"), said.ask),
+            ("ingress", HEAR[:1], [f"{key.split('/')[0]}/**" for key in hears]),
+            ("ingress", HEAR[2:], hears),
+            ("egress", SAY, hears),
+            # what the holder says is wanted elsewhere: he may know by whom
+            ("egress", ("declare_subscriber",), [f"{key.split('/')[0]}/**" for key in said.put]),
+            ("egress", ("liveliness_query", "declare_liveliness_subscriber"), said.token),
+        ]
+        ids = []
+        for index, (flow, messages, keys) in enumerate(allowed):
+            if keys:
+                ids.append(f"rule-{number}-{index}")
+                self._rules.append(
+                    {
+                        "id": ids[-1],
+                        "permission": "allow",
+                        "flows": [flow],
+                        "messages": list(messages),
+                        "key_exprs": sorted(set(keys)),
+                    }
+                )
+        if ids:
+            subject = f"subject-{number}"
+            self._subjects.append({"id": subject, "cert_common_names": names})
+            self._policies.append({"rules": ids, "subjects": [subject]})
+
+    def config(self) -> dict[str, Any]:
+        """The value of Zenoh's `access_control`."""
+        return {
+            "enabled": True,
+            "default_permission": "deny",
+            "rules": self._rules,
+            "subjects": self._subjects,
+            "policies": self._policies,
+        }
+
+
+def rules_of(
+    place: Place, certificates: Iterable[Issued], devices: Mapping[str, Iterable[str]]
+) -> dict[str, Any]:
+    """Rules of this place's router.
+
+    certificates: those that stand, of this place and its peers. devices: by the common name of a
+    gateway, the boards whose keys it may publish.
+    """
+    rules, peers = Rules(), {peer.place: peer for peer in place.peers}
+    for each in certificates:
+        if each.place == place.place and each.role != "router":
+            mine = devices.get(each.common_name, each.devices)
+            _local(rules, place, each, mine)
+        elif each.role == "join":
+            rules.allow([each.common_name], rights("join", place.site))
+        elif each.role == "router" and each.place in peers:
+            _between(rules, place, peers[each.place], each.common_name)
+    return rules.config()
+
+
+def _local(rules: Rules, place: Place, holder: Issued, devices: Iterable[str]) -> None:
+    """A process of this place."""
+    said = rights(holder.role, place.site, devices)
+    if place.seat == "viewer":
+        watching = (*listening(place.site), renew_key(place.site))
+        said = Rights(ask=tuple(key for key in said.ask if key in watching))
+    elif holder.role == "authority" and place.at_home:
+        home = (join_key(place.site), renew_key(place.site), f"{segment_key(place.site)}/**")
+        said += Rights(answer=home)
+    rules.allow([holder.common_name], said, [f"{place.site}/**"])
+
+
+def _between(rules: Rules, place: Place, peer: Peer, router: str) -> None:
+    """The router of another place: home speaks, the others listen, and order where their seat is
+    an operator's.
+    """
+    site = place.site
+    seat = peer.seat if place.at_home else place.seat
+    asks = (*listening(site), renew_key(site), *(order_keys(site) if seat == "operator" else ()))
+    notes = Rights(put=(f"{site}/*/note",)) if seat == "operator" else Rights()
+    heard = (*topic_keys(site), *claim_keys(site))
+    if place.at_home:
+        rules.allow([router], Rights(ask=asks) + notes, heard)
+        return
+    home = Rights(put=topic_keys(site), token=claim_keys(site), answer=asks)
+    rules.allow([router], home, [f"{site}/*/note"] if seat == "operator" else [])

@@ -1,0 +1,173 @@
+"""The other end of copying: ask for what differs, and prove that nothing does any more.
+
+The newest session comes first: what people look at. A file is written beside its place and put
+there when its hash is home's; session.json comes last, so a session is in the library once it is
+whole. Stopped anywhere, the copy goes on where it was: what is on the disk is hashed, not believed.
+"""
+
+import datetime as dt
+import hashlib
+import json
+import logging
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from inertial.whole_file import put_in_place
+from sites.copying.shelf import FILE, SEGMENT, SESSION, Listed, Listing, list_file
+from sites.place import SiteError, write
+
+PART = ".part"
+BOOK = "copies.json"
+LAST = "session.json"
+LARGEST = 64 << 20  # bytes of a list
+
+Ask = Callable[[str], bytes]  # a question below segment_key; raises SiteError
+
+log = logging.getLogger(__name__)
+
+
+class Copies:
+    """What a place has of home's sessions."""
+
+    def __init__(self, root: Path, folder: Path) -> None:
+        """root: of the sessions here; folder: of the place, where the proof is kept."""
+        self._root, self._book = root, folder / BOOK
+        self.known: dict[str, dict] = load_copies(folder)
+
+    def round(self, ask: Ask, stop: Callable[[], bool]) -> int:
+        """Copy what is new or has changed; how many sessions became equal. Raises SiteError when
+        home does not answer, OSError when nothing can be written here.
+        """
+        there, count = _index(ask("index")), 0
+        for session in sorted(there, reverse=True):
+            if stop():
+                break
+            if self.known.get(session, {}).get("stamp") == there[session]:
+                continue
+            proof = self._session(session, ask, stop)
+            if proof is not None:
+                now = dt.datetime.now(dt.UTC).isoformat(timespec="seconds")
+                self.known[session] = {"stamp": there[session], "equal_since": now, "files": proof}
+                write(self._book, json.dumps(self.known, indent=1).encode() + b"\n", 0o644)
+                log.info("%s: the copy is equal to home's", session)
+                count += 1
+        return count
+
+    def _session(self, session: str, ask: Ask, stop: Callable[[], bool]) -> dict | None:
+        """By file home's hash and the one here; None while it has not come to its end."""
+        listing = _listing(ask(session))
+        recording = _open(listing, session, ask)
+        folder = self._root / session
+        folder.mkdir(parents=True, exist_ok=True)
+        proof = {}
+        for name in sorted(listing.files, key=lambda name: (name == LAST, name)):
+            if recording and name == LAST:
+                return None
+            wanted, path = listing.files[name], folder / name
+            if recording:
+                wanted = _full(wanted)  # its end changes with every message
+            if not self._file(path, wanted, lambda part, s=session: ask(f"{s}/{part}"), stop):
+                return None
+            if recording:
+                continue
+            here = list_file(_part(path))
+            if here.sha256 != wanted.sha256:
+                log.warning("%s/%s changed at home meanwhile: once more", session, name)
+                return None
+            put_in_place(_part(path), path)
+            proof[name] = {"home_sha256": wanted.sha256, "here_sha256": here.sha256}
+        return proof
+
+    def _file(self, path: Path, wanted: Listed, ask: Ask, stop: Callable[[], bool]) -> bool:
+        """Bring the draft of a file to what home has; False when `stop` came first."""
+        part = _part(path)
+        if not part.exists() and path.exists():
+            part.write_bytes(path.read_bytes())
+        descriptor = os.open(part, os.O_RDWR | os.O_CREAT, 0o644)
+        with os.fdopen(descriptor, "r+b") as stream:
+            stream.truncate(min(os.fstat(descriptor).st_size, wanted.size))
+            for first, sha256 in _missing(stream, wanted):
+                if stop():
+                    return False
+                piece = ask(f"{path.name}/{first}-{sha256}")
+                if hashlib.sha256(piece).hexdigest() != sha256:
+                    log.info("%s: a segment changed while it was fetched", path.name)
+                    return False
+                stream.seek(first)
+                stream.write(piece)
+            stream.flush()
+            os.fsync(descriptor)
+        return True
+
+
+def load_copies(folder: Path) -> dict[str, dict]:
+    """What was proven equal; nothing where the book is damaged: it is proven again."""
+    try:
+        known = json.loads((folder / BOOK).read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return known if isinstance(known, dict) else {}
+
+
+def _missing(stream, wanted: Listed) -> Iterator[tuple[int, str]]:
+    """Segments that are not here as they are at home."""
+    for number, sha256 in enumerate(wanted.segments):
+        stream.seek(number * SEGMENT)
+        if hashlib.sha256(stream.read(SEGMENT)).hexdigest() != sha256:
+            yield number * SEGMENT, sha256
+
+
+def _full(listed: Listed) -> Listed:
+    """What of a growing file stays as it is."""
+    count = listed.size // SEGMENT
+    update = {"size": count * SEGMENT, "segments": listed.segments[:count]}
+    return listed.model_copy(update=update)
+
+
+def _part(path: Path) -> Path:
+    return path.with_name(path.name + PART)
+
+
+def _open(listing: Listing, session: str, ask: Ask) -> bool:
+    """Is this session still being recorded?"""
+    if LAST not in listing.files:
+        return True
+    first = listing.files[LAST]
+    pieces = [
+        ask(f"{session}/{LAST}/{number * SEGMENT}-{sha256}")
+        for number, sha256 in enumerate(first.segments)
+    ]
+    try:
+        return json.loads(b"".join(pieces)).get("state") == "open"
+    except (ValueError, AttributeError):
+        return True
+
+
+def _index(answer: bytes) -> dict[str, str]:
+    """Sessions and their stamps, of names that can be."""
+    if len(answer) > LARGEST:
+        raise SiteError("home's list of sessions is too long")
+    found = {}
+    for line in answer.decode(errors="replace").splitlines():
+        session, _, stamp = line.partition(" ")
+        if SESSION.fullmatch(session):
+            found[session] = stamp[:64]
+    return found
+
+
+def _listing(answer: bytes) -> Listing:
+    try:
+        if len(answer) > LARGEST:
+            raise ValueError
+        listing = Listing.model_validate_json(answer)
+    except (ValidationError, ValueError):
+        raise SiteError(
+            "home's list of segments cannot be read: is it of another version?"
+        ) from None
+    for name, listed in listing.files.items():
+        if not FILE.fullmatch(name) or len(listed.segments) != -(-listed.size // SEGMENT):
+            raise SiteError(f"home's list of segments has {name[:60]!r}, which cannot be")
+    return listing

@@ -1,0 +1,38 @@
+"""Key and certificate for a process on another machine, as a folder to be carried there."""
+
+import datetime as dt
+from pathlib import Path
+
+from sites.authority import Authority, Issued, pem
+from sites.enrolment import load_request, new_requests
+from sites.place import TRUSTED, SiteError, load_place, new_folder, write
+from sites.roles import ROLES
+
+
+def hand_out(
+    authority: Authority,
+    folder: Path,
+    role: str,
+    name: str,
+    devices: tuple[str, ...],
+    life: dt.timedelta,
+    out: Path,
+) -> Issued:
+    """Write `<role>.pem`, `<role>.key` and ca.pem to `out`. Raises SiteError, OSError."""
+    if role in ("join", "router", "authority") or role not in ROLES:
+        wanted = [each for each in ROLES if each not in ("join", "router", "authority")]
+        raise SiteError(f"no certificate of role {role!r} is handed out: want {', '.join(wanted)}")
+    if bool(devices) != (role == "gateway"):
+        raise SiteError("a gateway's certificate names its boards (--board), others none")
+    ((key, request),) = new_requests((role,)).values()
+    here = load_place(folder).place
+    if any(each.common_name == f"{role}.{name}" for each in authority.register()):
+        raise SiteError(f"{role}.{name} was issued already: choose another name for the machine")
+    with new_folder(out) as draft:
+        write(draft / f"{role}.key", key)
+        write(draft / TRUSTED, (folder / TRUSTED).read_bytes(), 0o644)
+        certificate = authority.issue(
+            load_request(request), role, here, name=name, devices=devices, life=life
+        )
+        write(draft / f"{role}.pem", pem(certificate), 0o644)
+    return authority.register()[-1]

@@ -1,0 +1,146 @@
+"""An invitation: a line of text that lets one other place join the site, once.
+
+It holds what a stranger needs for one question: the authority's certificate, a certificate that
+may ask to join and nothing else, and a secret of which home keeps the hash. The keys of the place
+that joins are made there and never leave it.
+"""
+
+import base64
+import datetime as dt
+import hashlib
+import json
+import secrets
+import zlib
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from messages.contract.names import Name
+from sites.authority import Authority, new_key, pem, private_pem, request_for
+from sites.place import Peer, Place, Seat, SiteError, load_place, save_place, write
+
+HEAD = "gyrofree-invitation-1-"
+LONGEST = 16_000  # characters
+BOOK = "authority/invitations.json"
+
+
+class Invitation(BaseModel):
+    """What the line says."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    site: Name
+    home: Name
+    place: Name
+    seat: Seat
+    ends: dt.datetime
+    secret: str
+    trusted: str  # PEM of the authority
+    certificate: str  # PEM, of the role "join"
+    key: str  # PEM
+
+    def line(self) -> str:
+        """As text that can be sent."""
+        packed = zlib.compress(self.model_dump_json().encode(), 9)
+        return HEAD + base64.urlsafe_b64encode(packed).decode()
+
+
+class Entry(BaseModel):
+    """What home remembers of an invitation."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    place: Name
+    seat: Seat
+    secret_sha256: str
+    ends: dt.datetime
+    common_name: str  # of the certificate in it
+    used: str = ""  # sha256 of the request that used it
+
+
+def read_invitation(line: str) -> Invitation:
+    """What a line says; raises SiteError for one that is none or has ended."""
+    text = "".join(line.split())
+    if not text.startswith(HEAD) or len(text) > LONGEST:
+        raise SiteError(
+            f"{text[:24]!r} ... is no invitation: want the whole line that `gyrofree site invite`"
+            f" printed; it begins with {HEAD}"
+        )
+    try:
+        packed = base64.urlsafe_b64decode(text[len(HEAD) :])
+        plain = zlib.decompressobj().decompress(packed, LONGEST)
+        invitation = Invitation.model_validate_json(plain)
+    except (ValueError, zlib.error, ValidationError):
+        raise SiteError(
+            "the invitation is damaged: copy the whole line, or have another one printed"
+        ) from None
+    if invitation.ends < dt.datetime.now(dt.UTC):
+        raise SiteError(
+            f"the invitation ended {invitation.ends:%Y-%m-%d %H:%M UTC}: have another one printed"
+            " at the site's home"
+        )
+    return invitation
+
+
+def invite(
+    folder: Path, place: str, seat: Seat, address: str, life: dt.timedelta
+) -> tuple[Invitation, Place]:
+    """Prepare for a place to join, at home: it becomes a peer whose router, at `address`, is
+    called from now on. Raises SiteError.
+    """
+    here, authority = load_place(folder), Authority(folder)
+    if not here.at_home:
+        raise SiteError(f"places are invited at the site's home, {here.home}")
+    if place == here.place or any(each.place == place for each in here.peers):
+        raise SiteError(f"{place} belongs to the site already: choose another name, or remove it")
+    key = new_key()
+    certificate = authority.issue(request_for(key, "join"), "join", place, life=life)
+    entry = authority.register()[-1]
+    invitation = Invitation(
+        site=here.site,
+        home=here.home,
+        place=place,
+        seat=seat,
+        ends=entry.ends,
+        secret=secrets.token_urlsafe(32),
+        trusted=pem(authority.certificate).decode(),
+        certificate=pem(certificate).decode(),
+        key=private_pem(key).decode(),
+    )
+    known = Entry(
+        place=place,
+        seat=seat,
+        secret_sha256=hashed(invitation.secret.encode()),
+        ends=entry.ends,
+        common_name=entry.common_name,
+    )
+    save_book(folder, [*load_book(folder), known])
+    peers = (*here.peers, Peer(place=place, seat=seat, address=address))
+    here = here.model_copy(update={"peers": peers})
+    save_place(folder, here)
+    return invitation, here
+
+
+def hashed(content: bytes) -> str:
+    """What is kept of a secret."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def load_book(folder: Path) -> list[Entry]:
+    """All invitations of this home; raises SiteError."""
+    path = folder / BOOK
+    try:
+        return [Entry.model_validate(each) for each in json.loads(path.read_bytes())]
+    except FileNotFoundError:
+        return []
+    except (OSError, ValueError, TypeError, ValidationError) as error:
+        raise SiteError(
+            f"{path}: cannot be read: {str(error).splitlines()[0]}; restore it from a backup, or"
+            " remove it: invitations that are not used yet then end"
+        ) from None
+
+
+def save_book(folder: Path, book: list[Entry]) -> None:
+    """Write it as a whole."""
+    text = json.dumps([each.model_dump(mode="json") for each in book], indent=1)
+    write(folder / BOOK, text.encode() + b"\n")

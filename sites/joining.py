@@ -1,0 +1,115 @@
+"""What happens at a new place of a site: made at home, or joined from elsewhere."""
+
+import json
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import zenoh
+from cryptography import x509
+
+from messages.bus.session import BusSettings, open_router
+from sites.authority import Authority, pem
+from sites.enrolment import JoinRequest, keep, new_requests
+from sites.invitation import Invitation
+from sites.place import PLACE, TRUSTED, Place, SiteError, load_place, new_folder, save_place, write
+from sites.roles import SERVICES, join_key
+from sites.service import asked
+
+JOINING = "joining"  # folder of the invitation's certificate, while it is needed
+PAUSE_S = 1.0
+
+
+def make_site(folder: Path, name: str, extra: tuple[str, ...] = ()) -> Place:
+    """A new site whose home is here, with a certificate for each of its services. Raises
+    SiteError.
+    """
+    if (folder / PLACE).exists():
+        raise SiteError(f"{folder} is a place of {load_place(folder).site} already")
+    place = Place(site=name, place=name, home=name)
+    with new_folder(folder) as draft:
+        issue_here(draft, Authority.create(draft, name), place, (*SERVICES, *extra))
+        save_place(draft, place)
+    return place
+
+
+def issue_here(folder: Path, authority: Authority, place: Place, roles: tuple[str, ...]) -> None:
+    """Keys and certificates for processes of this place."""
+    for role, (key, request) in new_requests(roles).items():
+        certificate = authority.issue(_load(request), role, place.place)
+        write(folder / f"{role}.key", key)
+        write(folder / f"{role}.pem", pem(certificate), 0o644)
+
+
+def _load(text: str) -> x509.CertificateSigningRequest:
+    return x509.load_pem_x509_csr(text.encode())
+
+
+def _requests_kept(folder: Path) -> dict[str, tuple[bytes, str]]:
+    """Those of an earlier try, which home may have answered already; else new ones."""
+    path = folder / "requests.json"
+    try:
+        kept = json.loads(path.read_bytes())
+        return {role: (key.encode(), request) for role, (key, request) in kept.items()}
+    except (OSError, ValueError, TypeError, AttributeError):
+        made = new_requests()
+        text = {role: (key.decode(), request) for role, (key, request) in made.items()}
+        write(path, json.dumps(text).encode())
+        return made
+
+
+def join(
+    folder: Path,
+    invitation: Invitation,
+    listen: str,
+    stop: threading.Event,
+    said: Callable[[str], None],
+) -> Place:
+    """Wait for home's call and ask it for this place's certificates. `said` gets what is waited
+    for, once. Raises SiteError; OSError where the folder cannot be written, zenoh.ZError where
+    nothing can listen at `listen`.
+    """
+    if (folder / PLACE).exists():
+        raise SiteError(f"{folder} is a place of {load_place(folder).site} already")
+    temporary = folder / JOINING
+    trusted = invitation.trusted.encode()
+    write(temporary / TRUSTED, trusted, 0o644)
+    write(temporary / "join.pem", invitation.certificate.encode(), 0o644)
+    write(temporary / "join.key", invitation.key.encode())
+    bus = BusSettings(prefix=invitation.site, listen=[listen], tls=temporary).acting_as("join")
+    made = _requests_kept(temporary)
+    keys = {role: key for role, (key, _) in made.items()}
+    question = JoinRequest(
+        place=invitation.place,
+        secret=invitation.secret,
+        requests={role: request for role, (_, request) in made.items()},
+    ).model_dump_json()
+    with open_router(bus) as session:
+        told = False
+        while not stop.is_set():
+            if not list(session.info.routers_zid()):
+                if not told:
+                    said(f"listening at {listen}, waiting for {invitation.home} to call")
+                    told = True
+                stop.wait(PAUSE_S)
+                continue
+            answer = _patiently(session, join_key(invitation.site), question.encode(), stop)
+            given = keep(folder, answer, keys, trusted)
+            for path in temporary.iterdir():
+                path.unlink()
+            temporary.rmdir()
+            return given.place
+    raise SiteError("not joined: ended before home had answered; the invitation is still good")
+
+
+def _patiently(session: zenoh.Session, key: str, question: bytes, stop: threading.Event) -> bytes:
+    """Home's answer; a link that has just been made may need some seconds to bring it."""
+    end = time.monotonic() + 30.0
+    while True:
+        try:
+            return asked(session, key, question)
+        except SiteError as error:
+            if "refuses" in str(error) or stop.is_set() or time.monotonic() > end:
+                raise
+        stop.wait(PAUSE_S)

@@ -1,0 +1,174 @@
+"""The service of a site: at home it lets places join and renews certificates; everywhere it has
+those of its own place renewed in time.
+
+Renewed files are seen by `gyrofree up`, which starts the service concerned anew; the gateway's
+port stays open meanwhile, so no board notices.
+"""
+
+import datetime as dt
+import logging
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import zenoh
+from cryptography import x509
+
+from messages.bus.session import BusSettings, open_client
+from sites.authority import DAYS
+from sites.copying.fetching import Copies
+from sites.copying.serving import Serving
+from sites.enrolment import Registrar, keep, renewal
+from sites.place import TRUSTED, Place, SiteError, load_place
+from sites.roles import join_key, renew_key, segment_key
+
+LOOK_S = 3600.0  # between two looks at the certificates
+AGAIN_S = 60.0  # after a renewal that did not succeed
+LEFT = dt.timedelta(days=DAYS / 3)  # of a certificate's life; less is renewed
+ASK_S = 10.0
+SEGMENT_S = 60.0  # for a segment over a slow link
+ROUND_S = 2.0  # between two looks at what home has recorded
+
+log = logging.getLogger(__name__)
+
+
+def run(folder: Path, sessions: Path, bus: BusSettings, stop: threading.Event) -> None:
+    """Until `stop`; raises SiteError where the folder has no place. sessions: the folder of the
+    recordings, which home shows and others fill.
+    """
+    place = load_place(folder)
+    with open_client(bus, stop) as session:
+        log.info("place %s of site %s%s", place.place, place.site, ", its home" * place.at_home)
+        keeping = threading.Thread(
+            target=_keep_certificates, args=(folder, place, session, stop), daemon=True
+        )
+        keeping.start()
+        if place.at_home:
+            declared = declare(session, place, Registrar(folder))
+            serving = Serving(session, place.site, sessions)
+            stop.wait()
+            serving.close()
+            for one in declared:
+                one.undeclare()
+        else:
+            copy(Copies(sessions, folder), place.site, session, stop)
+        keeping.join(ASK_S + 1.0)
+
+
+def copy(copies: Copies, site: str, session: zenoh.Session, stop: threading.Event) -> None:
+    """Bring home's recordings here, round after round, until `stop`."""
+
+    def ask(what: str) -> bytes:
+        return asked(session, f"{segment_key(site)}/{what}", b"", SEGMENT_S)
+
+    said = ""
+    while not stop.wait(ROUND_S):
+        try:
+            copies.round(ask, stop.is_set)
+            said = ""
+        except (SiteError, OSError) as error:
+            if str(error) != said:
+                log.warning("recordings are not copied: %s", error)
+            said = str(error)
+
+
+def _keep_certificates(
+    folder: Path, place: Place, session: zenoh.Session, stop: threading.Event
+) -> None:
+    ask, pause = _asker(folder, place, session), AGAIN_S / 10
+    while not stop.wait(pause):
+        pause = LOOK_S if look(folder, place, ask) else AGAIN_S
+
+
+def look(folder: Path, place: Place, ask: Callable[[bytes], bytes]) -> bool:
+    """Renew what is old; False where that did not succeed for one."""
+    good = True
+    for role, ends in own_certificates(folder).items():
+        left = ends - dt.datetime.now(dt.UTC)
+        if left > min(LEFT, _life(folder, role) / 3):
+            continue
+        try:
+            renew(folder, role, ask)
+            log.info("certificate of %s renewed", role)
+        except (SiteError, OSError, ValueError) as error:
+            good = False
+            log.warning(
+                "certificate of %s ends in %s and was not renewed: %s",
+                role,
+                str(left).split(".")[0],
+                error,
+            )
+    return good
+
+
+def renew(folder: Path, role: str, ask: Callable[[bytes], bytes]) -> None:
+    """Have the certificate of a role made anew; raises SiteError, OSError, ValueError."""
+    key, question = renewal(folder, role)
+    keep(folder, ask(question), {role: key}, (folder / TRUSTED).read_bytes())
+
+
+def own_certificates(folder: Path) -> dict[str, dt.datetime]:
+    """By role the end of each certificate that this place has."""
+    found = {}
+    for path in sorted(folder.glob("*.pem")):
+        if path.name != TRUSTED:
+            found[path.stem] = _read(path).not_valid_after_utc
+    return found
+
+
+def _life(folder: Path, role: str) -> dt.timedelta:
+    certificate = _read(folder / f"{role}.pem")
+    return certificate.not_valid_after_utc - certificate.not_valid_before_utc
+
+
+def _read(path: Path) -> x509.Certificate:
+    try:
+        return x509.load_pem_x509_certificate(path.read_bytes())
+    except (OSError, ValueError) as error:
+        raise SiteError(f"{path}: cannot be read: {error}") from None
+
+
+def _asker(folder: Path, place: Place, session: zenoh.Session) -> Callable[[bytes], bytes]:
+    """Who renews: home itself, others ask over the bus."""
+    if place.at_home:
+        return Registrar(folder).renew
+
+    def ask(question: bytes) -> bytes:
+        return asked(session, renew_key(place.site), question)
+
+    return ask
+
+
+def asked(session: zenoh.Session, key: str, question: bytes, patience_s: float = ASK_S) -> bytes:
+    """Home's answer; raises SiteError with its reason, or where it does not answer."""
+    # behind everything that is live: who fetches the past must not hold up the present
+    for reply in session.get(
+        key, payload=question, timeout=patience_s, priority=zenoh.Priority.BACKGROUND
+    ):
+        if reply.ok is not None:
+            return reply.ok.payload.to_bytes()
+        said = reply.err.payload.to_bytes().decode(errors="replace")[:500]
+        if said != "Timeout":
+            raise SiteError(f"home refuses: {said}")
+    raise SiteError("the site's home does not answer")
+
+
+def declare(session: zenoh.Session, place: Place, registrar: Registrar) -> list[zenoh.Queryable]:
+    def taking(answer: Callable[[bytes], bytes], what: str) -> Callable[[zenoh.Query], None]:
+        def on_query(query: zenoh.Query) -> None:
+            question = query.payload.to_bytes() if query.payload is not None else b""
+            try:
+                query.reply(str(query.key_expr), answer(question))
+            except SiteError as error:
+                log.warning("%s refused: %s", what, error)
+                query.reply_err(str(error).encode())
+            except Exception:  # whatever a stranger sends, the service goes on
+                log.exception("%s refused", what)
+                query.reply_err(b"the question cannot be answered; home's log says why")
+
+        return on_query
+
+    return [
+        session.declare_queryable(join_key(place.site), taking(registrar.join, "joining")),
+        session.declare_queryable(renew_key(place.site), taking(registrar.renew, "renewal")),
+    ]
