@@ -39,6 +39,7 @@ LEVELS = {"critical": 3, "warning": 2, "watch": 1}
 SHOWN = (pb.Alarm.STATE_UNACKNOWLEDGED, pb.Alarm.STATE_ACKNOWLEDGED)
 ALONE = ("clock", "disk", "inconsistent", "recorder")  # that the alarms' service finds, and we not
 MOST = 12  # of one device
+STARTING_S = 8.0  # after a device was first heard of, before which an absent board is no fault
 TURNS_RADPS = 0.035  # 2 deg/s: beyond it a rate is no standstill
 PROCEDURES_SILENT_S = 3.0  # s without a word of who drives a table
 RECORDER_STALE_S = 5.0  # s without a word of the recorder while it records
@@ -191,6 +192,8 @@ def _link(device: Device, now: float) -> Iterator[Alarm]:
     if device.stale("link", now=now):
         text = f"its gateway has been silent for {heard.age(now):.0f} s: does it still run?"
         yield Alarm("link", "gateway silent", text, "link")
+    elif not m.connected and not m.bytes_in and now - device.born < STARTING_S:
+        return  # services and board start together, each in its own time
     elif not m.connected:
         yield Alarm("link", "link lost", plain(m.message) or "the board is not connected", "link")
     elif m.message:

@@ -72,6 +72,7 @@ class Device:
     run: int = 0
     may_grow: Callable[[int], bool] = lambda _: True  # see Ring
     doubted: dict[tuple[str, str], int] = field(default_factory=dict)  # times of messages, utc_ns
+    born: float = field(default_factory=time.monotonic)  # s; when it was first heard of
     generation: int = 0  # counts the times everything was forgotten because time jumped back
 
     @property

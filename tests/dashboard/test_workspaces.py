@@ -225,7 +225,8 @@ def test_what_is_wrong_is_an_alarm_with_a_reason_and_a_page_that_exists(store):
     before = kinds(store)
     put = store.put
     put(tp.AXES, "cube-01", "", health(state=pb.AxisHealth.STATE_STUCK, excluded=True))
-    put(tp.LINK, "cube-01", "", pb.LinkStatus(header=pb.Header(utc_ns=UTC), connected=False))
+    gone = pb.LinkStatus(header=pb.Header(utc_ns=UTC), connected=False, bytes_in=1)
+    put(tp.LINK, "cube-01", "", gone)
     fault = pb.Fault(name="reboot", text="the board restarted", active=False)
     put(tp.BOARD, "cube-01", "", pb.BoardInfo(header=pb.Header(utc_ns=UTC), faults=[fault]))
     late = pb.EstimatorStatus(header=pb.Header(utc_ns=UTC), state="turning", behind_s=9.0)
@@ -243,6 +244,16 @@ def test_what_is_wrong_is_an_alarm_with_a_reason_and_a_page_that_exists(store):
     full = pb.RecorderStatus(recording=False, message="No space left on device: free some")
     put(tp.STATUS, "recorder", "", full)
     assert [alarm.title for alarm in bench_alarms(store)] == ["disk full"]
+
+
+def test_a_board_that_is_not_there_is_a_fault_once_it_had_time_to_come(store):
+    never = pb.LinkStatus(header=pb.Header(utc_ns=UTC), connected=False)
+    store.put(tp.LINK, "cube-01", "", never)
+    device = store.device("cube-01")
+    device.born = time.monotonic()
+    assert "link" not in kinds(store)
+    device.born -= 60.0
+    assert "link" in kinds(store)
 
 
 def test_an_axis_that_is_only_looked_into_is_no_alarm(store):
