@@ -127,6 +127,7 @@ class Door:
             additional_headers={"cookie": cookies},
             proxy=None,
             ssl=self.trust if self.settings.tls_key else None,
+            open_timeout=60.0,  # a busy machine is given time
             **options,
         )
 
