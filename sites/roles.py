@@ -12,20 +12,6 @@ from messages.bus import orders
 from messages.contract import topics as tp
 from messages.contract.topics import GATEWAY, RECORDER, TOPICS, check_name
 
-ROLES = (
-    "router",
-    "gateway",
-    "estimator",
-    "recorder",
-    "procedures",
-    "alarms",
-    "dashboard",
-    "operator",
-    "simulator",
-    "viewer",
-    "authority",
-    "join",
-)
 SERVICES = (
     "router",
     "gateway",
@@ -37,6 +23,7 @@ SERVICES = (
     "operator",
     "authority",
 )
+ROLES = (*SERVICES, "simulator", "viewer", "join")
 KINDS = (
     orders.RECORDER,
     orders.ESTIMATOR,
@@ -104,9 +91,9 @@ def segment_key(site: str) -> str:
 def listening(site: str) -> tuple[str, ...]:
     """What whoever listens may ask: for what he missed, which numbers were heard, recordings."""
     return (
-        tp.history_key(site, "any").replace("/any/", "/*/"),
+        tp.history_key(site, "*"),
         tp.published_key(site, "*", "*"),
-        f"{site}/*/fence",
+        tp.fence_key(site, "*"),
         f"{segment_key(site)}/**",
     )
 
@@ -136,7 +123,7 @@ def _listener(site: str) -> Rights:
 
 def _consumer(site: str) -> Rights:
     """A service: it listens, tells which numbers it heard, and may note and warn."""
-    return _listener(site) + Rights(put=_of(site, "*", "any"), answer=(f"{site}/*/fence",))
+    return _listener(site) + Rights(put=_of(site, "*", "any"), answer=(tp.fence_key(site, "*"),))
 
 
 def _gateway(site: str, device: str) -> Rights:

@@ -25,8 +25,8 @@ from messages.contract.topics import (
     GATEWAY,
     RECORDER,
     TopicError,
-    check_name,
     claim_key,
+    fence_key,
     parse,
 )
 
@@ -157,13 +157,13 @@ class Fence:
             number = self.highest(device, source)
             if number:
                 name = RECORDER if device == "*" else device  # a reply's key names one
-                query.reply(f"{prefix}/{name}/fence", number.to_bytes(BYTES, "little"))
+                query.reply(fence_key(prefix, name), number.to_bytes(BYTES, "little"))
 
         watches = [
             session_watch(session, f"{claim_key(prefix, source, '*')}/*", self.claims.heard)
             for source in CLAIMED
         ]
-        return Declared([*watches, session.declare_queryable(f"{prefix}/*/fence", on_query)])
+        return Declared([*watches, session.declare_queryable(fence_key(prefix, "*"), on_query)])
 
 
 class Declared:
@@ -184,7 +184,7 @@ def heard_of(session: zenoh.Session, prefix: str, device: str, source: str) -> i
     """
     found = 0
     for reply in session.get(
-        f"{check_name(prefix)}/{device}/fence",
+        fence_key(prefix, device),
         payload=source,
         timeout=QUERY_S,
         target=zenoh.QueryTarget.ALL,

@@ -184,8 +184,15 @@ def recorder_control_key(prefix: str) -> str:
 
 
 def history_key(prefix: str, device: str) -> str:
-    """Key of a gateway's queryable for journal records: selector parameters `first` and `last`."""
-    return f"{check_name(prefix)}/{check_name(device)}/history"
+    """Key of a gateway's queryable for journal records: selector parameters `first` and `last`;
+    device `*` stands for any.
+    """
+    return control_key(prefix, device, "history")
+
+
+def fence_key(prefix: str, device: str) -> str:
+    """Key at which consumers tell the greatest number heard of a device; `*` stands for any."""
+    return control_key(prefix, device, "fence")
 
 
 def claim_key(prefix: str, source: str, device: str = "every") -> str:
