@@ -8,7 +8,6 @@ and its common name is never given again.
 
 import datetime as dt
 import ipaddress
-import json
 from pathlib import Path
 
 from cryptography import x509
@@ -16,10 +15,11 @@ from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
+from messages.bus.tls import TRUSTED
 from messages.contract.names import NAME, Name
-from sites.place import TRUSTED, SiteError, write
+from sites.place import SiteError, load_list, save_list, write
 from sites.roles import ROLES
 
 KEY, REGISTER = "authority/ca.key", "authority/register.json"
@@ -73,7 +73,7 @@ class Authority:
         """A new one; raises SiteError where there is one already."""
         if (folder / KEY).exists():
             raise SiteError(f"{folder} has an authority already: it is not replaced")
-        key, now = ec.generate_private_key(ec.SECP256R1()), dt.datetime.now(dt.UTC)
+        key, now = new_key(), dt.datetime.now(dt.UTC)
         name = _name(f"authority of {site}")
         identifier = x509.SubjectKeyIdentifier.from_public_key(key.public_key())
         certificate = (
@@ -140,9 +140,12 @@ class Authority:
         if not meant:
             known = ", ".join(dict.fromkeys(each.common_name for each in register)) or "none"
             raise SiteError(f"no certificate {common_name!r} was issued here; there are {known}")
+        ended = {"revoked": now}
         self._save(
             [
-                each.model_copy(update={"revoked": each.revoked or now}) if each in meant else each
+                each.model_copy(update=ended)
+                if each.common_name == common_name and each.revoked is None
+                else each
                 for each in register
             ]
         )
@@ -150,20 +153,11 @@ class Authority:
 
     def register(self) -> list[Issued]:
         """All that was ever issued, the oldest first; raises SiteError."""
-        path = self._folder / REGISTER
-        try:
-            return [Issued.model_validate(each) for each in json.loads(path.read_bytes())]
-        except FileNotFoundError:
-            return []
-        except (OSError, ValueError, TypeError, ValidationError) as error:
-            raise SiteError(
-                f"{path}: cannot be read: {str(error).splitlines()[0]}; restore it from a backup:"
-                " without it nothing can be issued or revoked"
-            ) from None
+        remedy = "restore it from a backup: without it nothing can be issued or revoked"
+        return load_list(self._folder / REGISTER, Issued, remedy)
 
     def _save(self, register: list[Issued]) -> None:
-        text = json.dumps([each.model_dump(mode="json") for each in register], indent=1)
-        write(self._folder / REGISTER, text.encode() + b"\n")
+        save_list(self._folder / REGISTER, register)
 
 
 def new_key() -> ec.EllipticCurvePrivateKey:

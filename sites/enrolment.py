@@ -20,9 +20,20 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from messages.bus.tls import TRUSTED
 from sites.authority import Authority, Issued, new_key, pem, private_pem, request_for
 from sites.invitation import hashed, load_book, save_book
-from sites.place import TRUSTED, Peer, Place, SiteError, load_place, save_place, write
+from sites.place import (
+    Peer,
+    Place,
+    SiteError,
+    load_list,
+    load_place,
+    save_list,
+    save_place,
+    write,
+    write_identity,
+)
 
 AWAY = ("router", "dashboard", "operator", "authority")  # certificates of a place that watches
 KNOWN = "known.json"  # what home said of the certificates that count in a place
@@ -177,28 +188,20 @@ def keep(folder: Path, answer: bytes, keys: dict[str, bytes], trusted: bytes) ->
             raise SiteError(f"home gave a certificate of another key for {role}")
     write(folder / TRUSTED, trusted, 0o644)
     for role, text in given.certificates.items():
-        write(folder / f"{role}.key", keys[role])
-        write(folder / f"{role}.pem", text.encode(), 0o644)
-    save_known(folder, given.known)
+        write_identity(folder, role, keys[role], text.encode())
+    save_list(folder / KNOWN, given.known)
     if given.place is not None:
         save_place(folder, given.place)
     return given
-
-
-def save_known(folder: Path, known: list[Issued]) -> None:
-    """Keep what home said of the certificates that count here."""
-    text = json.dumps([each.model_dump(mode="json") for each in known], indent=1)
-    write(folder / KNOWN, text.encode() + b"\n")
 
 
 def known_here(folder: Path, place: Place) -> list[Issued]:
     """The certificates that give rights in a place, as far as it knows; raises SiteError."""
     if place.at_home:
         return Authority(folder).register()
-    try:
-        return [Issued.model_validate(e) for e in json.loads((folder / KNOWN).read_bytes())]
-    except (OSError, ValueError, TypeError, ValidationError) as error:
-        raise SiteError(f"{folder / KNOWN}: cannot be read: {error}; join the site again") from None
+    if not (folder / KNOWN).is_file():
+        raise SiteError(f"{folder / KNOWN} is not there: join the site again")
+    return load_list(folder / KNOWN, Issued, "join the site again")
 
 
 def _standing(authority: Authority, place: str, home: str) -> list[Issued]:

@@ -3,9 +3,10 @@
 import datetime as dt
 from pathlib import Path
 
+from messages.bus.tls import TRUSTED
 from sites.authority import Authority, Issued, pem
 from sites.enrolment import load_request, new_requests
-from sites.place import TRUSTED, SiteError, load_place, new_folder, write
+from sites.place import SiteError, load_place, new_folder, write, write_identity
 from sites.roles import ROLES
 
 
@@ -29,10 +30,9 @@ def hand_out(
     if any(each.common_name == f"{role}.{name}" for each in authority.register()):
         raise SiteError(f"{role}.{name} was issued already: choose another name for the machine")
     with new_folder(out) as draft:
-        write(draft / f"{role}.key", key)
         write(draft / TRUSTED, (folder / TRUSTED).read_bytes(), 0o644)
         certificate = authority.issue(
             load_request(request), role, here, name=name, devices=devices, life=life
         )
-        write(draft / f"{role}.pem", pem(certificate), 0o644)
+        write_identity(draft, role, key, pem(certificate))
     return authority.register()[-1]

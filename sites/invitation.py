@@ -8,7 +8,6 @@ that joins are made there and never leave it.
 import base64
 import datetime as dt
 import hashlib
-import json
 import secrets
 import zlib
 from pathlib import Path
@@ -17,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from messages.contract.names import Name
 from sites.authority import Authority, new_key, pem, private_pem, request_for
-from sites.place import Peer, Place, Seat, SiteError, load_place, save_place, write
+from sites.place import Peer, Place, Seat, SiteError, load_list, load_place, save_list, save_place
 
 HEAD = "gyrofree-invitation-1-"
 LONGEST = 16_000  # characters
@@ -128,19 +127,10 @@ def hashed(content: bytes) -> str:
 
 def load_book(folder: Path) -> list[Entry]:
     """All invitations of this home; raises SiteError."""
-    path = folder / BOOK
-    try:
-        return [Entry.model_validate(each) for each in json.loads(path.read_bytes())]
-    except FileNotFoundError:
-        return []
-    except (OSError, ValueError, TypeError, ValidationError) as error:
-        raise SiteError(
-            f"{path}: cannot be read: {str(error).splitlines()[0]}; restore it from a backup, or"
-            " remove it: invitations that are not used yet then end"
-        ) from None
+    remedy = "restore it from a backup, or remove it: invitations that are not used yet then end"
+    return load_list(folder / BOOK, Entry, remedy)
 
 
 def save_book(folder: Path, book: list[Entry]) -> None:
     """Write it as a whole."""
-    text = json.dumps([each.model_dump(mode="json") for each in book], indent=1)
-    write(folder / BOOK, text.encode() + b"\n")
+    save_list(folder / BOOK, book)

@@ -7,15 +7,24 @@ from collections.abc import Callable
 from pathlib import Path
 
 import zenoh
-from cryptography import x509
 
 from messages.bus.session import BusSettings, open_router
+from messages.bus.tls import TRUSTED
 from sites.authority import Authority, pem
-from sites.enrolment import JoinRequest, keep, new_requests
+from sites.enrolment import JoinRequest, keep, load_request, new_requests
 from sites.invitation import Invitation
-from sites.place import PLACE, TRUSTED, Place, SiteError, load_place, new_folder, save_place, write
+from sites.place import (
+    PLACE,
+    Place,
+    SiteError,
+    load_place,
+    new_folder,
+    save_place,
+    write,
+    write_identity,
+)
 from sites.roles import SERVICES, join_key
-from sites.service import asked
+from sites.service import HomeRefused, asked
 
 JOINING = "joining"  # folder of the invitation's certificate, while it is needed
 PAUSE_S = 1.0
@@ -37,13 +46,8 @@ def make_site(folder: Path, name: str, extra: tuple[str, ...] = ()) -> Place:
 def issue_here(folder: Path, authority: Authority, place: Place, roles: tuple[str, ...]) -> None:
     """Keys and certificates for processes of this place."""
     for role, (key, request) in new_requests(roles).items():
-        certificate = authority.issue(_load(request), role, place.place)
-        write(folder / f"{role}.key", key)
-        write(folder / f"{role}.pem", pem(certificate), 0o644)
-
-
-def _load(text: str) -> x509.CertificateSigningRequest:
-    return x509.load_pem_x509_csr(text.encode())
+        certificate = authority.issue(load_request(request), role, place.place)
+        write_identity(folder, role, key, pem(certificate))
 
 
 def _requests_kept(folder: Path) -> dict[str, tuple[bytes, str]]:
@@ -75,8 +79,7 @@ def join(
     temporary = folder / JOINING
     trusted = invitation.trusted.encode()
     write(temporary / TRUSTED, trusted, 0o644)
-    write(temporary / "join.pem", invitation.certificate.encode(), 0o644)
-    write(temporary / "join.key", invitation.key.encode())
+    write_identity(temporary, "join", invitation.key.encode(), invitation.certificate.encode())
     bus = BusSettings(prefix=invitation.site, listen=[listen], tls=temporary).acting_as("join")
     made = _requests_kept(temporary)
     keys = {role: key for role, (key, _) in made.items()}
@@ -109,7 +112,9 @@ def _patiently(session: zenoh.Session, key: str, question: bytes, stop: threadin
     while True:
         try:
             return asked(session, key, question)
-        except SiteError as error:
-            if "refuses" in str(error) or stop.is_set() or time.monotonic() > end:
+        except HomeRefused:
+            raise
+        except SiteError:
+            if stop.is_set() or time.monotonic() > end:
                 raise
         stop.wait(PAUSE_S)

@@ -8,9 +8,9 @@ import contextlib
 import json
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -20,7 +20,7 @@ from messages.contract.names import Name
 Seat = Literal["viewer", "operator"]  # what the people of another place may do here
 
 PLACE = "place.json"
-TRUSTED = "ca.pem"
+M = TypeVar("M", bound=BaseModel)
 
 
 class SiteError(ValueError):
@@ -79,6 +79,30 @@ def save_place(folder: Path, place: Place) -> None:
     """Write it as a whole."""
     text = json.dumps(place.model_dump(mode="json"), indent=1) + "\n"
     write(folder / PLACE, text.encode(), 0o644)
+
+
+def load_list(path: Path, model: type[M], remedy: str) -> list[M]:
+    """The entries of a book; none where it was not begun. Raises SiteError, which ends with the
+    remedy.
+    """
+    try:
+        return [model.model_validate(each) for each in json.loads(path.read_bytes())]
+    except FileNotFoundError:
+        return []
+    except (OSError, ValueError, TypeError, ValidationError) as error:
+        raise SiteError(f"{path}: cannot be read: {str(error).splitlines()[0]}; {remedy}") from None
+
+
+def save_list(path: Path, entries: Iterable[BaseModel]) -> None:
+    """Write a book as a whole."""
+    text = json.dumps([each.model_dump(mode="json") for each in entries], indent=1)
+    write(path, text.encode() + b"\n")
+
+
+def write_identity(folder: Path, role: str, key: bytes, certificate: bytes) -> None:
+    """Write key and certificate of a role, both PEM."""
+    write(folder / f"{role}.key", key)
+    write(folder / f"{role}.pem", certificate, 0o644)
 
 
 @contextlib.contextmanager

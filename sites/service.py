@@ -15,11 +15,12 @@ import zenoh
 from cryptography import x509
 
 from messages.bus.session import BusSettings, open_client
+from messages.bus.tls import TRUSTED
 from sites.authority import DAYS
 from sites.copying.fetching import Copies
 from sites.copying.serving import Serving
 from sites.enrolment import Registrar, keep, renewal
-from sites.place import TRUSTED, Place, SiteError, load_place
+from sites.place import Place, SiteError, load_place
 from sites.roles import join_key, renew_key, segment_key
 
 LOOK_S = 3600.0  # between two looks at the certificates
@@ -30,6 +31,10 @@ SEGMENT_S = 60.0  # for a segment over a slow link
 ROUND_S = 2.0  # between two looks at what home has recorded
 
 log = logging.getLogger(__name__)
+
+
+class HomeRefused(SiteError):
+    """Home was reached and says why not: to ask again would not help."""
 
 
 def run(folder: Path, sessions: Path, bus: BusSettings, stop: threading.Event) -> None:
@@ -149,7 +154,7 @@ def asked(session: zenoh.Session, key: str, question: bytes, patience_s: float =
             return reply.ok.payload.to_bytes()
         said = reply.err.payload.to_bytes().decode(errors="replace")[:500]
         if said != "Timeout":
-            raise SiteError(f"home refuses: {said}")
+            raise HomeRefused(f"home refuses: {said}")
     raise SiteError("the site's home does not answer")
 
 

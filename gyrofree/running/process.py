@@ -142,9 +142,7 @@ def run_service(body: Callable[[threading.Event], None], verbose: bool = False) 
     settled.start()
     try:
         body(stop)
-    except ConfigError as error:
-        raise fail(error, EXIT_CONFIG) from None
-    except IdentityError as error:
+    except (ConfigError, IdentityError) as error:
         raise fail(error, EXIT_CONFIG) from None
     except BusUnavailable as error:
         if not stop.is_set():

@@ -14,6 +14,7 @@ from support.stack import free_port
 from messages.bus import orders
 from messages.bus.faults import BusUnavailable, IdentityError
 from messages.bus.session import BusSettings, open_client, open_router
+from messages.bus.tls import TRUSTED
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 from sites.access import rules_of
@@ -23,7 +24,7 @@ from sites.enrolment import Registrar, known_here, load_request, new_requests
 from sites.handing_out import hand_out
 from sites.invitation import invite
 from sites.joining import join, make_site
-from sites.place import TRUSTED, SiteError, load_place, write
+from sites.place import SiteError, load_place, write
 from sites.removal import remove
 from sites.service import declare, own_certificates
 

@@ -14,11 +14,12 @@ from cryptography.x509.oid import NameOID
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from messages.bus.tls import TRUSTED
 from sites.authority import KEY, REGISTER, Authority, pem
 from sites.enrolment import AWAY, JoinRequest, Registrar, keep, new_requests, renewal
 from sites.invitation import HEAD, Invitation, invite, read_invitation
 from sites.joining import make_site
-from sites.place import TRUSTED, SiteError, load_place
+from sites.place import SiteError, load_place
 from sites.removal import remove
 from sites.service import look
 
