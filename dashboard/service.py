@@ -24,6 +24,7 @@ from dashboard.web.jobs import Jobs
 from dashboard.web.map.archive import ArchiveError, open_archive
 from dashboard.web.tls.certificate import open_certificate
 from dashboard.web.users import UserStore, load_users
+from messages.bus.beating import Beating
 from messages.bus.session import BusSettings, open_client
 from sessions.library.catalogue import Catalogue
 
@@ -181,7 +182,8 @@ def run(
             )
             log.info("dashboard at %s", settings.url)
             try:
-                serve(front, bound, stop)
+                with Beating(session, bus, viewers=front.lookers.by_role):
+                    serve(front, bound, stop)
             finally:
                 if replay is not None:
                     replay.stop()
