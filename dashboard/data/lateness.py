@@ -29,6 +29,7 @@ class Lateness:
     clock_ahead_s: float  # our clock minus home's; NaN: not known
     clock_bound_s: float
     why: str  # the age is not known; empty: it is
+    afar: bool = False  # the board is at another place, or nobody knows where
 
     @property
     def known(self) -> bool:
@@ -38,6 +39,11 @@ class Lateness:
     def late(self) -> bool:
         """Is it surely late?"""
         return self.known and self.age_s - self.bound_s > SAID_S
+
+    @property
+    def shown(self) -> bool:
+        """Is it worth a place in the head of a page?"""
+        return self.late or (self.afar and not self.known)
 
     @property
     def said(self) -> str:
@@ -88,18 +94,18 @@ def lateness(store: Store, device: Device, wall_s: float | None = None) -> Laten
     """
     if device.name.endswith(REPLAY_SUFFIX) or not device.rings:
         return None
-    presence, nan = store.presence, float("nan")
-    ahead, bound = ahead_of(presence.mine)
-    if not math.isfinite(ahead):
-        return Lateness(nan, nan, nan, nan, "no offset of this clock to the site's is measured yet")
-    gateway = presence.gateway_of(device.name)
-    if gateway is None:
-        why = "its gateway says nothing of its clock"
-        return Lateness(nan, nan, ahead, bound, why)
+    presence, mine, gateway = (
+        store.presence,
+        store.presence.mine,
+        store.presence.gateway_of(device.name),
+    )
+    ahead, bound = ahead_of(mine)
     theirs, their_bound = ahead_of(gateway)
-    if not math.isfinite(theirs):
-        why = "no offset of its gateway's clock to the site's is measured yet"
-        return Lateness(nan, nan, ahead, bound, why)
+    there = gateway.place if gateway is not None else ""
+    afar = presence.here not in ("", there) and len(presence.places()) > 1
+    why = _why(gateway, ahead, theirs)
+    if why:
+        return Lateness(math.nan, math.nan, ahead, bound, why, afar)
     link = device.get("link")
     was_set = 0.0 if link is None else link.message.clock_offset_s
     theirs -= was_set  # time stamps go on without it
@@ -108,7 +114,18 @@ def lateness(store: Store, device: Device, wall_s: float | None = None) -> Laten
     data = max(device.latest.values(), key=lambda one: one.arrived)
     sigma = data.message.header.utc_sigma_s - (abs(was_set) if abs(was_set) >= STEP_S else 0.0)
     total = bound + their_bound + SIGMAS * max(sigma, 0.0)
-    return Lateness(age, total, ahead, bound, "")
+    return Lateness(age, total, ahead, bound, "", afar)
+
+
+def _why(gateway: Process | None, ahead: float, theirs: float) -> str:
+    """Why there is no age; empty where there is one."""
+    if not math.isfinite(ahead):
+        return "no offset of this clock to the site's is measured yet"
+    if gateway is None:
+        return "its gateway says nothing of its clock"
+    if not math.isfinite(theirs):
+        return "no offset of its gateway's clock to the site's is measured yet"
+    return ""
 
 
 def ahead_of(process: Process | None) -> tuple[float, float]:

@@ -41,6 +41,11 @@ def _wrong(one: Process, silent_s: float) -> str:
             f"its connection stands and it has said nothing for {since}: it was stopped (a signal,"
             " a debugger), or its machine has no time for it or sleeps"
         )
+    if one.froze:
+        return (
+            f"it was frozen, has said nothing for {since} and was cut off: its machine has no time"
+            " for it, sleeps, or is out of reach"
+        )
     return (
         f"it went without a word {since} ago: killed, or its machine is cut off; does `gyrofree up`"
         " run there?"

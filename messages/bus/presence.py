@@ -46,6 +46,7 @@ class Process:
     heard_s: float = 0.0  # when the last one was, by the watch
     state: State = State.RUNNING
     since_s: float = 0.0  # that it is in this state, by the watch
+    froze: bool = False  # before it went
 
     @property
     def role(self) -> str:
@@ -104,9 +105,10 @@ class Claimants:
 class Presence:
     """All processes; beats and looks come from one thread, tokens from Zenoh's."""
 
-    def __init__(self, own: str = "") -> None:
-        """own: id of our own session."""
-        self.own = own
+    def __init__(self, at: str = "") -> None:
+        """at: our own place; empty: what our own beats say, if we have any."""
+        self._at = at
+        self.own = ""  # id of our own session
         self.processes: dict[tuple[str, str], Process] = {}
         self.claimants = Claimants()
         self.refused = 0  # processes beyond what is remembered
@@ -163,6 +165,7 @@ class Presence:
                 state = self._judge(one)
                 if state is not one.state:
                     changes.append(Change(one, one.state))
+                    one.froze = state is State.GONE and one.state is State.FROZEN
                     one.state, one.since_s = state, self.now_s
                 if self._done_with(one):
                     del self.processes[key]
@@ -218,14 +221,19 @@ class Presence:
         """Our own."""
         return self.by_session(self.own)
 
+    @property
+    def here(self) -> str:
+        """Our own place; empty where that is not known."""
+        mine = self.mine
+        return self._at or (mine.place if mine is not None else "")
+
     def out_of_reach(self, place: str) -> bool:
         """Is every process of another place silent? Then it is the way there that is cut, or the
         whole place.
         """
-        mine = self.mine
         there = [one for one in self.all() if one.place == place and one.state is not State.ENDED]
         silent = all(one.state in (State.FROZEN, State.GONE) for one in there)
-        return bool(there) and silent and mine is not None and mine.place != place
+        return bool(there) and silent and self.here not in ("", place)
 
     def gateway_of(self, device: str) -> Process | None:
         """Whose gateway publishes a board: the one that claimed it, else the one that names it."""
