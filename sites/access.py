@@ -7,7 +7,7 @@ Zenoh refuses silently: a denied message is dropped at the router, and who sent 
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from messages.contract.topics import NOTE
+from messages.contract.topics import NOTE, ORDER
 from sites.authority import Issued
 from sites.place import Peer, Place
 from sites.roles import (
@@ -122,10 +122,11 @@ def _between(rules: Rules, place: Place, peer: Peer, router: str) -> None:
     site = place.site
     seat = peer.seat if place.at_home else place.seat
     asks = (*listening(site), renew_key(site), *(order_keys(site) if seat == "operator" else ()))
-    notes = Rights(put=(NOTE.pattern(site),)) if seat == "operator" else Rights()
+    said = (NOTE.pattern(site), ORDER.pattern(site)) if seat == "operator" else ()
+    notes = Rights(put=said)
     heard = (*topic_keys(site), *claim_keys(site))
     if place.at_home:
         rules.allow([router], Rights(ask=asks) + notes, heard)
         return
     home = Rights(put=topic_keys(site), token=claim_keys(site), answer=asks)
-    rules.allow([router], home, [NOTE.pattern(site)] if seat == "operator" else [])
+    rules.allow([router], home, said)
