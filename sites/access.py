@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from messages.contract.names import NAME
-from messages.contract.topics import NOTE, clock_key
+from messages.contract.topics import NOTE, ORDER, clock_key
 from sites.authority import Issued
 from sites.place import Peer, Place
 from sites.roles import (
@@ -135,7 +135,8 @@ def _between(rules: Rules, place: Place, peer: Peer, router: str) -> None:
     site = place.site
     seat = peer.seat if place.at_home else place.seat
     asks = (*listening(site), renew_key(site), *(order_keys(site) if seat == "operator" else ()))
-    notes = Rights(put=(NOTE.pattern(site),)) if seat == "operator" else Rights()
+    said = (NOTE.pattern(site), ORDER.pattern(site)) if seat == "operator" else ()
+    notes = Rights(put=said)
     heard = (*topic_keys(site), *claim_keys(site), alive_keys(site))
     if place.at_home:
         there = presence_of(site, peer.place)
@@ -143,5 +144,5 @@ def _between(rules: Rules, place: Place, peer: Peer, router: str) -> None:
         return
     home = Rights(put=topic_keys(site), token=(*claim_keys(site), alive_keys(site)), answer=asks)
     here = presence_of(site, place.place)
-    said = [*here.put, *here.token, *notes.put]
+    said = (*said, *here.put, *here.token)
     rules.allow([router], home, said)

@@ -31,7 +31,9 @@ KINDS = (
     orders.PROCEDURES,
     orders.ALARMS,
     orders.REPLAY,
+    orders.SEAT,
 )
+SAID = (tp.NOTE, tp.MUTE, tp.ORDER)  # by people who order
 REPLAYED = f"$*{tp.REPLAY_SUFFIX}"  # of a device's name: any device that is a replay
 
 
@@ -60,7 +62,10 @@ def rights(role: str, site: str, devices: Iterable[str] = ()) -> Rights:
         "estimator": lambda: _consumer(site) + _publisher(site, tp.ESTIMATES, orders.ESTIMATOR),
         "recorder": lambda: _consumer(site) + _publisher(site, RECORDER, orders.RECORDER),
         "procedures": lambda: (
-            _consumer(site) + _publisher(site, tp.PROCEDURES, orders.PROCEDURES) + _orders(site)
+            _consumer(site)
+            + _publisher(site, tp.PROCEDURES, orders.PROCEDURES)
+            + Rights(answer=(orders.SEAT.key(site, ""),))
+            + _orders(site)
         ),
         "alarms": lambda: _consumer(site) + _publisher(site, tp.ALARMS, orders.ALARMS),
         "dashboard": lambda: _consumer(site) + _orders(site) + Rights(put=_of(site, "*", "any")),
@@ -165,7 +170,7 @@ def _publisher(site: str, source: str, kind: orders.Kind) -> Rights:
 
 
 def _orders(site: str) -> Rights:
-    return Rights(ask=order_keys(site), put=(tp.NOTE.pattern(site), tp.MUTE.pattern(site)))
+    return Rights(ask=order_keys(site), put=tuple(t.pattern(site) for t in SAID))
 
 
 def _replay(site: str) -> Rights:

@@ -30,7 +30,8 @@ from messages.text import plain
 log = logging.getLogger(__name__)
 
 # POSE and LOCATION repeat what RATE, NAV and GNSS say, for other viewers.
-TOPICS = {topic.name: topic for topic in tp.TOPICS if topic not in (tp.POSE, tp.LOCATION)}
+UNSHOWN = (tp.POSE, tp.LOCATION, tp.HOLDER, tp.ORDER)  # the last two are heard by the desk
+TOPICS = {topic.name: topic for topic in tp.TOPICS if topic not in UNSHOWN}
 QUEUE = 20000  # messages; about 20 s of a busy bench
 QUEUE_BYTES = 64 << 20
 MESSAGE_BYTES = 128 << 10  # of one message; what waits and what is newest has to stay in memory

@@ -20,7 +20,9 @@ from messages.contract import topics as tp
 from messages.contract.checks import Refusal
 from messages.contract.door import OTHERS, Door
 
-OF_DEVICES = tuple(t for t in tp.TOPICS if t not in (tp.STATUS, tp.REPLAY, tp.LOG, tp.BEAT))
+OF_DEVICES = tuple(
+    t for t in tp.TOPICS if t not in (tp.STATUS, tp.REPLAY, tp.LOG, tp.HOLDER, tp.ORDER, tp.BEAT)
+)
 LATE_JOIN_S = 2.0  # repaired stretches nearer than this are one
 MARKS = 200  # notes and marks of a device that are drawn
 DEVICES = 64  # remembered; a foreign publisher cannot fill the memory

@@ -125,7 +125,7 @@ def dashboard(
         from dashboard.web.jobs import Jobs
         from dashboard.web.tls.certificate import CertificateError
         from dashboard.web.users import UsersError
-        from gyrofree.setup.site import only_watching
+        from gyrofree.setup.site import only_watching, place_of
 
         options = ["--config", str(config)] if config else []
         replayer = command("replay", "--stay", *options)
@@ -135,7 +135,9 @@ def dashboard(
         bus = settings.bus.acting_as("dashboard")
         watching = only_watching(settings)
         try:
-            service.run(settings.dashboard, bus, stop, replay, jobs, first, watching)
+            service.run(
+                settings.dashboard, bus, stop, replay, jobs, first, watching, place_of(settings)
+            )
         except (CertificateError, UsersError) as error:
             raise ConfigError(str(error)) from None
 

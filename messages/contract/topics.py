@@ -24,6 +24,7 @@ RECORDER = "recorder"  # the device name under which the recorder speaks
 # processes by the topics' `source`: those that keep what they publish, and all of which one serves
 GATEWAY, ESTIMATES, PROCEDURES = "gateway", "estimator", "procedures"
 ALARMS = "alarms"
+COMMAND = "command"  # the device name under which it is said who has the command, and orders are
 CLAIMED = (GATEWAY, ESTIMATES, PROCEDURES, RECORDER, "replay", ALARMS)
 
 
@@ -95,6 +96,10 @@ PROCEDURE = Topic(
     "procedure", pb.ProcedureStatus, 4, "procedures", "a test as it runs, step by step"
 )
 ALARM = Topic("alarm", pb.AlarmStatus, 0.5, "alarms", "what is wrong, and who took note of it")
+HOLDER = Topic(
+    "holder", pb.CommandStatus, 1, "procedures", "who has the command of the site", recorded=False
+)
+ORDER = Topic("order", pb.OrderGiven, 0, "any", "an order and what came of it", recorded=False)
 NOTE = Topic("note", pb.Note, 0, "any", "remarks on the data by people and programs")
 REPLAY = Topic("replay", pb.ReplayStatus, 5, "replay", "where a replay stands", recorded=False)
 STATUS = Topic("status", pb.RecorderStatus, 1, "recorder", "state of the recording", recorded=False)
@@ -125,6 +130,8 @@ TOPICS: tuple[Topic, ...] = (
     WIRING,
     PROCEDURE,
     ALARM,
+    HOLDER,
+    ORDER,
     NOTE,
     REPLAY,
     STATUS,
@@ -230,6 +237,11 @@ def control_key(prefix: str, device: str, what: str) -> str:
 def replay_control_key(prefix: str) -> str:
     """Key of a replay's queryable: ReplayCommand in, ReplayStatus out."""
     return f"{check_name(prefix)}/{REPLAY.name}/control"
+
+
+def command_control_key(prefix: str) -> str:
+    """Key of the queryable of who keeps the command: SeatCommand in, SeatReply out."""
+    return f"{check_name(prefix)}/{COMMAND}/control"
 
 
 def alarms_control_key(prefix: str) -> str:

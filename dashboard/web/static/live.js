@@ -1,7 +1,8 @@
 // The bar above the scene: device, where its data come from, alarms, recording, replay. Polled once a second.
 import "/static/live_charts.js";
 import { call, toast } from "/static/rest.js";
-import { mayOperate, turnTo } from "/static/desk.js";
+import { command, whenCommand } from "/static/command.js";
+import { BARRED, mayOperate, turnTo } from "/static/desk.js";
 import { tell } from "/static/told.js";
 import { state } from "/static/view.js";
 
@@ -108,7 +109,8 @@ function alarmButton(alarm) {
 
 function showRecording(now) {
   recording = now;
-  record.disabled = !mayOperate || !now.available;
+  const may = mayOperate && command.may;
+  record.disabled = !may || !now.available;
   record.classList.toggle("on", now.recording);
   record.setAttribute("aria-pressed", String(now.recording));
   if (!now.recording) sure = 0;
@@ -116,14 +118,14 @@ function showRecording(now) {
   record.classList.toggle("asks", asks);
   record.querySelector("span").textContent = now.recording ? `${asks ? "Really stop" : "Stop"} ${clock(now.seconds)}` : "Record";
   record.title = now.message || (now.recording ? `${now.session}, ${now.messages} messages, ${now.lost} lost` : "");
-  session.disabled = !mayOperate || !now.available || now.recording;
+  session.disabled = !may || !now.available || now.recording;
   session.placeholder = now.recording ? now.session : "Session name";
   session.title = now.recording ? now.session : "Empty: it is called by its time";
-  if (!mayOperate) record.title = session.title = "Recording takes the role operator; you look as viewer";
+  if (!may) record.title = session.title = BARRED || command.why;
   replay.hidden = !now.replaying;
   replay.disabled = !mayOperate;
   replay.textContent = `Stop replay`;
-  replay.title = mayOperate ? now.replaying : `${now.replaying}: to end it takes the role operator`;
+  replay.title = mayOperate ? now.replaying : `${now.replaying}: ${BARRED}`;
 }
 
 async function poll() {
@@ -176,5 +178,6 @@ replay.addEventListener("click", async () => {
   }
 });
 
+whenCommand(() => recording && showRecording(recording));
 poll();
 
