@@ -26,6 +26,7 @@ from dashboard.web.jobs import Jobs
 from dashboard.web.map.archive import ArchiveError, open_archive
 from dashboard.web.tls.certificate import open_certificate
 from dashboard.web.users import UserStore, load_users
+from messages.bus.beating import Beating
 from messages.bus.session import BusSettings, open_client
 from messages.contract import gyrofree_pb2 as pb
 from sessions.library.catalogue import Catalogue
@@ -202,7 +203,8 @@ def run(
             keeping.start()
             log.info("dashboard at %s", settings.url)
             try:
-                serve(front, bound, stop)
+                with Beating(session, bus, viewers=front.lookers.by_role):
+                    serve(front, bound, stop)
             finally:
                 if replay is not None:
                     replay.stop()

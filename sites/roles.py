@@ -100,12 +100,31 @@ def listening(site: str) -> tuple[str, ...]:
         tp.published_key(site, "*", "*"),
         tp.fence_key(site, "*"),
         f"{segment_key(site)}/**",
+        tp.clock_key(site),
     )
 
 
 def order_keys(site: str) -> tuple[str, ...]:
     """The keys of all orders, for any device."""
     return tuple(kind.key(site, "*") for kind in KINDS)
+
+
+def presence(site: str, place: str, role: str) -> Rights:
+    """Everybody but a viewer may say that he is there: under his own place and role, no other's."""
+    if role not in (*SERVICES, "simulator"):
+        return Rights()
+    beat, token = tp.BEAT.pattern(site, place), tp.alive_key(site, place, "*")
+    return Rights(put=(f"{beat[:-1]}{role}-$*",), token=(f"{token[:-1]}{role}-$*",))
+
+
+def presence_of(site: str, place: str = "*") -> Rights:
+    """What all processes of a place say of being there, and of every place."""
+    return Rights(put=(tp.BEAT.pattern(site, place),), token=(alive_keys(site, place),))
+
+
+def alive_keys(site: str, place: str = "*") -> str:
+    """The tokens of all processes of a place, or of every one."""
+    return f"{check_name(site)}/{place}/alive/*"
 
 
 def topic_keys(site: str) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from fastapi import APIRouter, Depends, HTTPException, Query, Request
 from fastapi.responses import FileResponse
 
 from dashboard.data.alarms import alarms, bench_alarms
+from dashboard.data.lateness import lateness
 from dashboard.web.auth import Role
 from dashboard.web.control import ControlError
 from dashboard.web.front import Asker, Front, asker, desk_of, front_of, needs
@@ -186,7 +187,12 @@ def devices(request: Request, who: SignedIn) -> list[DeviceOut]:
     with front.store.lock:
         found = [front.store.devices[name] for name in front.store.names()]
         return [
-            device_out(device, front.settings.stale_s, alarms(front.store, device))
+            device_out(
+                device,
+                front.settings.stale_s,
+                alarms(front.store, device),
+                lateness(front.store, device),
+            )
             for device in found
             if device.spoken_of
         ]

@@ -16,6 +16,7 @@ from dashboard.web.command.seats import Seats
 from dashboard.web.control import Replay
 from dashboard.web.first.control import FirstRun
 from dashboard.web.jobs import Jobs
+from dashboard.web.places.lookers import Lookers
 from dashboard.web.readings import Readings
 from dashboard.web.tls.certificate import Certificate
 from dashboard.web.uploads import Uploads
@@ -44,6 +45,7 @@ class Front:
     certificate: Certificate | None = None  # of the port, where it speaks TLS by itself
     open_labels: Collection[str] = ()  # of the scene's inputs that concern nobody else
     ended: Counter[str] = field(default_factory=Counter)  # why -> connections that were ended
+    lookers: Lookers = field(default_factory=Lookers)  # people, by role
     views: Views = field(init=False)
     seats: Seats = field(init=False)
 
@@ -99,10 +101,13 @@ def asker(request: Request) -> Asker:
     """
     if "authorization" in request.headers and request.url.path.startswith("/api/"):
         return _by_token(request)
-    found = front_of(request).gate.session_of(request)
+    front = front_of(request)
+    found = front.gate.session_of(request)
     if found is None:
         raise HTTPException(401, "sign in first")
-    return Asker(*found)
+    who = Asker(*found)
+    front.lookers.saw(who.session.csrf, who.role.name)
+    return who
 
 
 def _by_token(request: Request) -> Asker:

@@ -1676,3 +1676,48 @@ class AlarmReply(_message.Message):
     ways: _containers.RepeatedCompositeFieldContainer[AlarmReply.Way]
     trouble: str
     def __init__(self, ok: _Optional[bool] = ..., message: _Optional[str] = ..., alarms: _Optional[_Iterable[_Union[Alarm, _Mapping]]] = ..., limits: _Optional[_Iterable[_Union[AlarmLimit, _Mapping]]] = ..., history: _Optional[_Iterable[_Union[AlarmReply.Event, _Mapping]]] = ..., ways: _Optional[_Iterable[_Union[AlarmReply.Way, _Mapping]]] = ..., trouble: _Optional[str] = ...) -> None: ...
+
+class Beat(_message.Message):
+    __slots__ = ("header", "role", "session", "since_utc_ns", "devices", "viewers", "leaving", "certificate_ends_utc_ns", "certificate_life_s", "certificate", "clock_ahead_s", "clock_bound_s", "version")
+    class Viewers(_message.Message):
+        __slots__ = ("role", "count")
+        ROLE_FIELD_NUMBER: _ClassVar[int]
+        COUNT_FIELD_NUMBER: _ClassVar[int]
+        role: str
+        count: int
+        def __init__(self, role: _Optional[str] = ..., count: _Optional[int] = ...) -> None: ...
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    ROLE_FIELD_NUMBER: _ClassVar[int]
+    SESSION_FIELD_NUMBER: _ClassVar[int]
+    SINCE_UTC_NS_FIELD_NUMBER: _ClassVar[int]
+    DEVICES_FIELD_NUMBER: _ClassVar[int]
+    VIEWERS_FIELD_NUMBER: _ClassVar[int]
+    LEAVING_FIELD_NUMBER: _ClassVar[int]
+    CERTIFICATE_ENDS_UTC_NS_FIELD_NUMBER: _ClassVar[int]
+    CERTIFICATE_LIFE_S_FIELD_NUMBER: _ClassVar[int]
+    CERTIFICATE_FIELD_NUMBER: _ClassVar[int]
+    CLOCK_AHEAD_S_FIELD_NUMBER: _ClassVar[int]
+    CLOCK_BOUND_S_FIELD_NUMBER: _ClassVar[int]
+    VERSION_FIELD_NUMBER: _ClassVar[int]
+    header: Header
+    role: str
+    session: str
+    since_utc_ns: int
+    devices: _containers.RepeatedScalarFieldContainer[str]
+    viewers: _containers.RepeatedCompositeFieldContainer[Beat.Viewers]
+    leaving: bool
+    certificate_ends_utc_ns: int
+    certificate_life_s: float
+    certificate: str
+    clock_ahead_s: float
+    clock_bound_s: float
+    version: str
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., role: _Optional[str] = ..., session: _Optional[str] = ..., since_utc_ns: _Optional[int] = ..., devices: _Optional[_Iterable[str]] = ..., viewers: _Optional[_Iterable[_Union[Beat.Viewers, _Mapping]]] = ..., leaving: _Optional[bool] = ..., certificate_ends_utc_ns: _Optional[int] = ..., certificate_life_s: _Optional[float] = ..., certificate: _Optional[str] = ..., clock_ahead_s: _Optional[float] = ..., clock_bound_s: _Optional[float] = ..., version: _Optional[str] = ...) -> None: ...
+
+class ClockReply(_message.Message):
+    __slots__ = ("received_ns", "answered_ns")
+    RECEIVED_NS_FIELD_NUMBER: _ClassVar[int]
+    ANSWERED_NS_FIELD_NUMBER: _ClassVar[int]
+    received_ns: int
+    answered_ns: int
+    def __init__(self, received_ns: _Optional[int] = ..., answered_ns: _Optional[int] = ...) -> None: ...

@@ -103,6 +103,9 @@ ORDER = Topic("order", pb.OrderGiven, 0, "any", "an order and what came of it", 
 NOTE = Topic("note", pb.Note, 0, "any", "remarks on the data by people and programs")
 REPLAY = Topic("replay", pb.ReplayStatus, 5, "replay", "where a replay stands", recorded=False)
 STATUS = Topic("status", pb.RecorderStatus, 1, "recorder", "state of the recording", recorded=False)
+BEAT = Topic(
+    "beat", pb.Beat, 2, "all", "a process is there and runs", per_estimator=True, recorded=False
+)
 LOG = Topic("log", Log, 0, "any", "warnings worth keeping with the data")
 
 TOPICS: tuple[Topic, ...] = (
@@ -134,6 +137,7 @@ TOPICS: tuple[Topic, ...] = (
     STATUS,
     LOG,
     MUTE,
+    BEAT,
 )
 
 BY_NAME = {topic.name: topic for topic in TOPICS}
@@ -243,6 +247,19 @@ def command_control_key(prefix: str) -> str:
 def alarms_control_key(prefix: str) -> str:
     """Key of the alarms' queryable: AlarmCommand in, AlarmReply out."""
     return f"{check_name(prefix)}/{ALARMS}/control"
+
+
+def alive_key(prefix: str, place: str, process: str) -> str:
+    """Key of the token of a process that is there; its beats have the same last part."""
+    for name in (place, process):
+        if name != "*":
+            check_name(name)
+    return f"{check_name(prefix)}/{place}/alive/{process}"
+
+
+def clock_key(prefix: str) -> str:
+    """Key of a queryable that tells the time of the site: nothing in, ClockReply out."""
+    return f"{check_name(prefix)}/site/clock"
 
 
 def markdown() -> str:

@@ -7,7 +7,7 @@ import { tell } from "/static/told.js";
 import { state } from "/static/view.js";
 
 const byId = (id) => document.getElementById(id);
-const device = byId("device"), choice = byId("devices"), source = byId("source"), alarms = byId("alarms");
+const device = byId("device"), choice = byId("devices"), source = byId("source"), late = byId("late"), alarms = byId("alarms");
 const record = byId("record"), replay = byId("replay"), session = byId("session");
 const SURE_MS = 4000; // in which a second click ends the recording
 const SHOWN = 3; // alarms; the others are counted
@@ -20,6 +20,9 @@ const clock = (s) => `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStar
 function showDevices(devices) {
   const one = devices.find((d) => d.name === state?.device) ?? devices.find((d) => d.connected) ?? devices[0];
   showChoice(state?.devices ?? devices.map((d) => d.name), state?.device ?? one?.name);
+  late.hidden = !one?.late?.shown;
+  late.textContent = one?.late?.said ?? "";
+  late.title = one?.late?.details ?? "";
   if (!one) {
     source.hidden = true;
     return showDevice("none", state?.device || "no device yet", state?.device ? "" : "waiting for a gateway");
