@@ -14,6 +14,7 @@ from dashboard.alarms import said
 from dashboard.alarms.book import Event, NoSuchAlarm
 from dashboard.alarms.machine import Now
 from dashboard.alarms.notices import DeliveryError, Notice, Sender, Teller
+from dashboard.alarms.places import Certificates
 from dashboard.alarms.settings import AlarmSettings
 from dashboard.alarms.state_file import load, save
 from dashboard.alarms.watch import Watch
@@ -54,15 +55,16 @@ class Service:
         session: zenoh.Session,
         prefix: str,
         number: int = 0,
+        certificates: Path | None = None,
     ) -> None:
-        """number: of the claim. recordings: the folder that sessions are written to."""
-        self._settings, self._clock = settings, Clock()
+        """number: of the claim. recordings, certificates: folders of this place's."""
+        self._settings, self._clock, self._site = settings, Clock(), prefix
         kept = settings.state.with_suffix(".published")
         self._publishers = KeptPublishers(session, prefix, ALARMS, kept, number)
-        self._site = prefix
         book, limits, self._users, self._trouble = load(settings.state)
         self._store = Store(most_bytes=MOST_BYTES)
-        self._watch = Watch(self._store, settings, recordings, book)
+        own = Certificates(certificates)
+        self._watch = Watch(self._store, settings, recordings, book, own)
         self._fixed = {limit.name for limit in settings.limits}
         self._own = {one.name: one for one in limits if one.name not in self._fixed}
         for limit in [*settings.limits, *self._own.values()]:
@@ -317,7 +319,7 @@ def _serve(
     stop: threading.Event,
 ) -> None:
     """Until `stop`, or until another has taken over."""
-    service = Service(settings, recordings, session, bus.prefix, claimed.number)
+    service = Service(settings, recordings, session, bus.prefix, claimed.number, bus.tls)
     log.info("watching %s/*: %d limits", bus.prefix, len(settings.limits))
     try:
         while not (claimed.lost.is_set() or stop.is_set()):

@@ -12,6 +12,7 @@ from gyrofree.commands.demo import demo, play
 from gyrofree.commands.installation import alarms, certs, config, site
 from gyrofree.commands.installation.completion import answer_the_shell, completion
 from gyrofree.commands.installation.doctor import doctor
+from gyrofree.commands.installation.orders import orders
 from gyrofree.commands.installation.setup import setup
 from gyrofree.commands.installation.up import up
 from gyrofree.commands.options import say
@@ -65,6 +66,7 @@ for command in (
     play,
     replay,
     doctor,
+    orders,
     completion,
 ):
     app.command()(command)

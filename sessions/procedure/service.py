@@ -12,6 +12,7 @@ import zenoh
 
 from messages.bus import orders
 from messages.bus.claiming import Claim
+from messages.bus.command.keeper import Keeper
 from messages.bus.session import BusSettings, subscribe
 from messages.bus.turns import in_turn, sessions
 from messages.clock import elapsed_ns
@@ -84,6 +85,7 @@ class Service:
         self._orders: deque[orders.Order[COMMAND, pb.Reply]] = deque()
         self._due: dict[str, float] = {}
         self._around = Around(session, prefix, lambda name: self._devices.setdefault(name, 0.0))
+        self._keeper = Keeper(session, prefix, settings.root, self._publishers)
         self._taking = orders.take(session, prefix, orders.PROCEDURES, self._on_order, "*")
 
     # --- on Zenoh's threads
@@ -132,6 +134,7 @@ class Service:
 
     def step(self) -> None:
         """Orders, data, status; call it every TICK_S."""
+        self._keeper.step()
         while self._orders:
             self._obey(self._orders.popleft())
         while self._around.recorder:
@@ -158,6 +161,7 @@ class Service:
     def close(self) -> None:
         """Stop listening; runs go on with the next life. Driven tables stand meanwhile."""
         self._taking.undeclare()
+        self._keeper.close()
         self._around.close()
         for device, conductor in self._conductors.items():
             self._silence(device)
@@ -167,6 +171,7 @@ class Service:
     def abandon(self) -> None:
         """Another process has taken over: say nothing more, least of all to its tables."""
         self._taking.undeclare()
+        self._keeper.close()
         self._around.close()
         for device, conductor in self._conductors.items():
             self._silence(device)
