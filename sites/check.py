@@ -90,6 +90,12 @@ def deeds(place: Place, device: str) -> list[Deed]:
             "token",
         ),
         Deed("order the recorder", orders.RECORDER.key(site, ""), orders_by, "order"),
+        Deed(
+            "change what a service logs",
+            orders.LOG_LEVEL.key(site, tp.RECORDER),
+            orders_by,
+            "order",
+        ),
         Deed("order the board", orders.BOARD.key(site, device), orders_by, "order"),
     ]
 

@@ -31,6 +31,7 @@ KINDS = (
     orders.PROCEDURES,
     orders.ALARMS,
     orders.REPLAY,
+    orders.LOG_LEVEL,
 )
 REPLAYED = f"$*{tp.REPLAY_SUFFIX}"  # of a device's name: any device that is a replay
 
@@ -70,7 +71,10 @@ def rights(role: str, site: str, devices: Iterable[str] = ()) -> Rights:
         "authority": lambda: _listener(site) + Rights(ask=(renew_key(site),)),
         "join": lambda: Rights(ask=(join_key(site),)),
     }
-    return made.get(role, Rights)()
+    said = made.get(role, Rights)()
+    if role not in SERVICES or role == "operator":
+        return said
+    return said + Rights(answer=(orders.LOG_LEVEL.key(site, role),))
 
 
 def join_key(site: str) -> str:

@@ -21,6 +21,8 @@ from dashboard.web.uploads import Uploads
 from dashboard.web.views import Views
 from sessions.library.catalogue import Catalogue
 
+METRICS = "/metrics"  # asked for by programs only, as all below /api/ is
+
 
 @dataclass
 class Front:
@@ -80,7 +82,8 @@ def asker(request: Request) -> Asker:
     """Who asks: by his cookie, or for REST by an API token in `Authorization: Bearer`; HTTP 401
     for nobody.
     """
-    if "authorization" in request.headers and request.url.path.startswith("/api/"):
+    path = request.url.path
+    if "authorization" in request.headers and (path.startswith("/api/") or path == METRICS):
         return _by_token(request)
     found = front_of(request).gate.session_of(request)
     if found is None:

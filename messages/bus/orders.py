@@ -113,6 +113,15 @@ ALARMS = Kind(
     lambda prefix, device: alarms_control_key(prefix),
     tp.ALARMS,
 )
+LOG_LEVEL = Kind(
+    "the service",
+    pb.LogLevelCommand,
+    pb.Reply,
+    "see that it runs and reaches the router",
+    3.0,
+    lambda prefix, device: control_key(prefix, device, "log-level"),
+    "process",  # nobody claims to be the only one
+)
 
 
 def give(

@@ -38,6 +38,8 @@ VALUES = {  # of what is no file
     "address": "127.0.0.1",
     "id": "link/cube",
     "minutes": "5",
+    "service": "router",
+    "level": "debug",
 }
 GOOD = {  # of a file that is wanted beside the broken one
     "log": "cube.csv",
@@ -87,7 +89,7 @@ def no_services(monkeypatch):
     for module in pkgutil.iter_modules(gyrofree.commands.__path__):
         loaded = importlib.import_module(f"gyrofree.commands.{module.name}")
         if hasattr(loaded, "run_service"):
-            monkeypatch.setattr(loaded, "run_service", lambda body, verbose=False: None)
+            monkeypatch.setattr(loaded, "run_service", lambda *_: None)
     monkeypatch.setattr("gyrofree.running.demo.run", lambda plan: None)
     monkeypatch.setattr("gyrofree.running.up.run", lambda plan: None)
 
