@@ -98,12 +98,11 @@ class Registrar:
         authority = Authority(self._folder)
         requests = {role: load_request(text) for role, text in asked.requests.items()}
         peer = next(each for each in here.peers if each.place == entry.place)
-        hosts = tuple(filter(None, [_host_of(peer.address)]))
         # noted before anything is issued: killed here, the same keys may ask again, others not
         used = entry.model_copy(update={"used": which})
         save_book(self._folder, [used if each is entry else each for each in book])
         certificates = {
-            role: pem(authority.issue(request, role, entry.place, hosts=hosts)).decode()
+            role: pem(authority.issue(request, role, entry.place, hosts=peer.hosts)).decode()
             for role, request in requests.items()
         }
         log.info("%s has joined the site, its people as %s", entry.place, entry.seat)
@@ -236,8 +235,3 @@ def load_request(text: str) -> x509.CertificateSigningRequest:
 
 def _pack(answer: Answer) -> bytes:
     return answer.model_dump_json().encode()
-
-
-def _host_of(address: str) -> str:
-    """The name of a router's machine in "tls/host:port"."""
-    return address.partition("/")[2].rpartition(":")[0].strip("[]")

@@ -16,7 +16,6 @@ from typing import Any
 import httpx
 import msgspec
 import viser
-import websockets.sync.client
 
 from dashboard.service import listen, serve
 from dashboard.settings import DashboardSettings
@@ -25,6 +24,7 @@ from dashboard.web.front import Front
 from dashboard.web.tls.certificate import open_certificate
 from dashboard.web.users import issue_link_token, write_private
 from sessions.library.catalogue import Catalogue
+from support.scene_socket import SceneSocket
 
 PASSWORDS = {"vera": "looks only 1", "otto": "operates 222", "anna": "administers 3"}
 SERVICES = ("store", "desk", "replay", "jobs", "first_run", "open_labels")
@@ -112,9 +112,7 @@ class Door:
                 client.headers["x-csrf-token"] = client.get("/api/me").json()["csrf"]
             yield client
 
-    def scene(
-        self, client: httpx.Client, **options: Any
-    ) -> websockets.sync.client.ClientConnection:
+    def scene(self, client: httpx.Client, **options: Any) -> SceneSocket:
         """The scene's WebSocket as that browser opens it."""
         cookies = "; ".join(f"{name}={value}" for name, value in client.cookies.items())
         options = {
@@ -122,10 +120,9 @@ class Door:
             "subprotocols": [f"viser-v{viser.__version__}"],
             "max_size": None,
         } | options
-        return websockets.sync.client.connect(
+        return SceneSocket(
             self.url.replace("http", "ws") + "/scene",
             additional_headers={"cookie": cookies},
-            proxy=None,
             ssl=self.trust if self.settings.tls_key else None,
             open_timeout=60.0,  # a busy machine is given time
             **options,
