@@ -148,6 +148,12 @@ def test_what_is_there_stays_unless_that_is_asked_for(made, tmp_path):
     assert again.exit_code == 0 and "0 restored" in again.output, again.output
 
 
+def test_a_device_is_no_place_for_a_backup(made):
+    refused = run(made[0], "backup", "/dev/null")
+    assert refused.exit_code == 1 and "no file" in refused.output
+    assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
+
+
 def test_nothing_is_written_where_a_link_leads(made, tmp_path):
     _, file = made
     (tmp_path / "lab").mkdir()

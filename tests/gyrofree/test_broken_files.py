@@ -47,6 +47,7 @@ GOOD = {  # of a file that is wanted beside the broken one
     "card": "card.toml",
     "session": "session.mcap",
     "sessions": "session.mcap",
+    "archive": "cube.csv",
 }
 ALSO = {  # further ways of a command
     "run": [[], ["--attitude"], ["--estimators", "least-squares", "--resolve", "--tacho-aid"]],
@@ -105,6 +106,8 @@ def arguments(command, spoilt, value, seeds, place):
                 last.append(str(seeds["session.mcap"]))
         elif parameter.name in OUTPUTS and option and parameter.name in ("out", "layout_out"):
             words.append(f"{option}={place / 'out'}")
+        elif parameter.name in OUTPUTS and parameter.required:
+            last.append(str(place / "out"))
         elif parameter.required:
             known = seeds[GOOD[parameter.name]] if parameter.name in GOOD else None
             word = known or VALUES.get(parameter.name)

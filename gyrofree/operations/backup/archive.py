@@ -8,6 +8,7 @@ in BackupError and in nothing else.
 import hashlib
 import io
 import os
+import stat
 import struct
 import zipfile
 import zlib
@@ -81,6 +82,8 @@ class Contents(BaseModel):
 
 def write(path: Path, collection: Collection, progress: Callable[[int], None]) -> Contents:
     """Write the archive, which is there whole or not at all. Raises BackupError, OSError."""
+    if path.exists() and not path.is_file():  # it would take the place of a device
+        raise BackupError(f"{path} is no file: name one")
     entries, taken = [], []
     for one in collection.taken:
         if not _stays(one.part, one.unit, one.path):
@@ -134,7 +137,10 @@ def _add(archive: zipfile.ZipFile, one: Taken, progress: Callable[[int], None]) 
 @contextmanager
 def opened(path: Path) -> Iterator["Archive"]:
     """An archive whose list is sound. Raises BackupError, OSError."""
-    with path.open("rb") as stream:
+    fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+    with os.fdopen(fd, "rb") as stream:
+        if not stat.S_ISREG(os.fstat(fd).st_mode):
+            raise BackupError(f"{path}: is no file")
         try:
             archive = zipfile.ZipFile(stream)
         except DAMAGED as error:
