@@ -7,15 +7,19 @@ Zenoh refuses silently: a denied message is dropped at the router, and who sent 
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from messages.contract.topics import NOTE
+from messages.contract.names import NAME
+from messages.contract.topics import NOTE, ORDER, clock_key
 from sites.authority import Issued
 from sites.place import Peer, Place
 from sites.roles import (
     Rights,
+    alive_keys,
     claim_keys,
     join_key,
     listening,
     order_keys,
+    presence,
+    presence_of,
     renew_key,
     rights,
     segment_key,
@@ -110,8 +114,17 @@ def _local(rules: Rules, place: Place, holder: Issued, devices: Iterable[str]) -
         watching = (*listening(place.site), renew_key(place.site))
         said = Rights(ask=tuple(key for key in said.ask if key in watching))
     elif holder.role == "authority" and place.at_home:
-        home = (join_key(place.site), renew_key(place.site), f"{segment_key(place.site)}/**")
+        home = (
+            join_key(place.site),
+            renew_key(place.site),
+            f"{segment_key(place.site)}/**",
+            clock_key(place.site),
+        )
         said += Rights(answer=home)
+    # a machine of its own says its own name
+    for name in {place.place, holder.common_name.partition(".")[2]}:
+        if NAME.fullmatch(name):
+            said += presence(place.site, name, holder.role)
     rules.allow([holder.common_name], said, [f"{place.site}/**"])
 
 
@@ -122,10 +135,14 @@ def _between(rules: Rules, place: Place, peer: Peer, router: str) -> None:
     site = place.site
     seat = peer.seat if place.at_home else place.seat
     asks = (*listening(site), renew_key(site), *(order_keys(site) if seat == "operator" else ()))
-    notes = Rights(put=(NOTE.pattern(site),)) if seat == "operator" else Rights()
-    heard = (*topic_keys(site), *claim_keys(site))
+    said = (NOTE.pattern(site), ORDER.pattern(site)) if seat == "operator" else ()
+    notes = Rights(put=said)
+    heard = (*topic_keys(site), *claim_keys(site), alive_keys(site))
     if place.at_home:
-        rules.allow([router], Rights(ask=asks) + notes, heard)
+        there = presence_of(site, peer.place)
+        rules.allow([router], Rights(ask=asks) + notes + there, heard)
         return
-    home = Rights(put=topic_keys(site), token=claim_keys(site), answer=asks)
-    rules.allow([router], home, [NOTE.pattern(site)] if seat == "operator" else [])
+    home = Rights(put=topic_keys(site), token=(*claim_keys(site), alive_keys(site)), answer=asks)
+    here = presence_of(site, place.place)
+    said = (*said, *here.put, *here.token)
+    rules.allow([router], home, said)

@@ -89,6 +89,7 @@ def deeds(place: Place, device: str) -> list[Deed]:
             ("estimator",),
             "token",
         ),
+        Deed("say who has the command", tp.HOLDER.key(site, tp.COMMAND), ("procedures",)),
         Deed("order the recorder", orders.RECORDER.key(site, ""), orders_by, "order"),
         Deed(
             "change what a service logs",

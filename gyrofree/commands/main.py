@@ -14,6 +14,7 @@ from gyrofree.commands.installation.backup import backup, restore
 from gyrofree.commands.installation.completion import answer_the_shell, completion
 from gyrofree.commands.installation.doctor import doctor
 from gyrofree.commands.installation.log_level import log_level
+from gyrofree.commands.installation.orders import orders
 from gyrofree.commands.installation.setup import setup
 from gyrofree.commands.installation.up import up
 from gyrofree.commands.options import say
@@ -70,6 +71,7 @@ for command in (
     log_level,
     backup,
     restore,
+    orders,
     completion,
 ):
     app.command()(command)

@@ -26,14 +26,20 @@ def router(config: Config = None, verbose: Verbose = False) -> None:
 
     def body(stop: threading.Event) -> None:
         from gyrofree.setup.site import router_rules
+        from messages.bus.beating import Beating, tell_time
         from messages.bus.session import open_router
 
         rules, mesh = router_rules(settings)
-        with open_router(settings.bus.acting_as("router"), rules, mesh):
+        bus = settings.bus.acting_as("router")
+        with open_router(bus, rules, mesh) as session, Beating(session, bus):
+            # at a site its home tells the time; who is none asks the router
+            telling = tell_time(session, bus.prefix) if bus.tls is None else None
             log.info("router listens on %s", ", ".join(settings.bus.listen))
             if mesh:
                 log.info("and calls %s", ", ".join(mesh))
             stop.wait()
+            if telling is not None:
+                telling.undeclare()
 
     run_service(body, verbose, attended(settings, "router"))
 
@@ -121,7 +127,7 @@ def dashboard(
         from dashboard.web.jobs import Jobs
         from dashboard.web.tls.certificate import CertificateError
         from dashboard.web.users import UsersError
-        from gyrofree.setup.site import only_watching
+        from gyrofree.setup.site import only_watching, place_of
 
         options = ["--config", str(config)] if config else []
         replayer = command("replay", "--stay", *options)
@@ -131,7 +137,9 @@ def dashboard(
         bus = settings.bus.acting_as("dashboard")
         watching = only_watching(settings)
         try:
-            service.run(settings.dashboard, bus, stop, replay, jobs, first, watching)
+            service.run(
+                settings.dashboard, bus, stop, replay, jobs, first, watching, place_of(settings)
+            )
         except (CertificateError, UsersError) as error:
             raise ConfigError(str(error)) from None
 

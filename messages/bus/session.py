@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, PrivateAttr
 
 from messages.bus import attending, tls
 from messages.bus.faults import BusUnavailable
-from messages.bus.fencing import packed
+from messages.bus.fencing import Fence, packed
 from messages.contract.door import read
 from messages.contract.names import Name
 from messages.contract.topics import REPLAY_SUFFIX, Topic
@@ -310,12 +310,15 @@ def subscribe(
     prefix: str,
     handler: Callable[[str, M], None],
     device: str = "*",
+    fence: Fence | None = None,
 ) -> zenoh.Subscriber:
     """Call handler(key, message) on Zenoh's thread for each message; handlers only append to a
-    queue.
+    queue. With a fence, for those of the process that serves.
     """
 
     def on_sample(sample: zenoh.Sample) -> None:
+        if fence is not None and not fence.admit(str(sample.key_expr), sample.attachment):
+            return
         message = decode(topic, sample.payload.to_bytes())
         if message is not None:
             handler(str(sample.key_expr), message)

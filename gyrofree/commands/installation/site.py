@@ -11,6 +11,7 @@ import typer
 import zenoh
 from rich.table import Table
 
+from gyrofree.commands.installation.site_status import site_status
 from gyrofree.commands.options import AsJson, Config, Verbose, say, settings_of, show_table
 from gyrofree.commands.parser import Commands, output_folder
 from gyrofree.config import DEFAULT_PATH, ConfigError, Settings
@@ -162,6 +163,9 @@ def site_show(as_json: AsJson = False, config: Config = None) -> None:
         say(f"  calls {peer.place} at {peer.address}, whose people are {peer.seat}s")
     for role, end in ends.items():
         say(f"  certificate of {role} until {end:%Y-%m-%d %H:%M UTC}")
+
+
+app.command("status")(site_status)
 
 
 @app.command("copies")
