@@ -114,6 +114,7 @@ docs: setup
 	$(BIN)/python -m firmware_protocol.document > docs/protocol.md
 	$(BIN)/python -m messages.contract.document > docs/topics.md
 	$(BIN)/gyrofree config reference > docs/configuration.md
+	$(BIN)/python -m gyrofree.operations.document > docs/metrics.md
 
 # Its packages want versions of their own, so they have an environment of their own.
 .make/site: requirements/site.txt | .make/venv

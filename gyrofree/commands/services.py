@@ -15,6 +15,7 @@ from gyrofree.commands.options import (
     settings_of,
 )
 from gyrofree.config import ConfigError
+from gyrofree.operations.attending import attended
 from gyrofree.running.process import command, run_service
 
 log = logging.getLogger(__name__)
@@ -53,7 +54,7 @@ def router(config: Config = None, verbose: Verbose = False) -> None:
             log.info("%s routes", bus.zenohd)
             serve(program.session, program.wait)
 
-    run_service(body, verbose)
+    run_service(body, verbose, attended(settings, "router"))
 
 
 def gateway(config: Config = None, verbose: Verbose = False) -> None:
@@ -68,7 +69,8 @@ def gateway(config: Config = None, verbose: Verbose = False) -> None:
         leave_when_alone(stop)
         service.run(settings.gateway, settings.bus.acting_as("gateway"), stop, keeper)
 
-    guard(lambda keeper: run_service(lambda stop: body(stop, keeper), verbose))
+    who = attended(settings, "gateway")
+    guard(lambda keeper: run_service(lambda stop: body(stop, keeper), verbose, who))
 
 
 def estimator(config: Config = None, verbose: Verbose = False) -> None:
@@ -86,7 +88,7 @@ def estimator(config: Config = None, verbose: Verbose = False) -> None:
         except UnknownEstimator as error:
             raise ConfigError(str(error)) from None
 
-    run_service(body, verbose)
+    run_service(body, verbose, attended(settings, "estimator"))
 
 
 def record(config: Config = None, verbose: Verbose = False) -> None:
@@ -102,7 +104,7 @@ def record(config: Config = None, verbose: Verbose = False) -> None:
         kept = settings.model_dump(mode="json", exclude={"alarms": {"webhook", "mail"}})
         service.run(settings.recorder, settings.bus.acting_as("recorder"), stop, kept)
 
-    run_service(body, verbose)
+    run_service(body, verbose, attended(settings, "recorder"))
 
 
 def procedures(config: Config = None, verbose: Verbose = False) -> None:
@@ -118,7 +120,7 @@ def procedures(config: Config = None, verbose: Verbose = False) -> None:
         except TableError as error:
             raise ConfigError(str(error)) from None
 
-    run_service(body, verbose)
+    run_service(body, verbose, attended(settings, "procedures"))
 
 
 def dashboard(
@@ -154,4 +156,4 @@ def dashboard(
         except (CertificateError, UsersError) as error:
             raise ConfigError(str(error)) from None
 
-    run_service(body, verbose)
+    run_service(body, verbose, attended(settings, "dashboard"))

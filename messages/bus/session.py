@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import zenoh
 from google.protobuf.message import Message
 
-from messages.bus import tls
+from messages.bus import attending, tls
 from messages.bus.faults import BusUnavailable
 from messages.bus.fencing import Fence, packed
 from messages.bus.settings import BusSettings, configuration
@@ -49,7 +49,7 @@ def open_router(
     config = _config(settings, "router", mesh)
     if access is not None:
         config.insert_json5("access_control", json.dumps(access))
-    return zenoh.open(config)
+    return attending.opened(zenoh.open(config), settings)
 
 
 def open_client(
@@ -64,7 +64,7 @@ def open_client(
     start, said = time.monotonic(), False
     while True:
         try:
-            return zenoh.open(_config(settings, "client"))
+            return attending.opened(zenoh.open(_config(settings, "client")), settings)
         except zenoh.ZError:
             if stop.is_set() or (end is not None and time.monotonic() > end):
                 raise BusUnavailable(
@@ -130,6 +130,8 @@ class Publishers:
     spool's end; a session may then come later (`attach`): until it does, messages are only kept.
     """
 
+    heard: Callable[[Topic, str, str, Message], None] | None = None  # gets each, for figures
+
     def __init__(
         self, session: zenoh.Session | None, prefix: str, spool: Spool | None = None
     ) -> None:
@@ -186,6 +188,8 @@ class Publishers:
                 header.sequence = self._sequence[key]
             if self._sequence[key] <= self._published.get(key, 0):
                 return
+        if Publishers.heard is not None:
+            Publishers.heard(topic, device, estimator, message)
         payload = message.SerializeToString()
         if self._spool is not None and not device.endswith(REPLAY_SUFFIX):
             name = key.split("/", 2)[2]
