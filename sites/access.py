@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from messages.contract.topics import NOTE
+from messages.previews.frames import overview_key
 from sites.authority import Issued
 from sites.place import Peer, Place
 from sites.roles import (
@@ -16,6 +17,7 @@ from sites.roles import (
     join_key,
     listening,
     order_keys,
+    preview_keys,
     renew_key,
     rights,
     segment_key,
@@ -47,11 +49,11 @@ class Rules:
             ("ingress", ("query",), said.ask),
             ("egress", ("query",), said.answer),
             ("egress", ("reply", "declare_queryable"), said.ask),
-            ("ingress", HEAR[:1], [f"{key.split('/')[0]}/**" for key in hears]),
+            ("ingress", HEAR[:1], _widely(hears)),
             ("ingress", HEAR[2:], hears),
             ("egress", SAY, hears),
             # what the holder says is wanted elsewhere: he may know by whom
-            ("egress", ("declare_subscriber",), [f"{key.split('/')[0]}/**" for key in said.put]),
+            ("egress", ("declare_subscriber",), _widely(said.put)),
             ("egress", ("liveliness_query", "declare_liveliness_subscriber"), said.token),
         ]
         ids = []
@@ -83,6 +85,13 @@ class Rules:
         }
 
 
+def _widely(keys: Iterable[str]) -> list[str]:
+    """Whoever may hear some keys of a site may subscribe to all of it at once; previews are not in
+    that.
+    """
+    return [key if "@" in key else f"{key.split('/')[0]}/**" for key in keys]
+
+
 def rules_of(
     place: Place, certificates: Iterable[Issued], devices: Mapping[str, Iterable[str]]
 ) -> dict[str, Any]:
@@ -111,8 +120,9 @@ def _local(rules: Rules, place: Place, holder: Issued, devices: Iterable[str]) -
         said = Rights(ask=tuple(key for key in said.ask if key in watching))
     elif holder.role == "authority" and place.at_home:
         home = (join_key(place.site), renew_key(place.site), f"{segment_key(place.site)}/**")
-        said += Rights(answer=home)
-    rules.allow([holder.common_name], said, [f"{place.site}/**"])
+        previews = preview_keys(place.site)
+        said += Rights(put=previews, answer=(*home, overview_key(place.site, "*")))
+    rules.allow([holder.common_name], said, [f"{place.site}/**", *preview_keys(place.site)])
 
 
 def _between(rules: Rules, place: Place, peer: Peer, router: str) -> None:
@@ -123,9 +133,10 @@ def _between(rules: Rules, place: Place, peer: Peer, router: str) -> None:
     seat = peer.seat if place.at_home else place.seat
     asks = (*listening(site), renew_key(site), *(order_keys(site) if seat == "operator" else ()))
     notes = Rights(put=(NOTE.pattern(site),)) if seat == "operator" else Rights()
-    heard = (*topic_keys(site), *claim_keys(site))
+    heard = (*topic_keys(site), *claim_keys(site), *preview_keys(site))
     if place.at_home:
         rules.allow([router], Rights(ask=asks) + notes, heard)
         return
-    home = Rights(put=topic_keys(site), token=claim_keys(site), answer=asks)
+    said = (*topic_keys(site), *preview_keys(site))
+    home = Rights(put=said, token=claim_keys(site), answer=asks)
     rules.allow([router], home, [NOTE.pattern(site)] if seat == "operator" else [])

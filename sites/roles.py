@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from messages.bus import orders
 from messages.contract import topics as tp
 from messages.contract.topics import GATEWAY, RECORDER, TOPICS, check_name
+from messages.previews.frames import frame_key, overview_key
 
 SERVICES = (
     "router",
@@ -95,7 +96,13 @@ def listening(site: str) -> tuple[str, ...]:
         tp.published_key(site, "*", "*"),
         tp.fence_key(site, "*"),
         f"{segment_key(site)}/**",
+        overview_key(site, "*"),
     )
+
+
+def preview_keys(site: str) -> tuple[str, ...]:
+    """Frames of every device at every rate; no `**` matches them."""
+    return (frame_key(site, "*", "*"),)
 
 
 def order_keys(site: str) -> tuple[str, ...]:

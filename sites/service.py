@@ -21,6 +21,7 @@ from sites.copying.fetching import Copies
 from sites.copying.serving import Serving
 from sites.enrolment import Registrar, keep, renewal
 from sites.place import Place, SiteError, load_place
+from sites.previews import Previews
 from sites.roles import join_key, renew_key, segment_key
 
 LOOK_S = 3600.0  # between two looks at the certificates
@@ -50,8 +51,12 @@ def run(folder: Path, sessions: Path, bus: BusSettings, stop: threading.Event) -
         keeping.start()
         if place.at_home:
             declared = declare(session, place, Registrar(folder))
-            serving = Serving(session, place.site, sessions)
+            serving, previews = (
+                Serving(session, place.site, sessions),
+                Previews(session, place.site),
+            )
             stop.wait()
+            previews.close()
             serving.close()
             for one in declared:
                 one.undeclare()
