@@ -15,6 +15,7 @@ from sites.roles import (
     Rights,
     claim_keys,
     join_key,
+    lane_key,
     listening,
     order_keys,
     preview_keys,
@@ -109,6 +110,8 @@ def rules_of(
             rules.allow([each.common_name], rights("join", place.site))
         elif each.role == "router" and each.place in peers:
             _between(rules, place, peers[each.place], each.common_name)
+        elif each.role == "authority" and each.place == place.home:
+            rules.allow([each.common_name], Rights(answer=(f"{lane_key(place.site, '*')}/**",)))
     return rules.config()
 
 

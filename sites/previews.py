@@ -19,6 +19,7 @@ from messages.contract.checks import check
 from messages.history.answers import ask
 from messages.previews.frames import (
     FRAMED,
+    OVERVIEW,
     RATES,
     SOURCES,
     Frame,
@@ -74,6 +75,10 @@ class Previews:
         for thread in self._threads:
             thread.start()
 
+    def at(self, session: zenoh.Session, lane: str) -> zenoh.Queryable:
+        """Answer what was on a lane too."""
+        return session.declare_queryable(f"{lane}/{OVERVIEW}/*", self._on_query)
+
     def close(self) -> None:
         """Make no more."""
         self._stop.set()
@@ -106,7 +111,8 @@ class Previews:
 
     def _on_query(self, query: zenoh.Query) -> None:
         try:
-            name = str(query.key_expr).split("/")[1]
+            parts = str(query.key_expr).split("/")
+            name = parts[-1] if parts[-2] == OVERVIEW else parts[1]
             question = pb.HistoryQuery.FromString(
                 query.payload.to_bytes() if query.payload is not None else b""
             )

@@ -33,6 +33,7 @@ KINDS = (
     orders.ALARMS,
     orders.REPLAY,
 )
+SEGMENTS = "/segment/"  # of a key: what stands behind it is asked for
 REPLAYED = f"$*{tp.REPLAY_SUFFIX}"  # of a device's name: any device that is a replay
 
 
@@ -86,7 +87,12 @@ def renew_key(site: str) -> str:
 
 def segment_key(site: str) -> str:
     """Below which home answers about its recordings."""
-    return f"{check_name(site)}/{RECORDER}/segment"
+    return f"{check_name(site)}/{RECORDER}{SEGMENTS}".rstrip("/")
+
+
+def lane_key(site: str, number: int | str) -> str:
+    """Below which home answers on one of its lanes (sites/lanes.py); `*` stands for any."""
+    return f"{check_name(site)}/@lane/{number}"
 
 
 def listening(site: str) -> tuple[str, ...]:
@@ -97,6 +103,7 @@ def listening(site: str) -> tuple[str, ...]:
         tp.fence_key(site, "*"),
         f"{segment_key(site)}/**",
         overview_key(site, "*"),
+        f"{lane_key(site, '*')}/**",
     )
 
 

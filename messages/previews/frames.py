@@ -19,6 +19,7 @@ from messages.history.mending_state import wrong_item
 
 RATES = (50, 20, 10, 5, 2, 1)  # Hz
 CHUNK = "@preview"
+OVERVIEW = "overview"
 MOST_BYTES = 8 << 20  # of a frame or an overview, unpacked
 SOURCES = (tp.GATEWAY, tp.ESTIMATES, tp.TRUTH.source)
 AGAIN = (tp.POSE, tp.LOCATION)  # repeat for other viewers what RATE, NAV and GNSS say
@@ -46,7 +47,7 @@ def frame_key(prefix: str, device: str, rate: int | str) -> str:
 
 def overview_key(prefix: str, device: str) -> str:
     """Key of the queryable for what was before: HistoryQuery in, a frame out."""
-    return frame_key(prefix, device, "overview")
+    return frame_key(prefix, device, OVERVIEW)
 
 
 def device_and_rate(key: str) -> tuple[str, int] | None:
