@@ -133,7 +133,7 @@ class Mender:
             if skipped is not None:
                 self._ask(skipped)
                 return out
-            out += self._fill(question.stream[0], item)
+            out += self._fill(stream, question.stream[0], item)
         if reply is not None and reply.next:
             refusal = question.goes_on(reply)
             if refusal is None:
@@ -160,6 +160,7 @@ class Mender:
         header = header_of(arrival)
         if header is None:
             return [] if self._known(arrival.payload) else [arrival]
+        stream.heard(header, arrival.at_ns)
         key = self._keys.get((arrival.device, arrival.name))
         if key is None:
             key = self._keys[arrival.device, arrival.name] = KeyState(header.run, header.sequence)
@@ -248,7 +249,7 @@ class Mender:
         query.of, query.after_run, query.after_sequence = begin
         return Question(question.stream, query, question.replies + 1)
 
-    def _fill(self, device: str, item: pb.HistoryItem) -> list[Arrival]:
+    def _fill(self, stream: Stream, device: str, item: pb.HistoryItem) -> list[Arrival]:
         name, _, estimator = item.topic.partition("/")
         topic = BY_NAME.get(name)
         if topic is None:
@@ -259,6 +260,10 @@ class Mender:
         key = self._keys.get((device, item.topic))
         if key is None:
             return []  # never heard live: not this consumer's gap
+        twin = stream.twin(header_of(arrival))
+        if twin is not None:
+            self._refuse(f"{device}/{item.topic}", twin, device)
+            return []
         for gap in key.missing:
             if gap[0] == item.run and gap[1] <= item.sequence <= gap[2]:
                 if self._hold and (item.run, item.sequence) < (key.run, key.last):

@@ -19,6 +19,7 @@ log = logging.getLogger(__name__)
 MOST_REPLIES = 10_000  # of one answer; a reply has about a MB
 MOST_IDLE = 64  # of those in a row: what is missing of one topic has others around it
 CLOCKS_NS = 5_000_000_000  # two clocks that are set by one another differ by less
+SPLIT_NS = 2_000_000_000  # two that were heard at once by less are one after the other
 FARTHEST = 10_000_000  # messages; a sequence that jumps further has begun anew: a day at 100 Hz
 
 
@@ -118,6 +119,37 @@ class Stream:
     held_bytes: int = 0
     waiting: deque[pb.HistoryQuery] = field(default_factory=deque)
     tried: set[tuple[str, int, int]] = field(default_factory=set)  # beginnings that were asked for
+    run: int = 0  # whose messages came last, live
+    heard_ns: int = 0  # when the newest of them came
+    newest_ns: int = 0  # and its own time
+    taken: tuple[int, int] = (0, 0)  # a run, and the time up to which another was heard beside it
+
+    def heard(self, header: pb.Header, at_ns: int) -> None:
+        """A live message came at at_ns (0: nobody says when). Of two publishers of one name, each
+        heard while the link between them was cut, the time of the one that was heard is taken.
+        """
+        if not at_ns or not header.run:
+            return
+        if header.run != self.run:
+            silent_ns = at_ns - self.heard_ns
+            both = (
+                header.utc_ns - header.run > silent_ns + SPLIT_NS
+                and self.newest_ns > header.run + SPLIT_NS
+            )
+            self.taken = (0, 0)
+            if self.run and both:
+                self.taken = header.run, min(self.newest_ns, header.utc_ns)
+            self.run, self.newest_ns = header.run, 0
+        self.heard_ns, self.newest_ns = at_ns, max(self.newest_ns, header.utc_ns)
+
+    def twin(self, header: pb.Header | None) -> Refusal | None:
+        """Why a message that is filled in is not taken: it is of a time when another publisher of
+        that name was heard.
+        """
+        if header is None or header.run != self.taken[0] or header.utc_ns >= self.taken[1]:
+            return None
+        wanted = "a time in which no other publisher of this name was heard"
+        return Refusal("twin", "header.utc_ns", str(header.utc_ns), wanted)
 
     def hold(self, arrival: Arrival, most: int, most_bytes: int) -> bool:
         """Keep a live message until a gap is filled; False: there is no room."""
