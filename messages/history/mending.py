@@ -107,6 +107,9 @@ class Mender:
         if arrival.topic.source not in self._sources or arrival.device.endswith(REPLAY_SUFFIX):
             return [arrival]
         stream = self._streams.setdefault((arrival.device, arrival.topic.source), Stream())
+        header = header_of(arrival)
+        if header is not None:
+            stream.heard(header, arrival.at_ns)
         if self._hold and stream.asking:
             if stream.hold(arrival, self._max_held, MAX_HELD_BYTES):
                 return []
@@ -160,7 +163,6 @@ class Mender:
         header = header_of(arrival)
         if header is None:
             return [] if self._known(arrival.payload) else [arrival]
-        stream.heard(header, arrival.at_ns)
         key = self._keys.get((arrival.device, arrival.name))
         if key is None:
             key = self._keys[arrival.device, arrival.name] = KeyState(header.run, header.sequence)

@@ -112,6 +112,19 @@ class KeyState:
 
 
 @dataclass
+class Heard:
+    """What came, live, of one run."""
+
+    run: int = 0
+    at_ns: int = 0  # when the newest came
+    newest_ns: int = 0  # the latest of their own times
+
+    def take(self, header: pb.Header, at_ns: int) -> None:
+        """One more."""
+        self.at_ns, self.newest_ns = at_ns, max(self.newest_ns, header.utc_ns)
+
+
+@dataclass
 class Stream:
     asking: bool = False
     full: bool = False  # holds max_held: the newest were not taken
@@ -119,28 +132,24 @@ class Stream:
     held_bytes: int = 0
     waiting: deque[pb.HistoryQuery] = field(default_factory=deque)
     tried: set[tuple[str, int, int]] = field(default_factory=set)  # beginnings that were asked for
-    run: int = 0  # whose messages came last, live
-    heard_ns: int = 0  # when the newest of them came
-    newest_ns: int = 0  # and its own time
+    live: Heard = field(default_factory=Heard)  # the newest run that is heard, live ...
+    before: Heard = field(default_factory=Heard)  # ... and the one before it
     taken: tuple[int, int] = (0, 0)  # a run, and the time up to which another was heard beside it
 
     def heard(self, header: pb.Header, at_ns: int) -> None:
         """A live message came at at_ns (0: nobody says when). Of two publishers of one name, each
-        heard while the link between them was cut, the time of the one that was heard is taken.
+        heard while the link between them was cut, the time of the one that was heard is taken:
+        the other has spoken for longer than the one has been silent.
         """
-        if not at_ns or not header.run:
+        if not at_ns or not header.run or header.run < self.live.run:
             return
-        if header.run != self.run:
-            silent_ns = at_ns - self.heard_ns
-            both = (
-                header.utc_ns - header.run > silent_ns + SPLIT_NS
-                and self.newest_ns > header.run + SPLIT_NS
-            )
-            self.taken = (0, 0)
-            if self.run and both:
-                self.taken = header.run, min(self.newest_ns, header.utc_ns)
-            self.run, self.newest_ns = header.run, 0
-        self.heard_ns, self.newest_ns = at_ns, max(self.newest_ns, header.utc_ns)
+        if header.run > self.live.run:
+            self.before, self.live = self.live, Heard(header.run)
+        self.live.take(header, at_ns)
+        spoken_ns, silent_ns = header.utc_ns - header.run, at_ns - self.before.at_ns
+        beside_ns = self.before.newest_ns - header.run
+        if self.before.run and min(spoken_ns - silent_ns, beside_ns) > SPLIT_NS:
+            self.taken = header.run, self.before.newest_ns
 
     def twin(self, header: pb.Header | None) -> Refusal | None:
         """Why a message that is filled in is not taken: it is of a time when another publisher of

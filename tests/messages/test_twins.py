@@ -46,9 +46,8 @@ def told(mender: Mender, questions: list, run: int, last: int) -> list:
 def test_the_time_that_was_heard_of_one_is_not_filled_with_the_other(first, before, after, hold):
     """The second began `before` steps after the first, which was heard `first` steps long."""
     assume(before != after)  # it would count on where the other ended
-    questions, refused = [], []
+    other, questions, refused = T0 + before * STEP, [], []
     mender = Mender(questions.append, hold=hold, refuse=lambda *why: refused.append(why))
-    other = T0 + before * STEP
     got = [one for k in range(1, first + 1) for one in heard(mender, T0, k)]
     live = first - before + after + 1
     got += heard(mender, other, live)
