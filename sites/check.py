@@ -100,6 +100,12 @@ def deeds(place: Place, device: str) -> list[Deed]:
         ),
         Deed("say who has the command", tp.HOLDER.key(site, tp.COMMAND), ("procedures",)),
         Deed("order the recorder", orders.RECORDER.key(site, ""), orders_by, "order"),
+        Deed(
+            "change what a service logs",
+            orders.LOG_LEVEL.key(site, tp.RECORDER),
+            orders_by,
+            "order",
+        ),
         Deed("order the board", orders.BOARD.key(site, device), orders_by, "order"),
     ]
 

@@ -10,8 +10,10 @@ from gyrofree.commands import run as logs
 from gyrofree.commands.board import board
 from gyrofree.commands.demo import demo, play
 from gyrofree.commands.installation import alarms, certs, config, site
+from gyrofree.commands.installation.backup import backup, restore
 from gyrofree.commands.installation.completion import answer_the_shell, completion
 from gyrofree.commands.installation.doctor import doctor
+from gyrofree.commands.installation.log_level import log_level
 from gyrofree.commands.installation.orders import orders
 from gyrofree.commands.installation.setup import setup
 from gyrofree.commands.installation.up import up
@@ -66,6 +68,9 @@ for command in (
     play,
     replay,
     doctor,
+    log_level,
+    backup,
+    restore,
     orders,
     completion,
 ):

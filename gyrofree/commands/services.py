@@ -14,6 +14,7 @@ from gyrofree.commands.options import (
     settings_of,
 )
 from gyrofree.config import ConfigError
+from gyrofree.operations.attending import attended
 from gyrofree.running.process import command, run_service
 
 log = logging.getLogger(__name__)
@@ -40,7 +41,7 @@ def router(config: Config = None, verbose: Verbose = False) -> None:
             if telling is not None:
                 telling.undeclare()
 
-    run_service(body, verbose)
+    run_service(body, verbose, attended(settings, "router"))
 
 
 def gateway(config: Config = None, verbose: Verbose = False) -> None:
@@ -55,7 +56,8 @@ def gateway(config: Config = None, verbose: Verbose = False) -> None:
         leave_when_alone(stop)
         service.run(settings.gateway, settings.bus.acting_as("gateway"), stop, keeper)
 
-    guard(lambda keeper: run_service(lambda stop: body(stop, keeper), verbose))
+    who = attended(settings, "gateway")
+    guard(lambda keeper: run_service(lambda stop: body(stop, keeper), verbose, who))
 
 
 def estimator(config: Config = None, verbose: Verbose = False) -> None:
@@ -73,7 +75,7 @@ def estimator(config: Config = None, verbose: Verbose = False) -> None:
         except UnknownEstimator as error:
             raise ConfigError(str(error)) from None
 
-    run_service(body, verbose)
+    run_service(body, verbose, attended(settings, "estimator"))
 
 
 def record(config: Config = None, verbose: Verbose = False) -> None:
@@ -89,7 +91,7 @@ def record(config: Config = None, verbose: Verbose = False) -> None:
         kept = settings.model_dump(mode="json", exclude={"alarms": {"webhook", "mail"}})
         service.run(settings.recorder, settings.bus.acting_as("recorder"), stop, kept)
 
-    run_service(body, verbose)
+    run_service(body, verbose, attended(settings, "recorder"))
 
 
 def procedures(config: Config = None, verbose: Verbose = False) -> None:
@@ -105,7 +107,7 @@ def procedures(config: Config = None, verbose: Verbose = False) -> None:
         except TableError as error:
             raise ConfigError(str(error)) from None
 
-    run_service(body, verbose)
+    run_service(body, verbose, attended(settings, "procedures"))
 
 
 def dashboard(
@@ -141,4 +143,4 @@ def dashboard(
         except (CertificateError, UsersError) as error:
             raise ConfigError(str(error)) from None
 
-    run_service(body, verbose)
+    run_service(body, verbose, attended(settings, "dashboard"))

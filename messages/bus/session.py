@@ -18,9 +18,9 @@ import zenoh
 from google.protobuf.message import Message
 from pydantic import BaseModel, ConfigDict, PrivateAttr
 
-from messages.bus import tls
+from messages.bus import attending, tls
 from messages.bus.faults import BusUnavailable
-from messages.bus.fencing import packed
+from messages.bus.fencing import Fence, packed
 from messages.contract.door import read
 from messages.contract.names import Name
 from messages.contract.topics import REPLAY_SUFFIX, Topic
@@ -132,7 +132,7 @@ def open_router(
     config = _config(settings, "router", mesh)
     if access is not None:
         config.insert_json5("access_control", json.dumps(access))
-    return zenoh.open(config)
+    return attending.opened(zenoh.open(config), settings)
 
 
 def open_client(
@@ -147,7 +147,7 @@ def open_client(
     start, said = time.monotonic(), False
     while True:
         try:
-            return zenoh.open(_config(settings, "client"))
+            return attending.opened(zenoh.open(_config(settings, "client")), settings)
         except zenoh.ZError:
             if stop.is_set() or (end is not None and time.monotonic() > end):
                 raise BusUnavailable(
@@ -213,6 +213,8 @@ class Publishers:
     spool's end; a session may then come later (`attach`): until it does, messages are only kept.
     """
 
+    heard: Callable[[Topic, str, str, Message], None] | None = None  # gets each, for figures
+
     def __init__(
         self, session: zenoh.Session | None, prefix: str, spool: Spool | None = None
     ) -> None:
@@ -269,6 +271,8 @@ class Publishers:
                 header.sequence = self._sequence[key]
             if self._sequence[key] <= self._published.get(key, 0):
                 return
+        if Publishers.heard is not None:
+            Publishers.heard(topic, device, estimator, message)
         payload = message.SerializeToString()
         if self._spool is not None and not device.endswith(REPLAY_SUFFIX):
             name = key.split("/", 2)[2]
@@ -306,12 +310,15 @@ def subscribe(
     prefix: str,
     handler: Callable[[str, M], None],
     device: str = "*",
+    fence: Fence | None = None,
 ) -> zenoh.Subscriber:
     """Call handler(key, message) on Zenoh's thread for each message; handlers only append to a
-    queue.
+    queue. With a fence, for those of the process that serves.
     """
 
     def on_sample(sample: zenoh.Sample) -> None:
+        if fence is not None and not fence.admit(str(sample.key_expr), sample.attachment):
+            return
         message = decode(topic, sample.payload.to_bytes())
         if message is not None:
             handler(str(sample.key_expr), message)
