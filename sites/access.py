@@ -7,17 +7,21 @@ Zenoh refuses silently: a denied message is dropped at the router, and who sent 
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from messages.contract.topics import NOTE
+from messages.contract.names import NAME
+from messages.contract.topics import NOTE, ORDER, clock_key
 from messages.previews.frames import overview_key
 from sites.authority import Issued
 from sites.place import Peer, Place
 from sites.roles import (
     Rights,
+    alive_keys,
     claim_keys,
     join_key,
     lane_key,
     listening,
     order_keys,
+    presence,
+    presence_of,
     preview_keys,
     renew_key,
     rights,
@@ -103,7 +107,7 @@ def rules_of(
     """
     rules, peers = Rules(), {peer.place: peer for peer in place.peers}
     for each in certificates:
-        if each.place == place.place and each.role != "router":
+        if each.place == place.place:  # its router is a client where zenohd routes
             mine = devices.get(each.common_name, each.devices)
             _local(rules, place, each, mine)
         elif each.role == "join":
@@ -122,9 +126,18 @@ def _local(rules: Rules, place: Place, holder: Issued, devices: Iterable[str]) -
         watching = (*listening(place.site), renew_key(place.site))
         said = Rights(ask=tuple(key for key in said.ask if key in watching))
     elif holder.role == "authority" and place.at_home:
-        home = (join_key(place.site), renew_key(place.site), f"{segment_key(place.site)}/**")
-        previews = preview_keys(place.site)
-        said += Rights(put=previews, answer=(*home, overview_key(place.site, "*")))
+        home = (
+            join_key(place.site),
+            renew_key(place.site),
+            f"{segment_key(place.site)}/**",
+            clock_key(place.site),
+            overview_key(place.site, "*"),
+        )
+        said += Rights(put=preview_keys(place.site), answer=home)
+    # a machine of its own says its own name
+    for name in {place.place, holder.common_name.partition(".")[2]}:
+        if NAME.fullmatch(name):
+            said += presence(place.site, name, holder.role)
     rules.allow([holder.common_name], said, [f"{place.site}/**", *preview_keys(place.site)])
 
 
@@ -135,11 +148,15 @@ def _between(rules: Rules, place: Place, peer: Peer, router: str) -> None:
     site = place.site
     seat = peer.seat if place.at_home else place.seat
     asks = (*listening(site), renew_key(site), *(order_keys(site) if seat == "operator" else ()))
-    notes = Rights(put=(NOTE.pattern(site),)) if seat == "operator" else Rights()
-    heard = (*topic_keys(site), *claim_keys(site), *preview_keys(site))
+    said = (NOTE.pattern(site), ORDER.pattern(site)) if seat == "operator" else ()
+    notes = Rights(put=said)
+    heard = (*topic_keys(site), *claim_keys(site), alive_keys(site), *preview_keys(site))
     if place.at_home:
-        rules.allow([router], Rights(ask=asks) + notes, heard)
+        there = presence_of(site, peer.place)
+        rules.allow([router], Rights(ask=asks) + notes + there, heard)
         return
-    said = (*topic_keys(site), *preview_keys(site))
-    home = Rights(put=said, token=claim_keys(site), answer=asks)
-    rules.allow([router], home, [NOTE.pattern(site)] if seat == "operator" else [])
+    token = (*claim_keys(site), alive_keys(site))
+    home = Rights(put=(*topic_keys(site), *preview_keys(site)), token=token, answer=asks)
+    here = presence_of(site, place.place)
+    said = (*said, *here.put, *here.token)
+    rules.allow([router], home, said)

@@ -14,6 +14,7 @@ from pathlib import Path
 import zenoh
 from cryptography import x509
 
+from messages.bus.beating import Beating, tell_time
 from messages.bus.session import BusSettings, open_client
 from messages.bus.tls import TRUSTED
 from sites.authority import DAYS
@@ -53,14 +54,17 @@ def run(
     """
     settings = settings or SiteSettings()
     place = load_place(folder)
-    with open_client(bus, stop) as session:
+    with open_client(bus, stop) as session, Beating(session, bus):
         log.info("place %s of site %s%s", place.place, place.site, ", its home" * place.at_home)
         keeping = threading.Thread(
             target=_keep_certificates, args=(folder, place, session, stop), daemon=True
         )
         keeping.start()
         if place.at_home:
-            declared = declare(session, place, Registrar(folder))
+            declared = [
+                *declare(session, place, Registrar(folder)),
+                tell_time(session, place.site),
+            ]
             serving = Serving(session, place.site, sessions)
             previews = Previews(session, place.site)
 

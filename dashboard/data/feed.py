@@ -17,6 +17,8 @@ from google.protobuf.message import Message
 
 from dashboard.data.store import Store
 from messages.bus.fencing import Fence
+from messages.bus.presence import Watching
+from messages.bus.session import connected
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 from messages.contract.checks import Refusal
@@ -28,7 +30,8 @@ from messages.text import plain
 log = logging.getLogger(__name__)
 
 # POSE and LOCATION repeat what RATE, NAV and GNSS say, for other viewers.
-TOPICS = {topic.name: topic for topic in tp.TOPICS if topic not in (tp.POSE, tp.LOCATION)}
+UNSHOWN = (tp.POSE, tp.LOCATION, tp.HOLDER, tp.ORDER)  # the last two are heard by the desk
+TOPICS = {topic.name: topic for topic in tp.TOPICS if topic not in UNSHOWN}
 QUEUE = 20000  # messages; about 20 s of a busy bench
 QUEUE_BYTES = 64 << 20
 MESSAGE_BYTES = 128 << 10  # of one message; what waits and what is newest has to stay in memory
@@ -37,6 +40,7 @@ PAST_EVERY_S = 1.0  # ... with one message of each topic in this time, s
 FULL_S = 60.0  # ... and in full for the last s of it
 FAILURES_SHOWN = 20  # faults of ours that stand in the log with all that is known of them
 BUSY_S, IDLE_S = 0.02, 0.1  # pause between rounds with and without a browser
+LOOK_S = 0.1  # between two looks at who is there
 
 
 class Past(NamedTuple):
@@ -66,6 +70,7 @@ class Feed:
         self._door = store.door
         self._stop = threading.Event()
         self._received = self._refused = 0
+        self._next_look = 0.0
         self.taken = 0  # messages that went into the store
         self._mender = Mender(self._ask, hold=False, refuse=self._door.refuse)
         self._fence = Fence(self._door.refuse)
@@ -85,12 +90,22 @@ class Feed:
     def _run(self) -> None:
         subscriber = self._session.declare_subscriber(f"{self._prefix}/**", self._on_sample)
         answering = self._fence.declare(self._session, self._prefix)
+        watching = Watching(self._session, self._prefix, self._store.presence)
         log.info("showing %s/*", self._prefix)
         while not self._stop.wait(BUSY_S if self._watched.is_set() else IDLE_S):
             self._drain()
+            self._look()
         subscriber.undeclare()
+        watching.undeclare()
         answering.undeclare()
         self._asker.close()
+
+    def _look(self) -> None:
+        """At who is there, a few times a second, after what waited was taken in."""
+        now = time.monotonic()
+        if now >= self._next_look:
+            self._next_look = now + LOOK_S
+            self._store.presence.look(now, connected(self._session))
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
         """Zenoh's thread."""
@@ -135,13 +150,20 @@ class Feed:
 
     def _take(self, address: tp.Address, payload: bytes, arrived: float) -> None:
         topic, device, estimator = address.topic, address.device, address.estimator
+        if topic is tp.BEAT:
+            beat = self._door.message(address, payload)
+            if beat is not None:
+                self._store.presence.beat(device, estimator, beat)
+            return
         gone = self._store.admit(topic, device, estimator, arrived)
         if gone is None or not self._door.header(address, payload, f"{device}/{topic.name}"):
             return
         if gone:
             self._mender.forget(gone)
             self._known.discard(gone)
-        for ready in self._mender.take(Arrival(topic, device, estimator, payload, 0)):
+        for ready in self._mender.take(
+            Arrival(topic, device, estimator, payload, int(arrived * 1e9))
+        ):
             message = self._message(ready)
             if message is None:
                 continue

@@ -14,12 +14,15 @@ from google.protobuf.message import Message
 from dashboard.data.device import HISTORY_S, Device, Latest
 from dashboard.data.intake import INTAKE
 from dashboard.data.replayed import Replayed
+from messages.bus.presence import Presence
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 from messages.contract.checks import Refusal
 from messages.contract.door import OTHERS, Door
 
-OF_DEVICES = tuple(t for t in tp.TOPICS if t not in (tp.STATUS, tp.REPLAY, tp.LOG))
+OF_DEVICES = tuple(
+    t for t in tp.TOPICS if t not in (tp.STATUS, tp.REPLAY, tp.LOG, tp.HOLDER, tp.ORDER, tp.BEAT)
+)
 LATE_JOIN_S = 2.0  # repaired stretches nearer than this are one
 MARKS = 200  # notes and marks of a device that are drawn
 DEVICES = 64  # remembered; a foreign publisher cannot fill the memory
@@ -45,6 +48,7 @@ class Store:
         self.lock = threading.RLock()
         self.devices: dict[str, Device] = {}
         self.recorder: Latest | None = None
+        self.presence = Presence()
         self.replay = Replayed()
         self.logs: list[tuple[float, str, str]] = []  # arrived, device, text
         self.dropped = 0  # messages the feed could not keep up with

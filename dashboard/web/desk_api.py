@@ -12,7 +12,7 @@ from dashboard.data.alarms import drives
 from dashboard.data.channels import channels
 from dashboard.data.store import Store
 from dashboard.web.auth import Role
-from dashboard.web.front import Asker, asker, front_of, needs
+from dashboard.web.front import Asker, asker, desk_of, front_of, needs
 from dashboard.web.schemas import Lines, Strict
 from dashboard.web.views import LONGEST
 from logs.figures.quantity import HINTS
@@ -149,7 +149,7 @@ def tables(request: Request, who: SignedIn) -> list[TableOut]:
 @routes.post("/devices/{device}/stop", summary="EMERGENCY STOP of its table (operator)")
 def stop(request: Request, device: str, who: Operator) -> StopOut:
     """The table stops at once and the procedure ends; HTTP 503 where that is not certain."""
-    desk = front_of(request).desk
+    desk = desk_of(request, who)
     if desk is None:
         raise HTTPException(503, f"{SWITCH_OFF}: this dashboard has no connection to the bus")
     action = pb.ProcedureCommand.ACTION_STOP

@@ -19,6 +19,7 @@ from sessions.procedure.settings import ProcedureSettings
 log = logging.getLogger(__name__)
 
 ACTION = pb.RecorderCommand
+SELF = pb.OrderBy(seat=pb.Seat(id="procedures", user="procedures", service=True))
 
 
 class ProcedureDesk:
@@ -105,4 +106,4 @@ class ProcedureDesk:
     def _give(self, action: int, **more: str) -> pb.RecorderStatus:
         """Raises OrderError."""
         command = ACTION(action=action, **more)
-        return orders.give(self._session, self._prefix, orders.RECORDER, command)
+        return orders.give(self._session, self._prefix, orders.RECORDER, command, by=SELF)

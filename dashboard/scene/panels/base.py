@@ -183,6 +183,11 @@ class Panel:
         """Inputs that do more than change this browser's own view: a viewer may not use them."""
         return ()
 
+    @property
+    def always(self) -> tuple[Input, ...]:
+        """Of the orders, those that an operator may give whoever has the command."""
+        return ()
+
     def update(self, s: Snapshot) -> None:
         """Bring the page to the state of the snapshot."""
         raise NotImplementedError

@@ -79,6 +79,10 @@ class ProcedurePanel(Guided):
         """Buttons, and what is given with them."""
         return *super().orders, self._choice, self._unit, self._read
 
+    @property
+    def always(self) -> tuple[Input, ...]:
+        return (self._buttons[ACTION.ACTION_STOP],)
+
     @classmethod
     def missing(cls, device: Device) -> str:
         if device.get("procedure") is not None:
