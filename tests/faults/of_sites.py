@@ -11,8 +11,8 @@ from sites.authority import Authority, new_key, pem, private_pem, request_for
 from sites.place import write_identity
 
 SITE = "lab"
-LIFE_S = 14.0  # enough for a service to start with it on a busy machine
-ENDED_S = 4.0  # that it is without one
+LIFE_S = 20.0  # enough for a service to start with it on a busy machine
+ENDED_S = 5.0  # that it is without one
 
 
 def ended(bench: Bench, role: str) -> None:
@@ -26,6 +26,8 @@ def ended(bench: Bench, role: str) -> None:
     if role == "router":
         bench.stop_router()
         bench.start_router()
+    since = time.monotonic_ns()
+    bench.until(lambda: bench.well(since), "bench with the short certificate")
     left = made.not_valid_after_utc - dt.datetime.now(dt.UTC)
     time.sleep(max(0.0, left.total_seconds()) + ENDED_S)
     subprocess.run(
@@ -46,11 +48,15 @@ def of(role: str, *said) -> Scenario:
         f"in mid-session; renewed after {ENDED_S:g} s",
         lambda bench: ended(bench, role),
         said=said,
+        site=SITE,
     )
 
 
+ENDED = Line("its certificate ended", r"\(its certificate ended")
+
 SITES = (
-    of("gateway", Alarmed(f"certificate-{SITE}-gateway")),
-    of("recorder", Line("ended", r"its certificate ended")),
-    of("router"),
+    of("gateway", ENDED, Alarmed(f"certificate-{SITE}-gateway")),
+    of("recorder", ENDED, Alarmed("recorder")),
+    of("estimator", ENDED, Alarmed(f"certificate-{SITE}-estimator")),
+    of("router", Line("the router is gone", r"router \S+ is gone")),
 )
