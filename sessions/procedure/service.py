@@ -31,7 +31,7 @@ from messages.contract.topics import (
 from sessions.procedure import library, seen
 from sessions.procedure.around import Around
 from sessions.procedure.conductor import Conductor
-from sessions.procedure.desk import ProcedureDesk
+from sessions.procedure.desk import ProcedureDesk, if_lost
 from sessions.procedure.driven.description import TableError, described
 from sessions.procedure.driven.table import RateTable, TextTable
 from sessions.procedure.run import Journal, unfinished
@@ -265,6 +265,7 @@ class Service:
         self._publish(device, message)
 
     def _publish(self, device: str, message: pb.ProcedureStatus) -> None:
+        message.if_lost = if_lost(self._tables.get(device))
         message.header.device, message.header.run = device, self._since
         message.header.utc_ns = message.header.utc_ns or time.time_ns()
         self._publishers.put(PROCEDURE, device, message)

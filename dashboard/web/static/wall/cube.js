@@ -1,7 +1,7 @@
 // The board as a cube on a plain canvas, which lasts for days where a graphics context may be lost. Body b: x, y, z; n: north, east, down.
 const VIEW = { azimuth: (35 * Math.PI) / 180, elevation: (24 * Math.PI) / 180 };
 const FACES = [["x", 0, 1, "#56b4e9"], ["x", 0, -1, "#56b4e9"], ["y", 1, 1, "#009e73"], ["y", 1, -1, "#009e73"], ["z", 2, 1, "#e69f00"], ["z", 2, -1, "#e69f00"]];
-const SHORTEST = 0.08, PER_RADPS = 0.35, LONGEST = 1.4; // of the arrow, in half sides
+const SHORTEST = 0.08, PER_RADPS = 0.2, LONGEST = 0.75; // of the arrow, in half sides
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
@@ -25,7 +25,7 @@ export class Cube {
     const ratio = Math.min(devicePixelRatio, 2), width = Math.round(canvas.clientWidth * ratio), height = Math.round(canvas.clientHeight * ratio);
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     c.clearRect(0, 0, width, height);
-    const scale = Math.min(width, height) * 0.26;
+    const scale = Math.min(width, height) * 0.22;
     const at = (v) => [width / 2 + scale * dot(v, RIGHT), height / 2 - scale * dot(v, UP)];
     if (!q) {
       c.fillStyle = "#aab3ba";
@@ -51,7 +51,7 @@ export class Cube {
       c.lineTo(...at(turn(q, corner)));
     }
     c.closePath();
-    c.globalAlpha = 0.35 + 0.5 * facing;
+    c.globalAlpha = 0.6 + 0.4 * facing;
     c.fillStyle = sign > 0 ? colour : "#3a4147";
     c.fill();
     c.globalAlpha = 1;
@@ -71,7 +71,7 @@ export class Cube {
     const size = Math.hypot(...omega);
     if (size < 0.05) return;
     const length = Math.min(SHORTEST + PER_RADPS * size, LONGEST), u = omega.map((v) => v / size);
-    const [x0, y0] = at(u.map((v) => v * 1.2)), [x1, y1] = at(u.map((v) => v * (1.2 + length)));
+    const [x0, y0] = at(u.map((v) => v * 1.1)), [x1, y1] = at(u.map((v) => v * (1.1 + length)));
     const { context: c } = this, angle = Math.atan2(y1 - y0, x1 - x0), head = scale * 0.16;
     c.strokeStyle = c.fillStyle = "#ff6b57";
     c.lineWidth = Math.max(4, scale * 0.045);
