@@ -97,7 +97,7 @@ def rules_of(
     """
     rules, peers = Rules(), {peer.place: peer for peer in place.peers}
     for each in certificates:
-        if each.place == place.place and each.role != "router":
+        if each.place == place.place:  # its router is a client where zenohd routes
             mine = devices.get(each.common_name, each.devices)
             _local(rules, place, each, mine)
         elif each.role == "join":

@@ -78,6 +78,15 @@ def deeds(place: Place, device: str) -> list[Deed]:
         Deed("say what is wrong", tp.ALARM.key(site, device), ("alarms",)),
         Deed("leave a note", tp.NOTE.key(site, device), noting),
         Deed(
+            "say that the gateway runs", tp.BEAT.key(site, place.place, "gateway-1"), ("gateway",)
+        ),
+        Deed(
+            "say that the dashboard runs",
+            tp.BEAT.key(site, place.place, "dashboard-1"),
+            ("dashboard",),
+        ),
+        Deed("say that another place runs", tp.BEAT.key(site, OTHER, "dashboard-1"), ()),
+        Deed(
             "claim to be the gateway",
             f"{tp.claim_key(site, tp.GATEWAY, device)}/1-check",
             ("gateway",),
@@ -91,6 +100,12 @@ def deeds(place: Place, device: str) -> list[Deed]:
         ),
         Deed("say who has the command", tp.HOLDER.key(site, tp.COMMAND), ("procedures",)),
         Deed("order the recorder", orders.RECORDER.key(site, ""), orders_by, "order"),
+        Deed(
+            "change what a service logs",
+            orders.LOG_LEVEL.key(site, tp.RECORDER),
+            orders_by,
+            "order",
+        ),
         Deed("order the board", orders.BOARD.key(site, device), orders_by, "order"),
     ]
 

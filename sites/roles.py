@@ -31,6 +31,7 @@ KINDS = (
     orders.PROCEDURES,
     orders.ALARMS,
     orders.REPLAY,
+    orders.LOG_LEVEL,
     orders.SEAT,
 )
 SAID = (tp.NOTE, tp.MUTE, tp.ORDER)  # by people who order
@@ -75,7 +76,10 @@ def rights(role: str, site: str, devices: Iterable[str] = ()) -> Rights:
         "authority": lambda: _listener(site) + Rights(ask=(renew_key(site),)),
         "join": lambda: Rights(ask=(join_key(site),)),
     }
-    return made.get(role, Rights)()
+    said = made.get(role, Rights)()
+    if role not in SERVICES or role == "operator":
+        return said
+    return said + Rights(answer=(orders.LOG_LEVEL.key(site, role),))
 
 
 def join_key(site: str) -> str:

@@ -161,7 +161,9 @@ class Feed:
         if gone:
             self._mender.forget(gone)
             self._known.discard(gone)
-        for ready in self._mender.take(Arrival(topic, device, estimator, payload, 0)):
+        for ready in self._mender.take(
+            Arrival(topic, device, estimator, payload, int(arrived * 1e9))
+        ):
             message = self._message(ready)
             if message is None:
                 continue

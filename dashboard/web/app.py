@@ -32,7 +32,7 @@ from dashboard.web.front import Front
 from dashboard.web.guard import Guard
 from dashboard.web.map import routes as map_routes
 from dashboard.web.places import routes as place_routes
-from dashboard.web.programs import live_api, users_page
+from dashboard.web.programs import live_api, metrics, users_page
 from dashboard.web.users import UsersError
 from dashboard.web.wall import routes as wall_routes
 
@@ -60,6 +60,7 @@ def create_app(front: Front) -> ASGIApp:
     app.include_router(spectrum_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(compare_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(alarm_routes.routes, responses={401: {"description": "not signed in"}})
+    app.include_router(metrics.routes, responses={401: {"description": "not signed in"}})
     app.include_router(place_routes.routes, responses={401: {"description": "not signed in"}})
     app.include_router(command_routes.routes, responses={401: {"description": "not signed in"}})
     app.include_router(pages.routes)

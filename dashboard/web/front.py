@@ -24,6 +24,8 @@ from dashboard.web.views import Views
 from messages.contract import gyrofree_pb2 as pb
 from sessions.library.catalogue import Catalogue
 
+METRICS = "/metrics"  # asked for by programs only, as all below /api/ is
+
 
 @dataclass
 class Front:
@@ -99,7 +101,8 @@ def asker(request: Request) -> Asker:
     """Who asks: by his cookie, or for REST by an API token in `Authorization: Bearer`; HTTP 401
     for nobody.
     """
-    if "authorization" in request.headers and request.url.path.startswith("/api/"):
+    path = request.url.path
+    if "authorization" in request.headers and (path.startswith("/api/") or path == METRICS):
         return _by_token(request)
     front = front_of(request)
     found = front.gate.session_of(request)

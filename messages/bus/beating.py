@@ -141,7 +141,8 @@ class Beating:
             if check(said):
                 self._offset.refused += 1
             else:
-                self._offset.take(Exchange(t1, said.received_ns, said.answered_ns, t4))
+                times = said.received_ns, said.answered_ns
+                self._offset.take(Exchange(t1, *times, t4, said.wall_ns))
 
         self._session.get(
             self._clock_key,
@@ -156,8 +157,9 @@ def tell_time(session: zenoh.Session, prefix: str) -> "zenoh.Queryable[None]":
     """Answer, by this machine's clock, what time it is at the site."""
 
     def on_query(query: zenoh.Query) -> None:
-        received = time.time_ns()
-        said = pb.ClockReply(received_ns=received, answered_ns=max(received, time.time_ns()))
+        received = elapsed_ns()
+        said = pb.ClockReply(received_ns=received, wall_ns=time.time_ns() - elapsed_ns())
+        said.answered_ns = elapsed_ns()
         query.reply(clock_key(prefix), said.SerializeToString(), express=True)
 
     return session.declare_queryable(clock_key(prefix), on_query)

@@ -132,6 +132,15 @@ SEAT = Kind(
     tp.PROCEDURES,
     lambda command: False,  # noqa: ARG005 it is about the command itself
 )
+LOG_LEVEL = Kind(
+    "the service",
+    pb.LogLevelCommand,
+    pb.Reply,
+    "see that it runs and reaches the router",
+    3.0,
+    lambda prefix, device: control_key(prefix, device, "log-level"),
+    "process",  # nobody claims to be the only one
+)
 
 
 def give(

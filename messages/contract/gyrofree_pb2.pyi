@@ -1677,6 +1677,16 @@ class AlarmReply(_message.Message):
     trouble: str
     def __init__(self, ok: _Optional[bool] = ..., message: _Optional[str] = ..., alarms: _Optional[_Iterable[_Union[Alarm, _Mapping]]] = ..., limits: _Optional[_Iterable[_Union[AlarmLimit, _Mapping]]] = ..., history: _Optional[_Iterable[_Union[AlarmReply.Event, _Mapping]]] = ..., ways: _Optional[_Iterable[_Union[AlarmReply.Way, _Mapping]]] = ..., trouble: _Optional[str] = ...) -> None: ...
 
+class LogLevelCommand(_message.Message):
+    __slots__ = ("level", "seconds", "user")
+    LEVEL_FIELD_NUMBER: _ClassVar[int]
+    SECONDS_FIELD_NUMBER: _ClassVar[int]
+    USER_FIELD_NUMBER: _ClassVar[int]
+    level: str
+    seconds: float
+    user: str
+    def __init__(self, level: _Optional[str] = ..., seconds: _Optional[float] = ..., user: _Optional[str] = ...) -> None: ...
+
 class Beat(_message.Message):
     __slots__ = ("header", "role", "session", "since_utc_ns", "devices", "viewers", "leaving", "certificate_ends_utc_ns", "certificate_life_s", "certificate", "clock_ahead_s", "clock_bound_s", "version")
     class Viewers(_message.Message):
@@ -1715,9 +1725,11 @@ class Beat(_message.Message):
     def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., role: _Optional[str] = ..., session: _Optional[str] = ..., since_utc_ns: _Optional[int] = ..., devices: _Optional[_Iterable[str]] = ..., viewers: _Optional[_Iterable[_Union[Beat.Viewers, _Mapping]]] = ..., leaving: _Optional[bool] = ..., certificate_ends_utc_ns: _Optional[int] = ..., certificate_life_s: _Optional[float] = ..., certificate: _Optional[str] = ..., clock_ahead_s: _Optional[float] = ..., clock_bound_s: _Optional[float] = ..., version: _Optional[str] = ...) -> None: ...
 
 class ClockReply(_message.Message):
-    __slots__ = ("received_ns", "answered_ns")
+    __slots__ = ("received_ns", "answered_ns", "wall_ns")
     RECEIVED_NS_FIELD_NUMBER: _ClassVar[int]
     ANSWERED_NS_FIELD_NUMBER: _ClassVar[int]
+    WALL_NS_FIELD_NUMBER: _ClassVar[int]
     received_ns: int
     answered_ns: int
-    def __init__(self, received_ns: _Optional[int] = ..., answered_ns: _Optional[int] = ...) -> None: ...
+    wall_ns: int
+    def __init__(self, received_ns: _Optional[int] = ..., answered_ns: _Optional[int] = ..., wall_ns: _Optional[int] = ...) -> None: ...

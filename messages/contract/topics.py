@@ -21,9 +21,10 @@ M = TypeVar("M", bound=Message)
 REPLAY_SUFFIX = "-replay"  # of a device's name when a recording of it is played on the bus
 RECORDER = "recorder"  # the device name under which the recorder speaks
 
-# processes by the topics' `source`: those that keep what they publish, and all of which one serves
+# processes by the topics' `source`; those that keep what they publish, and all of which one serves
 GATEWAY, ESTIMATES, PROCEDURES = "gateway", "estimator", "procedures"
 ALARMS = "alarms"
+KEEPING = (GATEWAY, ESTIMATES, PROCEDURES, ALARMS)
 COMMAND = "command"  # the device name under which it is said who has the command, and orders are
 CLAIMED = (GATEWAY, ESTIMATES, PROCEDURES, RECORDER, "replay", ALARMS)
 

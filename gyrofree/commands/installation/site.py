@@ -15,6 +15,7 @@ from gyrofree.commands.installation.site_status import site_status
 from gyrofree.commands.options import AsJson, Config, Verbose, say, settings_of, show_table
 from gyrofree.commands.parser import Commands, output_folder
 from gyrofree.config import DEFAULT_PATH, ConfigError, Settings
+from gyrofree.operations.attending import attended
 from gyrofree.running.process import (
     EXIT_CONFIG,
     EXIT_FAILED,
@@ -254,7 +255,7 @@ def site_serve(config: Config = None, verbose: Verbose = False) -> None:
         except SiteError as error:
             raise ConfigError(str(error)) from None
 
-    run_service(body, verbose)
+    run_service(body, verbose, attended(settings, "authority"))
 
 
 def _folder(settings: Settings) -> Path:
