@@ -85,7 +85,7 @@ class Service:
         self._orders: deque[orders.Order[COMMAND, pb.Reply]] = deque()
         self._due: dict[str, float] = {}
         self._around = Around(session, prefix, lambda name: self._devices.setdefault(name, 0.0))
-        self._keeper = Keeper(session, prefix, settings.root, self._publishers)
+        self._keeper = Keeper(session, prefix, settings.root, number)
         self._taking = orders.take(session, prefix, orders.PROCEDURES, self._on_order, "*")
 
     # --- on Zenoh's threads

@@ -38,9 +38,27 @@ def speaking(store, omega=(0.1, -0.2, 3.0), **more):
     return store
 
 
+@contextlib.contextmanager
+def spoken(**more):
+    """A store into which a board speaks until the block ends, or until it is told to be quiet."""
+    store, quiet = speaking(Store(), **more), threading.Event()
+
+    def speak():
+        while not quiet.wait(0.02):
+            speaking(store, **more)
+
+    speaker = threading.Thread(target=speak)
+    speaker.start()
+    try:
+        yield store, lambda: (quiet.set(), speaker.join())
+    finally:
+        quiet.set()
+        speaker.join()
+
+
 @pytest.fixture
 def door(tmp_path):
-    with open_door(tmp_path, scene=False, store=speaking(Store())) as served:
+    with spoken() as (store, _), open_door(tmp_path, scene=False, store=store) as served:
         yield served
 
 
@@ -141,8 +159,11 @@ def test_only_an_admin_makes_one_and_a_program_gets_in_nowhere_by_it(door):
     ],
 )
 def test_no_digit_is_shown_that_is_not_known(tmp_path, more, values, notes):
-    store = speaking(Store(), **more)
-    with open_door(tmp_path, scene=False, store=store) as door, door.client("vera") as client:
+    with (
+        spoken(**more) as (store, _),
+        open_door(tmp_path, scene=False, store=store) as door,
+        door.client("vera") as client,
+    ):
         rows = events(client, ("state",))["state"]["rows"]
     assert [row["value"] for row in rows] == values
     assert [row["note"] for row in rows] == notes
@@ -166,15 +187,11 @@ def test_a_board_that_is_silent_is_old_although_alarms_speak_of_it(tmp_path):
 def test_nothing_grows_on_a_wall_and_it_comes_back_by_itself(tmp_path, chromium, monkeypatch):
     monkeypatch.setattr(routes, "POSES_S", 0.002)
     monkeypatch.setattr(routes, "STATE_S", 0.002)
-    store, quiet = speaking(Store()), threading.Event()
-
-    def speak():
-        while not quiet.wait(0.02):
-            speaking(store)
-
-    speaker = threading.Thread(target=speak)
-    speaker.start()
-    with open_door(tmp_path, scene=False, store=store) as door, door.client("anna") as admin:
+    with (
+        spoken() as (store, quiet),
+        open_door(tmp_path, scene=False, store=store) as door,
+        door.client("anna") as admin,
+    ):
         token = link_of(door, admin)
         page = chromium.new_page(viewport={"width": 1920, "height": 1080})
         page.goto(f"{door.url}/wall/open#{token}")
@@ -203,8 +220,7 @@ def test_nothing_grows_on_a_wall_and_it_comes_back_by_itself(tmp_path, chromium,
         assert after["Nodes"] <= before["Nodes"] + 20, (before, after)
         assert after["JSEventListeners"] <= before["JSEventListeners"] + 5
         assert after["JSHeapUsedSize"] < before["JSHeapUsedSize"] + 400_000, (before, after)
-        quiet.set()
-        speaker.join()
+        quiet()
         # a silent board is said, and dimmed
         for latest in store.devices["cube"].latest.values():
             latest.arrived -= 60.0
