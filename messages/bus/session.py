@@ -53,15 +53,18 @@ def open_router(
 
 
 def open_client(
-    settings: BusSettings, stop: threading.Event | None = None, timeout_s: float | None = None
+    settings: BusSettings,
+    stop: threading.Event | None = None,
+    timeout_s: float | None = None,
+    warn: bool = True,
 ) -> zenoh.Session:
-    """A connected client session; waits for the router, for ever by default.
+    """A connected client session; waits for the router, for ever by default. warn: say so.
 
     Raises BusUnavailable after timeout_s or when `stop` is set first.
     """
     stop = stop or threading.Event()
     end = None if timeout_s is None else time.monotonic() + timeout_s
-    start, said = time.monotonic(), False
+    start, said = time.monotonic(), not warn
     while True:
         try:
             return attending.opened(zenoh.open(_config(settings, "client")), settings)
@@ -95,11 +98,16 @@ class LateSession:
     hear it.
     """
 
-    def __init__(self, settings: BusSettings, opened: Callable[[zenoh.Session], object]) -> None:
+    def __init__(
+        self,
+        settings: BusSettings,
+        opened: Callable[[zenoh.Session], object],
+        warn: bool = True,
+    ) -> None:
         """`opened` gets the session, on a thread of its own; what it returns is kept as long as
-        this is.
+        this is. warn: say that the router does not answer.
         """
-        self._settings, self._opened = settings, opened
+        self._settings, self._opened, self._warn = settings, opened, warn
         self._session: zenoh.Session | None = None
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._open, name="late session", daemon=True)
@@ -107,7 +115,7 @@ class LateSession:
 
     def _open(self) -> None:
         try:
-            self._session = open_client(self._settings, self._closing)
+            self._session = open_client(self._settings, self._closing, warn=self._warn)
         except BusUnavailable:
             return
         self._kept = self._opened(self._session)
