@@ -18,10 +18,13 @@ from messages.contract.topics import GATEWAY, check_name
 
 FROZEN_S = 1.5  # without a beat, of which there are two a second
 SETTLE_S = 5.0  # after a router came back, for all others to find it too
+DEAF_S = 0.75  # without a beat of anybody, of several: it is our router that is stuck, or we are
+AGAIN_S = 1.0  # after that, for the next beat of each
 LOOK_S = 0.25  # the longest time between two looks that counts
 ENDED_S = 10.0  # one that ended as it should is listed for so long
 GONE_S = 3600.0  # and one that went without a word
 MOST = 512  # processes
+ROUTER = "router"  # role
 
 
 class State(Enum):
@@ -115,8 +118,8 @@ class Presence:
         self.now_s = 0.0  # by the watch
         self._looked: float | None = None
         self._settled_s = -SETTLE_S  # since when there is a router
-        self._connected = True
-        self._lock = threading.Lock()
+        self._connected, self._deaf, self._heard_s = True, False, 0.0
+        self._lock = threading.RLock()
 
     # --- what is heard
 
@@ -126,6 +129,8 @@ class Presence:
             one = self._process(place, name)
             if one is not None:
                 one.beat, one.heard_s, one.beats = beat, self.now_s, one.beats + 1
+                if not self._is_own(one):
+                    self._heard_s = self.now_s
 
     def token(self, key: str, there: bool) -> None:
         """Zenoh's thread: a token of a process (alive_key) came or went."""
@@ -160,9 +165,10 @@ class Presence:
             self._connected = connected
             if connected:
                 self.now_s += min(max(passed, 0.0), LOOK_S)
-            changes = []
+            self._listen()
+            changes, here = [], self.here if self._deaf else ""
             for key, one in list(self.processes.items()):
-                state = self._judge(one)
+                state = self._judge(one, here)
                 if state is not one.state:
                     changes.append(Change(one, one.state))
                     one.froze = state is State.GONE and one.state is State.FROZEN
@@ -171,7 +177,21 @@ class Presence:
                     del self.processes[key]
             return changes
 
-    def _judge(self, one: Process) -> State:
+    def _is_own(self, one: Process) -> bool:
+        return bool(self.own) and one.beat.session == self.own
+
+    def _listen(self) -> None:
+        """Is anybody heard at all? Not, where several are there: none of them is to blame."""
+        others = [
+            one
+            for one in self.processes.values()
+            if one.token and not one.beat.leaving and not self._is_own(one)
+        ]
+        was, self._deaf = self._deaf, len(others) > 1 and self.now_s - self._heard_s > DEAF_S
+        if was and not self._deaf:
+            self._settled_s = max(self._settled_s, self.now_s - SETTLE_S + AGAIN_S)
+
+    def _judge(self, one: Process, here: str) -> State:
         if not self._connected:
             return State.UNKNOWN if one.state is not State.ENDED else State.ENDED
         if one.beat.leaving:
@@ -179,7 +199,8 @@ class Presence:
         silent = self.now_s - one.heard_s > FROZEN_S
         if not silent:
             return State.RUNNING
-        if self.now_s - self._settled_s < SETTLE_S:
+        stuck = self._deaf and (one.role, one.place) != (ROUTER, here)
+        if stuck or self.now_s - self._settled_s < SETTLE_S:
             return one.state if one.state is not State.RUNNING else State.UNKNOWN
         return State.FROZEN if one.token else State.GONE
 
@@ -200,7 +221,7 @@ class Presence:
     @property
     def sees(self) -> bool:
         """Can it be told now who is there?"""
-        return self._connected and self.now_s - self._settled_s >= SETTLE_S
+        return self._connected and not self._deaf and self.now_s - self._settled_s >= SETTLE_S
 
     def all(self) -> list[Process]:
         """By place and role."""
