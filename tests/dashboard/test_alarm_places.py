@@ -90,7 +90,7 @@ def settle(bench: Bench, **office: object) -> None:
 def test_a_frozen_service_and_one_that_is_gone_are_alarms_on_the_page_and_in_the_service(bench):
     settle(bench)
     assert not bench.found() and not bench_alarms(bench.store)
-    for _ in range(4):  # the gateway says nothing any more
+    for _ in range(7):  # the gateway says nothing any more
         bench.passes(0.5)
         for place, role in (("lab", "router"), ("office", "dashboard"), ("office", "router")):
             bench.beats(place, role)
