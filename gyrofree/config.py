@@ -22,6 +22,7 @@ from messages.bus.session import BusSettings
 from messages.setting import setting
 from sessions.procedure.settings import ProcedureSettings
 from sessions.recording.settings import RecorderSettings
+from sites.settings import SiteSettings
 
 DEFAULT_PATH = Path("gyrofree.toml")
 
@@ -44,6 +45,7 @@ class Settings(BaseModel):
     )
     alarms: AlarmSettings = setting(AlarmSettings(), "What is an alarm, and who is told")
     dashboard: DashboardSettings = setting(DashboardSettings(), "The page in the browser")
+    site: SiteSettings = setting(SiteSettings(), "What home does for places that watch it")
     log: LogSettings = setting(LogSettings(), "What the services write on stderr")
     metrics: MetricsSettings = setting(MetricsSettings(), "Figures for Prometheus")
 

@@ -18,6 +18,7 @@ import zenoh
 from messages.bus import orders
 from messages.bus.session import BusSettings, open_client, open_router
 from messages.contract import topics as tp
+from messages.previews.frames import RATES, frame_key
 from sites.place import Place
 
 WAIT_S = 1.0  # for what was sent to arrive
@@ -98,6 +99,11 @@ def deeds(place: Place, device: str) -> list[Deed]:
             ("estimator",),
             "token",
         ),
+        Deed(
+            "publish previews",
+            frame_key(site, device, RATES[0]),
+            ("authority",) if place.at_home else (),
+        ),
         Deed("say who has the command", tp.HOLDER.key(site, tp.COMMAND), ("procedures",)),
         Deed("order the recorder", orders.RECORDER.key(site, ""), orders_by, "order"),
         Deed(
@@ -120,9 +126,10 @@ def try_all(
     roles, tried = [role for role in roles if role not in ("router", "join")], deeds(place, device)
     with open_router(bus.acting_as("router"), access) as router:
         # the router's own session hears all that passed the rules on their way in
-        watch = router.declare_subscriber(
-            f"{place.site}/**", lambda sample: heard.add(sample.payload.to_string())
-        )
+        watches = [
+            router.declare_subscriber(key, lambda sample: heard.add(sample.payload.to_string()))
+            for key in (f"{place.site}/**", frame_key(place.site, "*", "*"))
+        ]
         alive = router.liveliness().declare_subscriber(
             f"{place.site}/**", lambda sample: heard.add(f"token {sample.key_expr}")
         )
@@ -138,7 +145,7 @@ def try_all(
             }
             kept = [_try(session, role, tried) for role, session in sessions.items()]
             time.sleep(WAIT_S)
-        for one in (watch, alive, *answers):
+        for one in (*watches, alive, *answers):
             one.undeclare()
         del kept
     return [

@@ -42,6 +42,7 @@ M = TypeVar("M", bound=BaseModel)
 Text = Field(max_length=8_000)
 
 log = logging.getLogger(__name__)
+CALLING = ("router", "authority")  # at home, those who connect to other places
 
 
 class JoinRequest(BaseModel):
@@ -204,13 +205,13 @@ def known_here(folder: Path, place: Place) -> list[Issued]:
 
 
 def _standing(authority: Authority, place: str, home: str) -> list[Issued]:
-    """What a place has to know: its own certificates and that of home's router."""
+    """What a place has to know: its own certificates, and those of home that call there."""
     now = dt.datetime.now(dt.UTC)
     return [
         each
         for each in authority.register()
         if each.stands(now)
-        and (each.place == place or (each.place == home and each.role == "router"))
+        and (each.place == place or (each.place == home and each.role in CALLING))
     ]
 
 

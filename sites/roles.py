@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from messages.bus import orders
 from messages.contract import topics as tp
 from messages.contract.topics import GATEWAY, RECORDER, TOPICS, check_name
+from messages.previews.frames import frame_key, overview_key
 
 SERVICES = (
     "router",
@@ -34,6 +35,7 @@ KINDS = (
     orders.LOG_LEVEL,
     orders.SEAT,
 )
+SEGMENTS = "/segment/"  # of a key: what stands behind it is asked for
 SAID = (tp.NOTE, tp.MUTE, tp.ORDER)  # by people who order
 REPLAYED = f"$*{tp.REPLAY_SUFFIX}"  # of a device's name: any device that is a replay
 
@@ -94,7 +96,12 @@ def renew_key(site: str) -> str:
 
 def segment_key(site: str) -> str:
     """Below which home answers about its recordings."""
-    return f"{check_name(site)}/{RECORDER}/segment"
+    return f"{check_name(site)}/{RECORDER}{SEGMENTS}".rstrip("/")
+
+
+def lane_key(site: str, number: int | str) -> str:
+    """Below which home answers on one of its lanes (sites/lanes.py); `*` stands for any."""
+    return f"{check_name(site)}/@lane/{number}"
 
 
 def listening(site: str) -> tuple[str, ...]:
@@ -104,8 +111,15 @@ def listening(site: str) -> tuple[str, ...]:
         tp.published_key(site, "*", "*"),
         tp.fence_key(site, "*"),
         f"{segment_key(site)}/**",
+        overview_key(site, "*"),
+        f"{lane_key(site, '*')}/**",
         tp.clock_key(site),
     )
+
+
+def preview_keys(site: str) -> tuple[str, ...]:
+    """Frames of every device at every rate; no `**` matches them."""
+    return (frame_key(site, "*", "*"),)
 
 
 def order_keys(site: str) -> tuple[str, ...]:

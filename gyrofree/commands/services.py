@@ -4,7 +4,8 @@
 
 import logging
 import threading
-from typing import Annotated
+from collections.abc import Callable
+from typing import Annotated, Any
 
 import typer
 
@@ -25,21 +26,33 @@ def router(config: Config = None, verbose: Verbose = False) -> None:
     settings = settings_of(config)
 
     def body(stop: threading.Event) -> None:
+        from gyrofree.running.supervisor import die_with_parent
         from gyrofree.setup.site import router_rules
         from messages.bus.beating import Beating, tell_time
         from messages.bus.session import open_router
+        from messages.bus.zenohd import Zenohd
 
         rules, mesh = router_rules(settings)
         bus = settings.bus.acting_as("router")
-        with open_router(bus, rules, mesh) as session, Beating(session, bus):
+
+        def serve(session: Any, wait: Callable[[], object]) -> None:
             # at a site its home tells the time; who is none asks the router
             telling = tell_time(session, bus.prefix) if bus.tls is None else None
-            log.info("router listens on %s", ", ".join(settings.bus.listen))
-            if mesh:
-                log.info("and calls %s", ", ".join(mesh))
-            stop.wait()
+            with Beating(session, bus):
+                log.info("router listens on %s", ", ".join(settings.bus.listen))
+                if mesh:
+                    log.info("and calls %s", ", ".join(mesh))
+                wait()
             if telling is not None:
                 telling.undeclare()
+
+        if bus.zenohd is None:
+            with open_router(bus, rules, mesh) as session:
+                serve(session, stop.wait)
+            return
+        with Zenohd(bus, rules, mesh, stop, die_with_parent) as program:
+            log.info("%s routes", bus.zenohd)
+            serve(program.session, program.wait)
 
     run_service(body, verbose, attended(settings, "router"))
 

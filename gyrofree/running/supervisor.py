@@ -55,7 +55,7 @@ class Child:
     )
 
 
-def _die_with_parent() -> None:
+def die_with_parent() -> None:
     """Ask Linux for SIGTERM when the supervisor is gone, however it went."""
     ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
@@ -173,7 +173,7 @@ class Supervisor:
             | {FORMAT: "json" if self.as_json else "text"},
             # Ctrl-C reaches the supervisor alone, which then ends them in order
             start_new_session=True,
-            preexec_fn=_die_with_parent,
+            preexec_fn=die_with_parent,
         )
         reader = threading.Thread(target=self._read, args=(child, child.process), daemon=True)
         reader.start()

@@ -12,13 +12,13 @@ from messages.bus import orders
 from messages.bus.claiming import Claim, Claimant, newest
 from messages.bus.fencing import Fence
 from messages.bus.session import (
-    LARGEST,
     BusSettings,
     Publishers,
     connected,
     open_client,
     open_router,
 )
+from messages.bus.settings import LARGEST
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import Refusal
 from messages.contract.topics import (

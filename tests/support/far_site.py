@@ -25,9 +25,6 @@ BOARD = f"""
 name = "{DEVICE}"
 port = "board"
 layout = "cube"
-
-[procedures]
-root = "var/procedures"
 """
 
 
@@ -78,7 +75,8 @@ class FarSite:
 def far_site(folder: Path, line: Line, settings: str = "", office: str = "") -> Iterator[FarSite]:
     """Made and joined as docs/sites.md says, with `gyrofree up` at both ends.
 
-    settings, office: further lines of the lab's and the office's gyrofree.toml. Raises NoNamespaces.
+    settings, office: further lines of the gyrofree.toml of the lab and of the office. Raises
+    NoNamespaces.
     """
     with far_link(Line()) as link:
         made = FarSite(link, folder / "lab", folder / "office", [])

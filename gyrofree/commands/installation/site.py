@@ -251,7 +251,8 @@ def site_serve(config: Config = None, verbose: Verbose = False) -> None:
 
         try:
             sessions = Path(settings.recorder.root)
-            service.run(folder, sessions, settings.bus.acting_as("authority"), stop)
+            bus = settings.bus.acting_as("authority")
+            service.run(folder, sessions, bus, stop, settings.site)
         except SiteError as error:
             raise ConfigError(str(error)) from None
 
