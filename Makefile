@@ -7,6 +7,7 @@
 # make fuzz   libFuzzer on the board's decoder and commands (SECONDS=60); make fuzz-web hostile requests to the page
 # make wheel  dist/gyrofree-*.whl, which installs and runs where there is no compiler
 # make site   the documents as a site in build/site, links checked; make pictures takes its pictures anew
+# make sbom   what the product is made of, build/sbom.json; make audit asks for known vulnerabilities of it
 # make bench  the figures of README and docs, one JSON line each
 PYTHON ?= python3
 SOURCE ?= table
@@ -133,6 +134,20 @@ pictures: setup dev system-packages
 
 messages: dev
 	$(BIN)/python -m grpc_tools.protoc -Imessages/contract --python_out=messages/contract --pyi_out=messages/contract messages/contract/gyrofree.proto
+
+# What the product is made of, from the lock: CycloneDX JSON.
+sbom: dev
+	@mkdir -p build && $(BIN)/python -P deploy/sbom.py > build/sbom.json
+	@echo "build/sbom.json"
+
+# Known vulnerabilities of what the lock names; its packages have an environment of their own.
+.make/audit: requirements/audit.txt | .make/venv
+	@rm -rf .make/audit && $(PYTHON) -m venv .make/audit
+	@.make/audit/bin/python -m pip --disable-pip-version-check install --quiet --no-deps --require-hashes -r requirements/audit.txt
+	@touch $@
+
+audit: .make/audit
+	@sh deploy/audit.sh .make/audit/bin/pip-audit
 
 compose-test:
 	bash deploy/compose-test.sh

@@ -34,6 +34,7 @@ from dashboard.web.map import routes as map_routes
 from dashboard.web.places import routes as place_routes
 from dashboard.web.programs import live_api, metrics, users_page
 from dashboard.web.users import UsersError
+from dashboard.web.wall import routes as wall_routes
 
 STATIC = Path(__file__).parent / "static"
 
@@ -45,6 +46,7 @@ def create_app(front: Front) -> ASGIApp:
     )
     app.state.front = front
     app.state.listeners = Counter()  # user -> open streams
+    app.state.walls = Counter()  # user -> open wall displays
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
     app.include_router(
         proxy.router(front.settings, front.gate, front.scene_port, front.open_labels, front.seats)
@@ -64,6 +66,7 @@ def create_app(front: Front) -> ASGIApp:
     app.include_router(pages.routes)
     app.include_router(session_pages.routes)
     app.include_router(users_page.routes)
+    app.include_router(wall_routes.routes)
     app.include_router(account_pages.routes)
     app.include_router(provider_pages.router(front.gate))
     app.include_router(first_pages.routes)

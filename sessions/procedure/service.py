@@ -32,7 +32,7 @@ from messages.history.keeping import KeptPublishers
 from sessions.procedure import library, seen
 from sessions.procedure.around import Around
 from sessions.procedure.conductor import Conductor
-from sessions.procedure.desk import ProcedureDesk
+from sessions.procedure.desk import ProcedureDesk, if_lost
 from sessions.procedure.driven.description import TableError, described
 from sessions.procedure.driven.table import RateTable, TextTable
 from sessions.procedure.run import Journal, unfinished
@@ -85,7 +85,7 @@ class Service:
         self._orders: deque[orders.Order[COMMAND, pb.Reply]] = deque()
         self._due: dict[str, float] = {}
         self._around = Around(session, prefix, lambda name: self._devices.setdefault(name, 0.0))
-        self._keeper = Keeper(session, prefix, settings.root, self._publishers)
+        self._keeper = Keeper(session, prefix, settings.root, number)
         self._taking = orders.take(session, prefix, orders.PROCEDURES, self._on_order, "*")
 
     # --- on Zenoh's threads
@@ -268,6 +268,7 @@ class Service:
         self._publish(device, message)
 
     def _publish(self, device: str, message: pb.ProcedureStatus) -> None:
+        message.if_lost = if_lost(self._tables.get(device))
         message.header.device, message.header.run = device, self._publishers.run
         message.header.utc_ns = message.header.utc_ns or time.time_ns()
         self._publishers.put(PROCEDURE, device, message)

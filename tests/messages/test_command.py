@@ -14,7 +14,7 @@ from messages.bus.command import state
 from messages.bus.command.history import KEPT, History
 from messages.bus.command.keeper import Keeper
 from messages.bus.command.state import Held, Refusal, Seat
-from messages.bus.session import BusSettings, Publishers, open_client, open_router
+from messages.bus.session import BusSettings, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
 
 SEATS = [Seat(f"s{n}", f"user{n}", "lab", admin=n == 2) for n in range(3)]
@@ -109,7 +109,7 @@ class Site:
         self.root = self.pages[1].of(pb.Seat(id="s-root", user="root", admin=True))
 
     def new_keeper(self):
-        return Keeper(self.session, "t", self.folder, Publishers(self.session, "t"))
+        return Keeper(self.session, "t", self.folder)
 
     def here(self, seat):
         return seat in self.alive

@@ -35,11 +35,10 @@ Asked = orders.Order[pb.SeatCommand, pb.SeatReply]
 class Keeper:
     """One life; step() is called a few times a second, by one thread."""
 
-    def __init__(
-        self, session: zenoh.Session, prefix: str, folder: Path, publishers: Publishers
-    ) -> None:
-        """publishers: of who serves, so that what is said here is believed as his."""
-        self._publishers, self._file = publishers, folder / "command.json"
+    def __init__(self, session: zenoh.Session, prefix: str, folder: Path, number: int = 0) -> None:
+        """number: of the claim of who serves, so that what is said here is believed as his."""
+        self._publishers, self._file = Publishers(session, prefix), folder / "command.json"
+        self._publishers.number = number
         self._lock = threading.Lock()
         self._history = History(folder / "orders.jsonl")
         self._held = _load(self._file)
