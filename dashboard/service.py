@@ -149,14 +149,16 @@ def run(
     first_run: FirstRun | None = None,
     watching: str = "",
     place: str = "",
+    afar: bool = False,
 ) -> None:
     """The dashboard until `stop` is set.
 
     `replay` starts replays for the sessions page (control.ProcessReplay); without it the page has
     no such button. `jobs` makes reports and exports in the background; `first_run` asks an
     administrator for the first board. `watching`: why nobody here may give orders. `place`: of a
-    site, this one. Raises PortTaken when the port or viser's is in use, CertificateError,
-    UsersError for a damaged users file, BusUnavailable when it is stopped before a router answers.
+    site, this one. `afar`: the boards are at another place, over a link that may be slow. Raises
+    PortTaken when the port or viser's is in use, CertificateError, UsersError for a damaged users
+    file, BusUnavailable when it is stopped before a router answers.
     """
     from dashboard.scene import (
         service as scene,
@@ -182,7 +184,8 @@ def run(
                 handle = scene.start(settings, store, desk, watched)
             except scene.SceneError as error:
                 raise PortTaken(errno.EADDRINUSE, str(error)) from None
-            feed = Feed(session, bus.prefix, store, watched)
+            live = settings.live if afar else "full"
+            feed = Feed(session, bus.prefix, store, watched, live=live, highest=settings.preview_hz)
             front = Front(
                 settings=settings,
                 gate=Gate(settings, UserStore(settings.users)),

@@ -9,7 +9,7 @@ from typing import Any
 
 from messages.contract.names import NAME
 from messages.contract.topics import NOTE, ORDER, clock_key
-from messages.previews.frames import overview_key
+from messages.previews.frames import lane_key, overview_key
 from sites.authority import Issued
 from sites.place import Peer, Place
 from sites.roles import (
@@ -17,7 +17,6 @@ from sites.roles import (
     alive_keys,
     claim_keys,
     join_key,
-    lane_key,
     listening,
     order_keys,
     presence,

@@ -14,8 +14,8 @@ from pathlib import Path
 import zenoh
 
 from messages.bus.session import BusSettings, LateSession
+from messages.previews.frames import lane_key
 from sites.place import SiteError, load_place
-from sites.roles import lane_key
 
 LOOK_S = 5.0  # between two looks at who belongs to the site
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from messages.bus import orders
 from messages.contract import topics as tp
 from messages.contract.topics import GATEWAY, RECORDER, TOPICS, check_name
-from messages.previews.frames import frame_key, overview_key
+from messages.previews.frames import frame_key, lane_key, overview_key
 
 SERVICES = (
     "router",
@@ -97,11 +97,6 @@ def renew_key(site: str) -> str:
 def segment_key(site: str) -> str:
     """Below which home answers about its recordings."""
     return f"{check_name(site)}/{RECORDER}{SEGMENTS}".rstrip("/")
-
-
-def lane_key(site: str, number: int | str) -> str:
-    """Below which home answers on one of its lanes (sites/lanes.py); `*` stands for any."""
-    return f"{check_name(site)}/@lane/{number}"
 
 
 def listening(site: str) -> tuple[str, ...]:

@@ -30,6 +30,7 @@ class Lateness:
     clock_bound_s: float
     why: str  # the age is not known; empty: it is
     afar: bool = False  # the board is at another place, or nobody knows where
+    preview_hz: float = 0.0  # it is a preview of so many rows a second; 0: it is everything
 
     @property
     def known(self) -> bool:
@@ -43,14 +44,15 @@ class Lateness:
     @property
     def shown(self) -> bool:
         """Is it worth a place in the head of a page?"""
-        return self.late or (self.afar and not self.known)
+        return self.late or bool(self.preview_hz) or (self.afar and not self.known)
 
     @property
     def said(self) -> str:
         """For the head of a page, with no digit that is not known."""
+        parts = [f"preview, {self.preview_hz:g} Hz"] if self.preview_hz else []
         if not self.known:
-            return "age not known"
-        parts = [f"{behind(self.age_s, self.bound_s)} behind"]
+            return ", ".join([*parts, "age not known"])
+        parts.append(f"{behind(self.age_s, self.bound_s)} behind")
         if abs(self.clock_ahead_s) > CLOCK_SAID_S + self.clock_bound_s:
             parts.append(f"clock {clock(self.clock_ahead_s, self.clock_bound_s)}")
         return ", ".join(parts)
@@ -59,12 +61,21 @@ class Lateness:
     def details(self) -> str:
         """In full."""
         if not self.known:
-            return self.why
+            return self.why + self._thinned
         way = "ahead of" if self.clock_ahead_s >= 0 else "behind"
         ahead, bound = abs(self.clock_ahead_s), self.clock_bound_s
         return (
             f"newest sample {self.age_s:.3f} s ago, within {self.bound_s:.3f} s; the clock here is"
-            f" {ahead:.3f} s {way} the site's, within {bound:.3f} s"
+            f" {ahead:.3f} s {way} the site's, within {bound:.3f} s{self._thinned}"
+        )
+
+    @property
+    def _thinned(self) -> str:
+        if not self.preview_hz:
+            return ""
+        return (
+            f"; at most {self.preview_hz:g} samples a second come over the link, and what lies"
+            " between is no gap: it comes with the copy of the recording"
         )
 
 
@@ -103,9 +114,9 @@ def lateness(store: Store, device: Device, wall_s: float | None = None) -> Laten
     theirs, their_bound = ahead_of(gateway)
     there = gateway.place if gateway is not None else ""
     afar = presence.here not in ("", there) and len(presence.places()) > 1
-    why = _why(gateway, ahead, theirs)
+    why, hz = _why(gateway, ahead, theirs), float(store.preview_hz)
     if why:
-        return Lateness(math.nan, math.nan, ahead, bound, why, afar)
+        return Lateness(math.nan, math.nan, ahead, bound, why, afar, hz)
     link = device.get("link")
     was_set = 0.0 if link is None else link.message.clock_offset_s
     theirs -= was_set  # time stamps go on without it
@@ -114,7 +125,7 @@ def lateness(store: Store, device: Device, wall_s: float | None = None) -> Laten
     data = max(device.latest.values(), key=lambda one: one.arrived)
     sigma = data.message.header.utc_sigma_s - (abs(was_set) if abs(was_set) >= STEP_S else 0.0)
     total = bound + their_bound + SIGMAS * max(sigma, 0.0)
-    return Lateness(age, total, ahead, bound, "", afar)
+    return Lateness(age, total, ahead, bound, "", afar, hz)
 
 
 def _why(gateway: Process | None, ahead: float, theirs: float) -> str:

@@ -13,6 +13,7 @@ FULL = 0  # the rate of everything, as it is published
 BEGIN = 10  # Hz
 LOOK_S = 3.0  # of arrivals that are judged
 QUEUE_S = 0.7  # the usual frame comes so much later than the quickest: the link has a queue
+DRAINS = 0.97  # ... and the later ones are not less late by this: the queue does not end
 CALM_S = 0.25  # ... so little later: there is room
 CLEAR_S = 0.05  # nine of ten come within that: a link that everything may be tried on
 TRY_S = 6.0  # of calm, before more is tried
@@ -63,7 +64,9 @@ class Pace:
         if now - self._since < SETTLE_S:
             return self.rate
         lates = self._lates()
-        if np.median(lates) > QUEUE_S:
+        half = len(lates) // 2
+        drains = half > 0 and np.mean(lates[half:]) < DRAINS * np.mean(lates[:half])
+        if np.median(lates) > QUEUE_S and not drains:
             self._refuse(now)
         elif np.median(lates) < CALM_S and now - self._since > TRY_S:
             self._more(now, float(np.quantile(lates, 0.9)))

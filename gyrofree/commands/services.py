@@ -140,7 +140,7 @@ def dashboard(
         from dashboard.web.jobs import Jobs
         from dashboard.web.tls.certificate import CertificateError
         from dashboard.web.users import UsersError
-        from gyrofree.setup.site import only_watching, place_of
+        from gyrofree.setup.site import is_afar, only_watching, place_of
 
         options = ["--config", str(config)] if config else []
         replayer = command("replay", "--stay", *options)
@@ -151,7 +151,15 @@ def dashboard(
         watching = only_watching(settings)
         try:
             service.run(
-                settings.dashboard, bus, stop, replay, jobs, first, watching, place_of(settings)
+                settings.dashboard,
+                bus,
+                stop,
+                replay,
+                jobs,
+                first,
+                watching,
+                place_of(settings),
+                is_afar(settings),
             )
         except (CertificateError, UsersError) as error:
             raise ConfigError(str(error)) from None

@@ -45,6 +45,11 @@ def place_of(settings: Settings) -> str:
     return "" if settings.bus.tls is None else _place(settings.bus.tls).place
 
 
+def is_afar(settings: Settings) -> bool:
+    """Are the boards at another place of the site? Raises ConfigError."""
+    return settings.bus.tls is not None and not _place(settings.bus.tls).at_home
+
+
 def router_rules(settings: Settings) -> tuple[dict[str, Any] | None, tuple[str, ...]]:
     """What the router lets through, and the routers that it calls; no rules without a site."""
     folder = settings.bus.tls

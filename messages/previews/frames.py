@@ -50,6 +50,18 @@ def overview_key(prefix: str, device: str) -> str:
     return frame_key(prefix, device, OVERVIEW)
 
 
+def lane_key(prefix: str, number: int | str) -> str:
+    """Below which home answers on one of its lanes (sites/lanes.py); `*` stands for any."""
+    return f"{tp.check_name(prefix)}/@lane/{number}"
+
+
+def lane_overview_key(prefix: str, number: int | str, device: str) -> str:
+    """The same questions as overview_key, on a lane; `*` stands for any device."""
+    if device != "*":
+        tp.check_name(device)
+    return f"{lane_key(prefix, number)}/{OVERVIEW}/{device}"
+
+
 def device_and_rate(key: str) -> tuple[str, int] | None:
     """What a frame's key says; None for any other key."""
     parts = key.split("/")

@@ -5,8 +5,9 @@ from collections.abc import Callable, Iterator, Sequence
 
 import zenoh
 
+from messages.previews.frames import lane_key
 from sites.place import SiteError
-from sites.roles import SEGMENTS, lane_key, segment_key
+from sites.roles import SEGMENTS, segment_key
 
 MOST_LANES = 16
 
