@@ -34,7 +34,7 @@ RUN /opt/gyrofree/venv/bin/pip install --no-cache-dir --no-deps --no-compile --n
 FROM python:3.11-slim-bookworm
 RUN groupadd --gid 10001 gyrofree \
  && useradd --uid 10001 --gid 10001 --no-create-home --home-dir /nonexistent --shell /usr/sbin/nologin gyrofree \
- && install -d -o gyrofree -g gyrofree -m 0750 /data/journal /data/estimates /data/sessions /data/state /data/procedures \
+ && install -d -o gyrofree -g gyrofree -m 0750 /data/journal /data/estimates /data/sessions /data/state /data/procedures /data/site \
  && install -d /etc/gyrofree
 COPY --from=packages /opt/gyrofree /opt/gyrofree
 COPY --chmod=0644 deploy/gyrofree.toml /etc/gyrofree/gyrofree.toml

@@ -3,9 +3,11 @@
 # make test   everything it needs, then all tests
 # make cases  inputs that once failed, from $GYROFREE_CASES or ../shared/cases
 # make firmware  the board's image and map into build/firmware, with its size
+# make faults every fault, done to real processes, and the tables of docs/faults.md
 # make fuzz   libFuzzer on the board's decoder and commands (SECONDS=60); make fuzz-web hostile requests to the page
 # make wheel  dist/gyrofree-*.whl, which installs and runs where there is no compiler
 # make site   the documents as a site in build/site, links checked; make pictures takes its pictures anew
+# make sbom   what the product is made of, build/sbom.json; make audit asks for known vulnerabilities of it
 # make bench  the figures of README and docs, one JSON line each
 PYTHON ?= python3
 SOURCE ?= table
@@ -19,7 +21,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 INSTALL := $(PIP) install --quiet --no-deps --require-hashes
 DRIVE := $(if $(DATA),--data "$(DATA)")
 
-.PHONY: demo test cases setup wheel dev system-packages bench docs site pictures messages lint firmware fuzz fuzz-web compose-test clean
+.PHONY: demo test cases setup wheel dev system-packages bench docs site pictures messages lint firmware fuzz fuzz-web compose-test faults clean
 
 # BOARD=emulated: the table is sensed by the firmware image in the emulator
 demo: setup $(if $(filter emulated,$(BOARD)),.make/board firmware)
@@ -82,8 +84,12 @@ system-packages:
 
 # The browser draws in software and wants the machine for itself, so it comes after the others.
 test: setup dev system-packages site
-	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "not browser"
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "not browser and not faults"
 	$(BIN)/python -m pytest -m browser
+
+# Every fault done to real processes; it writes the tables of docs/faults.md.
+faults: setup dev system-packages
+	$(BIN)/python tests/faults/run.py
 
 # The inputs that once failed, from $GYROFREE_CASES or ../shared/cases; `make test` runs them too.
 cases: setup dev
@@ -109,6 +115,7 @@ docs: setup
 	$(BIN)/python -m firmware_protocol.document > docs/protocol.md
 	$(BIN)/python -m messages.contract.document > docs/topics.md
 	$(BIN)/gyrofree config reference > docs/configuration.md
+	$(BIN)/python -m gyrofree.operations.document > docs/metrics.md
 
 # Its packages want versions of their own, so they have an environment of their own.
 .make/site: requirements/site.txt | .make/venv
@@ -127,6 +134,20 @@ pictures: setup dev system-packages
 
 messages: dev
 	$(BIN)/python -m grpc_tools.protoc -Imessages/contract --python_out=messages/contract --pyi_out=messages/contract messages/contract/gyrofree.proto
+
+# What the product is made of, from the lock: CycloneDX JSON.
+sbom: dev
+	@mkdir -p build && $(BIN)/python -P deploy/sbom.py > build/sbom.json
+	@echo "build/sbom.json"
+
+# Known vulnerabilities of what the lock names; its packages have an environment of their own.
+.make/audit: requirements/audit.txt | .make/venv
+	@rm -rf .make/audit && $(PYTHON) -m venv .make/audit
+	@.make/audit/bin/python -m pip --disable-pip-version-check install --quiet --no-deps --require-hashes -r requirements/audit.txt
+	@touch $@
+
+audit: .make/audit
+	@sh deploy/audit.sh .make/audit/bin/pip-audit
 
 compose-test:
 	bash deploy/compose-test.sh

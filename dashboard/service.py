@@ -6,6 +6,7 @@ import errno
 import logging
 import socket
 import threading
+from collections.abc import Callable
 from typing import Any
 
 import uvicorn
@@ -14,6 +15,7 @@ from dashboard.data.feed import Feed
 from dashboard.data.store import Store
 from dashboard.desk import Desk
 from dashboard.settings import DashboardSettings
+from dashboard.web.accounts.audit import Audit
 from dashboard.web.app import create_app
 from dashboard.web.auth import Gate
 from dashboard.web.connections import Connections
@@ -24,7 +26,9 @@ from dashboard.web.jobs import Jobs
 from dashboard.web.map.archive import ArchiveError, open_archive
 from dashboard.web.tls.certificate import open_certificate
 from dashboard.web.users import UserStore, load_users
+from messages.bus.beating import Beating
 from messages.bus.session import BusSettings, open_client
+from messages.contract import gyrofree_pb2 as pb
 from sessions.library.catalogue import Catalogue
 
 log = logging.getLogger(__name__)
@@ -124,6 +128,18 @@ def _look_at_map(settings: DashboardSettings) -> None:
         log.warning("[dashboard] map: %s; the map is a plain grid", error)
 
 
+def audited(audit: Audit) -> Callable[[pb.OrderGiven], None]:
+    """What writes an order and what came of it into the log of acts."""
+
+    def tell(one: pb.OrderGiven) -> None:
+        done = one.outcome == pb.OrderGiven.OUTCOME_DONE
+        what = f"order to {one.whom}{f' of {one.device}' if one.device else ''}: {one.what}"
+        detail = f"{one.text} (after {one.seconds:.2f} s)"
+        (audit.done if done else audit.refused)(what, one.user, "", detail)
+
+    return tell
+
+
 def run(
     settings: DashboardSettings,
     bus: BusSettings,
@@ -132,12 +148,15 @@ def run(
     jobs: Jobs | None = None,
     first_run: FirstRun | None = None,
     watching: str = "",
+    place: str = "",
+    afar: bool = False,
 ) -> None:
     """The dashboard until `stop` is set.
 
     `replay` starts replays for the sessions page (control.ProcessReplay); without it the page has
     no such button. `jobs` makes reports and exports in the background; `first_run` asks an
-    administrator for the first board. `watching`: why nobody here may give orders. Raises
+    administrator for the first board. `watching`: why nobody here may give orders. `place`: of a
+    site, this one. `afar`: the boards are at another place, over a link that may be slow. Raises
     PortTaken when the port or viser's is in use, CertificateError, UsersError for a damaged users
     file, BusUnavailable when it is stopped before a router answers.
     """
@@ -160,12 +179,13 @@ def run(
         _look_at_map(settings)
         with open_client(bus, stop) as session:
             store = Store(settings.devices, settings.history_bytes)
-            desk, watched = Desk(session, bus.prefix, watching), threading.Event()
+            desk, watched = Desk(session, bus.prefix, watching, place), threading.Event()
             try:
                 handle = scene.start(settings, store, desk, watched)
             except scene.SceneError as error:
                 raise PortTaken(errno.EADDRINUSE, str(error)) from None
-            feed = Feed(session, bus.prefix, store, watched)
+            live = settings.live if afar else "full"
+            feed = Feed(session, bus.prefix, store, watched, live=live, highest=settings.preview_hz)
             front = Front(
                 settings=settings,
                 gate=Gate(settings, UserStore(settings.users)),
@@ -179,9 +199,15 @@ def run(
                 first_run=first_run,
                 open_labels=scene.OWN_INPUTS,
             )
+            desk.told = audited(front.gate.audit)
+            keeping = threading.Thread(
+                target=desk.keep, args=(stop, front.seats.alive), daemon=True
+            )
+            keeping.start()
             log.info("dashboard at %s", settings.url)
             try:
-                serve(front, bound, stop)
+                with Beating(session, bus, viewers=front.lookers.by_role):
+                    serve(front, bound, stop)
             finally:
                 if replay is not None:
                     replay.stop()

@@ -2,6 +2,7 @@
 
 import ipaddress
 from pathlib import Path
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, field_validator, model_validator
 
@@ -86,6 +87,15 @@ class DashboardSettings(BaseModel):
         300.0, "longest of the doubling waits after them", unit="s", gt=0, le=86400
     )
 
+    live: Literal["auto", "preview", "full"] = setting(
+        "auto",
+        "what another place asks of home's boards: a preview, as many samples a second as the link"
+        " carries, and everything where that fits (auto); a preview at most; always everything",
+        shown=True,
+    )
+    preview_hz: int = setting(
+        50, "samples of a preview at most: 50, 20, 10, 5, 2 or 1", unit="1/s", ge=1, le=50
+    )
     devices: int = setting(64, "shown; a silent one makes room for another", ge=1, le=1000)
     history_bytes: int = setting(
         1 << 30,

@@ -178,6 +178,8 @@ prove() {
     say "PASSED with podman $(podman --version | cut -d' ' -f3) on a Debian stand-in base; not run under Docker Engine"
 }
 
+source deploy/compose-sites.sh
+
 [ "$(id -u)" = 0 ] || die "must run as root (namespaces, mmdebstrap)"
 packages
 if [ "${1:-}" != inside ]; then
@@ -193,4 +195,8 @@ if [ "${2:-}" != run ]; then
     exec unshare --net -- "$0" inside run
 fi
 own_namespace net
-prove
+case "${GYROFREE_COMPOSE_WHAT:-all}" in # one: docker-compose.yml; sites: lab and office; none: the image only
+    all) (prove) && prove_sites ;;
+    one) prove ;;
+    sites) prove_sites ;;
+esac

@@ -56,7 +56,7 @@ def run(
             "[gateway] has no [[gateway.devices]]: nothing to read; name a board and its port"
         )
     opened: Future[Claimant | None] = Future()
-    keeper = keeper or Keeper()
+    keeper, names = keeper or Keeper(), [device.name for device in settings.devices]
     threads = [
         threading.Thread(
             target=_serve,
@@ -68,7 +68,7 @@ def run(
     for thread in threads:
         thread.start()
     try:
-        with sessions(bus, stop) as mine:  # waits for ever, while the other threads read
+        with sessions(bus, stop, names) as mine:  # waits for ever, while the other threads read
             opened.set_result(mine)
             try:
                 stop.wait()

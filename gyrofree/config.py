@@ -16,11 +16,13 @@ from dashboard.alarms.settings import AlarmSettings
 from dashboard.settings import DashboardSettings
 from estimator.settings import EstimatorSettings
 from gateway.settings import GatewaySettings
+from gyrofree.operations.settings import LogSettings, MetricsSettings
 from inertial.toml_file import parsed, text_of
 from messages.bus.session import BusSettings
 from messages.setting import setting
 from sessions.procedure.settings import ProcedureSettings
 from sessions.recording.settings import RecorderSettings
+from sites.settings import SiteSettings
 
 DEFAULT_PATH = Path("gyrofree.toml")
 
@@ -43,6 +45,9 @@ class Settings(BaseModel):
     )
     alarms: AlarmSettings = setting(AlarmSettings(), "What is an alarm, and who is told")
     dashboard: DashboardSettings = setting(DashboardSettings(), "The page in the browser")
+    site: SiteSettings = setting(SiteSettings(), "What home does for places that watch it")
+    log: LogSettings = setting(LogSettings(), "What the services write on stderr")
+    metrics: MetricsSettings = setting(MetricsSettings(), "Figures for Prometheus")
 
 
 def load(path: Path) -> Settings:

@@ -40,13 +40,14 @@ class Step(NamedTuple):
 class Clock:
     """UTC as it was when this was made, and what has elapsed since: never goes back, has no steps.
 
-    `offset_ns`: what the wall clock said beyond it at the last `look`; 0 while it was not set.
+    `offset_ns`: what the wall clock said beyond it at the last step; 0 while it was not set.
+    `difference_ns`: at the last `look`, with what is too little for a step.
     """
 
     def __init__(self) -> None:
         self._begin_ns = time.time_ns() - elapsed_ns()
         self._asleep_ns = elapsed_ns() - time.monotonic_ns()
-        self.offset_ns = 0
+        self.offset_ns = self.difference_ns = 0
 
     def now_ns(self) -> int:
         """Now, ns since 1970."""
@@ -60,7 +61,8 @@ class Clock:
         """Compare with the wall clock, about once a second; the step it made since last time."""
         now = elapsed_ns()
         self._asleep_ns = now - time.monotonic_ns()
-        step = time.time_ns() - self._begin_ns - now - self.offset_ns
+        self.difference_ns = time.time_ns() - self._begin_ns - now
+        step = self.difference_ns - self.offset_ns
         if abs(step) < STEP_NS:
             return None
         self.offset_ns += step

@@ -7,15 +7,21 @@ Zenoh refuses silently: a denied message is dropped at the router, and who sent 
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from messages.contract.topics import NOTE
+from messages.contract.names import NAME
+from messages.contract.topics import NOTE, ORDER, clock_key
+from messages.previews.frames import lane_key, overview_key
 from sites.authority import Issued
 from sites.place import Peer, Place
 from sites.roles import (
     Rights,
+    alive_keys,
     claim_keys,
     join_key,
     listening,
     order_keys,
+    presence,
+    presence_of,
+    preview_keys,
     renew_key,
     rights,
     segment_key,
@@ -47,11 +53,11 @@ class Rules:
             ("ingress", ("query",), said.ask),
             ("egress", ("query",), said.answer),
             ("egress", ("reply", "declare_queryable"), said.ask),
-            ("ingress", HEAR[:1], [f"{key.split('/')[0]}/**" for key in hears]),
+            ("ingress", HEAR[:1], _widely(hears)),
             ("ingress", HEAR[2:], hears),
             ("egress", SAY, hears),
             # what the holder says is wanted elsewhere: he may know by whom
-            ("egress", ("declare_subscriber",), [f"{key.split('/')[0]}/**" for key in said.put]),
+            ("egress", ("declare_subscriber",), _widely(said.put)),
             ("egress", ("liveliness_query", "declare_liveliness_subscriber"), said.token),
         ]
         ids = []
@@ -83,6 +89,13 @@ class Rules:
         }
 
 
+def _widely(keys: Iterable[str]) -> list[str]:
+    """Whoever may hear some keys of a site may subscribe to all of it at once; previews are not in
+    that.
+    """
+    return [key if "@" in key else f"{key.split('/')[0]}/**" for key in keys]
+
+
 def rules_of(
     place: Place, certificates: Iterable[Issued], devices: Mapping[str, Iterable[str]]
 ) -> dict[str, Any]:
@@ -93,13 +106,15 @@ def rules_of(
     """
     rules, peers = Rules(), {peer.place: peer for peer in place.peers}
     for each in certificates:
-        if each.place == place.place and each.role != "router":
+        if each.place == place.place:  # its router is a client where zenohd routes
             mine = devices.get(each.common_name, each.devices)
             _local(rules, place, each, mine)
         elif each.role == "join":
             rules.allow([each.common_name], rights("join", place.site))
         elif each.role == "router" and each.place in peers:
             _between(rules, place, peers[each.place], each.common_name)
+        elif each.role == "authority" and each.place == place.home:
+            rules.allow([each.common_name], Rights(answer=(f"{lane_key(place.site, '*')}/**",)))
     return rules.config()
 
 
@@ -110,9 +125,19 @@ def _local(rules: Rules, place: Place, holder: Issued, devices: Iterable[str]) -
         watching = (*listening(place.site), renew_key(place.site))
         said = Rights(ask=tuple(key for key in said.ask if key in watching))
     elif holder.role == "authority" and place.at_home:
-        home = (join_key(place.site), renew_key(place.site), f"{segment_key(place.site)}/**")
-        said += Rights(answer=home)
-    rules.allow([holder.common_name], said, [f"{place.site}/**"])
+        home = (
+            join_key(place.site),
+            renew_key(place.site),
+            f"{segment_key(place.site)}/**",
+            clock_key(place.site),
+            overview_key(place.site, "*"),
+        )
+        said += Rights(put=preview_keys(place.site), answer=home)
+    # a machine of its own says its own name
+    for name in {place.place, holder.common_name.partition(".")[2]}:
+        if NAME.fullmatch(name):
+            said += presence(place.site, name, holder.role)
+    rules.allow([holder.common_name], said, [f"{place.site}/**", *preview_keys(place.site)])
 
 
 def _between(rules: Rules, place: Place, peer: Peer, router: str) -> None:
@@ -122,10 +147,15 @@ def _between(rules: Rules, place: Place, peer: Peer, router: str) -> None:
     site = place.site
     seat = peer.seat if place.at_home else place.seat
     asks = (*listening(site), renew_key(site), *(order_keys(site) if seat == "operator" else ()))
-    notes = Rights(put=(NOTE.pattern(site),)) if seat == "operator" else Rights()
-    heard = (*topic_keys(site), *claim_keys(site))
+    said = (NOTE.pattern(site), ORDER.pattern(site)) if seat == "operator" else ()
+    notes = Rights(put=said)
+    heard = (*topic_keys(site), *claim_keys(site), alive_keys(site), *preview_keys(site))
     if place.at_home:
-        rules.allow([router], Rights(ask=asks) + notes, heard)
+        there = presence_of(site, peer.place)
+        rules.allow([router], Rights(ask=asks) + notes + there, heard)
         return
-    home = Rights(put=topic_keys(site), token=claim_keys(site), answer=asks)
-    rules.allow([router], home, [NOTE.pattern(site)] if seat == "operator" else [])
+    token = (*claim_keys(site), alive_keys(site))
+    home = Rights(put=(*topic_keys(site), *preview_keys(site)), token=token, answer=asks)
+    here = presence_of(site, place.place)
+    said = (*said, *here.put, *here.token)
+    rules.allow([router], home, said)

@@ -18,6 +18,7 @@ import zenoh
 from messages.bus import orders
 from messages.bus.session import BusSettings, open_client, open_router
 from messages.contract import topics as tp
+from messages.previews.frames import RATES, frame_key
 from sites.place import Place
 
 WAIT_S = 1.0  # for what was sent to arrive
@@ -78,6 +79,15 @@ def deeds(place: Place, device: str) -> list[Deed]:
         Deed("say what is wrong", tp.ALARM.key(site, device), ("alarms",)),
         Deed("leave a note", tp.NOTE.key(site, device), noting),
         Deed(
+            "say that the gateway runs", tp.BEAT.key(site, place.place, "gateway-1"), ("gateway",)
+        ),
+        Deed(
+            "say that the dashboard runs",
+            tp.BEAT.key(site, place.place, "dashboard-1"),
+            ("dashboard",),
+        ),
+        Deed("say that another place runs", tp.BEAT.key(site, OTHER, "dashboard-1"), ()),
+        Deed(
             "claim to be the gateway",
             f"{tp.claim_key(site, tp.GATEWAY, device)}/1-check",
             ("gateway",),
@@ -89,7 +99,19 @@ def deeds(place: Place, device: str) -> list[Deed]:
             ("estimator",),
             "token",
         ),
+        Deed(
+            "publish previews",
+            frame_key(site, device, RATES[0]),
+            ("authority",) if place.at_home else (),
+        ),
+        Deed("say who has the command", tp.HOLDER.key(site, tp.COMMAND), ("procedures",)),
         Deed("order the recorder", orders.RECORDER.key(site, ""), orders_by, "order"),
+        Deed(
+            "change what a service logs",
+            orders.LOG_LEVEL.key(site, tp.RECORDER),
+            orders_by,
+            "order",
+        ),
         Deed("order the board", orders.BOARD.key(site, device), orders_by, "order"),
     ]
 
@@ -104,9 +126,10 @@ def try_all(
     roles, tried = [role for role in roles if role not in ("router", "join")], deeds(place, device)
     with open_router(bus.acting_as("router"), access) as router:
         # the router's own session hears all that passed the rules on their way in
-        watch = router.declare_subscriber(
-            f"{place.site}/**", lambda sample: heard.add(sample.payload.to_string())
-        )
+        watches = [
+            router.declare_subscriber(key, lambda sample: heard.add(sample.payload.to_string()))
+            for key in (f"{place.site}/**", frame_key(place.site, "*", "*"))
+        ]
         alive = router.liveliness().declare_subscriber(
             f"{place.site}/**", lambda sample: heard.add(f"token {sample.key_expr}")
         )
@@ -122,7 +145,7 @@ def try_all(
             }
             kept = [_try(session, role, tried) for role, session in sessions.items()]
             time.sleep(WAIT_S)
-        for one in (watch, alive, *answers):
+        for one in (*watches, alive, *answers):
             one.undeclare()
         del kept
     return [

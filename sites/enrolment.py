@@ -42,6 +42,7 @@ M = TypeVar("M", bound=BaseModel)
 Text = Field(max_length=8_000)
 
 log = logging.getLogger(__name__)
+CALLING = ("router", "authority")  # at home, those who connect to other places
 
 
 class JoinRequest(BaseModel):
@@ -98,12 +99,11 @@ class Registrar:
         authority = Authority(self._folder)
         requests = {role: load_request(text) for role, text in asked.requests.items()}
         peer = next(each for each in here.peers if each.place == entry.place)
-        hosts = tuple(filter(None, [_host_of(peer.address)]))
         # noted before anything is issued: killed here, the same keys may ask again, others not
         used = entry.model_copy(update={"used": which})
         save_book(self._folder, [used if each is entry else each for each in book])
         certificates = {
-            role: pem(authority.issue(request, role, entry.place, hosts=hosts)).decode()
+            role: pem(authority.issue(request, role, entry.place, hosts=peer.hosts)).decode()
             for role, request in requests.items()
         }
         log.info("%s has joined the site, its people as %s", entry.place, entry.seat)
@@ -205,13 +205,13 @@ def known_here(folder: Path, place: Place) -> list[Issued]:
 
 
 def _standing(authority: Authority, place: str, home: str) -> list[Issued]:
-    """What a place has to know: its own certificates and that of home's router."""
+    """What a place has to know: its own certificates, and those of home that call there."""
     now = dt.datetime.now(dt.UTC)
     return [
         each
         for each in authority.register()
         if each.stands(now)
-        and (each.place == place or (each.place == home and each.role == "router"))
+        and (each.place == place or (each.place == home and each.role in CALLING))
     ]
 
 
@@ -236,8 +236,3 @@ def load_request(text: str) -> x509.CertificateSigningRequest:
 
 def _pack(answer: Answer) -> bytes:
     return answer.model_dump_json().encode()
-
-
-def _host_of(address: str) -> str:
-    """The name of a router's machine in "tls/host:port"."""
-    return address.partition("/")[2].rpartition(":")[0].strip("[]")

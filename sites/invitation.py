@@ -92,8 +92,11 @@ def invite(
         raise SiteError(f"places are invited at the site's home, {here.home}")
     if place == here.place or any(each.place == place for each in here.peers):
         raise SiteError(f"{place} belongs to the site already: choose another name, or remove it")
-    key = new_key()
-    certificate = authority.issue(request_for(key, "join"), "join", place, life=life)
+    key, peer = new_key(), Peer(place=place, seat=seat, address=address)
+    # the certificate that answers our router's call there until the place has its own
+    certificate = authority.issue(
+        request_for(key, "join"), "join", place, hosts=peer.hosts, life=life
+    )
     entry = authority.register()[-1]
     invitation = Invitation(
         site=here.site,
@@ -114,8 +117,7 @@ def invite(
         common_name=entry.common_name,
     )
     save_book(folder, [*load_book(folder), known])
-    peers = (*here.peers, Peer(place=place, seat=seat, address=address))
-    here = here.model_copy(update={"peers": peers})
+    here = here.model_copy(update={"peers": (*here.peers, peer)})
     save_place(folder, here)
     return invitation, here
 

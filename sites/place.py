@@ -36,6 +36,12 @@ class Peer(BaseModel):
     seat: Seat
     address: str  # of its router, "tls/host:port"; empty: it comes to us
 
+    @property
+    def hosts(self) -> tuple[str, ...]:
+        """The name of its router's machine, which its certificates carry; none where it comes."""
+        host = self.address.partition("/")[2].rpartition(":")[0].strip("[]")
+        return (host,) if host else ()
+
 
 class Place(BaseModel):
     """Who this installation is."""

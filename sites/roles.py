@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from messages.bus import orders
 from messages.contract import topics as tp
 from messages.contract.topics import GATEWAY, RECORDER, TOPICS, check_name
+from messages.previews.frames import frame_key, lane_key, overview_key
 
 SERVICES = (
     "router",
@@ -31,7 +32,11 @@ KINDS = (
     orders.PROCEDURES,
     orders.ALARMS,
     orders.REPLAY,
+    orders.LOG_LEVEL,
+    orders.SEAT,
 )
+SEGMENTS = "/segment/"  # of a key: what stands behind it is asked for
+SAID = (tp.NOTE, tp.MUTE, tp.ORDER)  # by people who order
 REPLAYED = f"$*{tp.REPLAY_SUFFIX}"  # of a device's name: any device that is a replay
 
 
@@ -60,7 +65,10 @@ def rights(role: str, site: str, devices: Iterable[str] = ()) -> Rights:
         "estimator": lambda: _consumer(site) + _publisher(site, tp.ESTIMATES, orders.ESTIMATOR),
         "recorder": lambda: _consumer(site) + _publisher(site, RECORDER, orders.RECORDER),
         "procedures": lambda: (
-            _consumer(site) + _publisher(site, tp.PROCEDURES, orders.PROCEDURES) + _orders(site)
+            _consumer(site)
+            + _publisher(site, tp.PROCEDURES, orders.PROCEDURES)
+            + Rights(answer=(orders.SEAT.key(site, ""),))
+            + _orders(site)
         ),
         "alarms": lambda: _consumer(site) + _publisher(site, tp.ALARMS, orders.ALARMS),
         "dashboard": lambda: _consumer(site) + _orders(site) + Rights(put=_of(site, "*", "any")),
@@ -70,7 +78,10 @@ def rights(role: str, site: str, devices: Iterable[str] = ()) -> Rights:
         "authority": lambda: _listener(site) + Rights(ask=(renew_key(site),)),
         "join": lambda: Rights(ask=(join_key(site),)),
     }
-    return made.get(role, Rights)()
+    said = made.get(role, Rights)()
+    if role not in SERVICES or role == "operator":
+        return said
+    return said + Rights(answer=(orders.LOG_LEVEL.key(site, role),))
 
 
 def join_key(site: str) -> str:
@@ -85,7 +96,7 @@ def renew_key(site: str) -> str:
 
 def segment_key(site: str) -> str:
     """Below which home answers about its recordings."""
-    return f"{check_name(site)}/{RECORDER}/segment"
+    return f"{check_name(site)}/{RECORDER}{SEGMENTS}".rstrip("/")
 
 
 def listening(site: str) -> tuple[str, ...]:
@@ -95,12 +106,38 @@ def listening(site: str) -> tuple[str, ...]:
         tp.published_key(site, "*", "*"),
         tp.fence_key(site, "*"),
         f"{segment_key(site)}/**",
+        overview_key(site, "*"),
+        f"{lane_key(site, '*')}/**",
+        tp.clock_key(site),
     )
+
+
+def preview_keys(site: str) -> tuple[str, ...]:
+    """Frames of every device at every rate; no `**` matches them."""
+    return (frame_key(site, "*", "*"),)
 
 
 def order_keys(site: str) -> tuple[str, ...]:
     """The keys of all orders, for any device."""
     return tuple(kind.key(site, "*") for kind in KINDS)
+
+
+def presence(site: str, place: str, role: str) -> Rights:
+    """Everybody but a viewer may say that he is there: under his own place and role, no other's."""
+    if role not in (*SERVICES, "simulator"):
+        return Rights()
+    beat, token = tp.BEAT.pattern(site, place), tp.alive_key(site, place, "*")
+    return Rights(put=(f"{beat[:-1]}{role}-$*",), token=(f"{token[:-1]}{role}-$*",))
+
+
+def presence_of(site: str, place: str = "*") -> Rights:
+    """What all processes of a place say of being there, and of every place."""
+    return Rights(put=(tp.BEAT.pattern(site, place),), token=(alive_keys(site, place),))
+
+
+def alive_keys(site: str, place: str = "*") -> str:
+    """The tokens of all processes of a place, or of every one."""
+    return f"{check_name(site)}/{place}/alive/*"
 
 
 def topic_keys(site: str) -> tuple[str, ...]:
@@ -146,7 +183,7 @@ def _publisher(site: str, source: str, kind: orders.Kind) -> Rights:
 
 
 def _orders(site: str) -> Rights:
-    return Rights(ask=order_keys(site), put=(tp.NOTE.pattern(site), tp.MUTE.pattern(site)))
+    return Rights(ask=order_keys(site), put=tuple(t.pattern(site) for t in SAID))
 
 
 def _replay(site: str) -> Rights:

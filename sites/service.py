@@ -14,14 +14,19 @@ from pathlib import Path
 import zenoh
 from cryptography import x509
 
+from messages.bus.beating import Beating, tell_time
 from messages.bus.session import BusSettings, open_client
 from messages.bus.tls import TRUSTED
 from sites.authority import DAYS
 from sites.copying.fetching import Copies
+from sites.copying.roads import Roads
 from sites.copying.serving import Serving
 from sites.enrolment import Registrar, keep, renewal
+from sites.lanes import Lanes
 from sites.place import Place, SiteError, load_place
-from sites.roles import join_key, renew_key, segment_key
+from sites.previews import Previews
+from sites.roles import SEGMENTS, join_key, renew_key
+from sites.settings import SiteSettings
 
 LOOK_S = 3600.0  # between two looks at the certificates
 AGAIN_S = 60.0  # after a renewal that did not succeed
@@ -37,22 +42,39 @@ class HomeRefused(SiteError):
     """Home was reached and says why not: to ask again would not help."""
 
 
-def run(folder: Path, sessions: Path, bus: BusSettings, stop: threading.Event) -> None:
+def run(
+    folder: Path,
+    sessions: Path,
+    bus: BusSettings,
+    stop: threading.Event,
+    settings: SiteSettings | None = None,
+) -> None:
     """Until `stop`; raises SiteError where the folder has no place. sessions: the folder of the
     recordings, which home shows and others fill.
     """
+    settings = settings or SiteSettings()
     place = load_place(folder)
-    with open_client(bus, stop) as session:
+    with open_client(bus, stop) as session, Beating(session, bus):
         log.info("place %s of site %s%s", place.place, place.site, ", its home" * place.at_home)
         keeping = threading.Thread(
             target=_keep_certificates, args=(folder, place, session, stop), daemon=True
         )
         keeping.start()
         if place.at_home:
-            declared = declare(session, place, Registrar(folder))
+            declared = [
+                *declare(session, place, Registrar(folder)),
+                tell_time(session, place.site),
+            ]
             serving = Serving(session, place.site, sessions)
+            previews = Previews(session, place.site)
+
+            def at_lane(lane: zenoh.Session, key: str) -> list[zenoh.Queryable]:
+                return [serving.at(lane, key + SEGMENTS.rstrip("/")), previews.at(lane, key)]
+
+            lanes = Lanes(folder, bus, settings.lanes, at_lane)
             stop.wait()
-            serving.close()
+            for each in (lanes, previews, serving):
+                each.close()
             for one in declared:
                 one.undeclare()
         else:
@@ -62,14 +84,11 @@ def run(folder: Path, sessions: Path, bus: BusSettings, stop: threading.Event) -
 
 def copy(copies: Copies, site: str, session: zenoh.Session, stop: threading.Event) -> None:
     """Bring home's recordings here, round after round, until `stop`."""
-
-    def ask(what: str) -> bytes:
-        return asked(session, f"{segment_key(site)}/{what}", b"", SEGMENT_S)
-
+    roads = Roads(session, site, lambda key: asked(session, key, b"", SEGMENT_S))
     said = ""
     while not stop.wait(ROUND_S):
         try:
-            copies.round(ask, stop.is_set)
+            copies.round(roads(), stop.is_set)
             said = ""
         except (SiteError, OSError) as error:
             if str(error) != said:

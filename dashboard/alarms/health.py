@@ -5,6 +5,7 @@ What cannot be looked at now (its topic is silent, the filter waits) is neither 
 """
 
 import shutil
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,10 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from dashboard.alarms.machine import Cause
+from dashboard.alarms.places import Certificates, clocks_off
 from dashboard.alarms.settings import OFF, AlarmSettings
-from dashboard.data.alarms import RECORDER_STALE_S, Alarm, bench_faults, faults, waits
+from dashboard.data.alarms import RECORDER_STALE_S, bench_faults, faults, waits
 from dashboard.data.device import Device
+from dashboard.data.fault import Alarm
 from dashboard.data.store import Store
+from dashboard.data.there import twin_fault
 from messages.clock import STEP_NS
 from messages.contract import gyrofree_pb2 as pb
 from messages.text import plain
@@ -37,10 +41,12 @@ class Found:
 
 def of_device(store: Store, device: Device, settings: AlarmSettings, now: float) -> Found:
     """Call under the store's lock; now: time.monotonic(), s."""
-    found = [*faults(device, now), *_clock(device, now), *_not_recorded(store, device, now)]
+    found = [*twin_fault(store, device.name), *faults(device, now)]
+    found += [*_clock(device, now), *_not_recorded(store, device, now)]
     verdict = _inconsistent(device, now)
     found += verdict or []
     kinds = {"link"} if device.get("link") else set()
+    kinds |= {"twin"} if store.presence.sees else set()
     kinds |= {"table"} if device.get("procedure") else set()
     kinds |= {"board"} if not device.stale("board", now=now) else set()
     kinds |= {"axis"} if not device.stale("axes", now=now) else set()
@@ -51,10 +57,24 @@ def of_device(store: Store, device: Device, settings: AlarmSettings, now: float)
     return Found(_causes(found, settings), frozenset(kinds))
 
 
-def of_bench(store: Store, settings: AlarmSettings, recordings: Path, now: float) -> Found:
-    """Of the recorder and the disk it writes to. Call under the store's lock."""
+def of_bench(
+    store: Store,
+    settings: AlarmSettings,
+    recordings: Path,
+    now: float,
+    certificates: Certificates | None = None,
+) -> Found:
+    """Of the recorder, the disk it writes to, the services, their clocks and certificates. Call
+    under the store's lock.
+    """
     found = bench_faults(store, now)
     kinds = {"recorder"} if store.recorder is not None else set()
+    if store.presence.sees:
+        kinds |= {"service", "place", "clock", "certificate"}
+        found += clocks_off(store, settings)
+        if certificates is not None:
+            days = settings.certificate_days
+            found += certificates.near_end(store, days, time.time())
     free = free_bytes(recordings)
     if free is not None:
         kinds |= {"disk"}

@@ -4,7 +4,6 @@ orders. There is one that serves; others wait. What it knows survives it in [ala
 
 import logging
 import threading
-import time
 from collections import deque
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from dashboard.alarms import said
 from dashboard.alarms.book import Event, NoSuchAlarm
 from dashboard.alarms.machine import Now
 from dashboard.alarms.notices import DeliveryError, Notice, Sender, Teller
+from dashboard.alarms.places import Certificates
 from dashboard.alarms.settings import AlarmSettings
 from dashboard.alarms.state_file import load, save
 from dashboard.alarms.watch import Watch
@@ -24,11 +24,12 @@ from dashboard.data.store import Store
 from logs.figures.quantity import ExpressionError
 from messages.bus import orders
 from messages.bus.claiming import Claim
-from messages.bus.session import BusSettings, Publishers
+from messages.bus.session import BusSettings
 from messages.bus.turns import in_turn, sessions
 from messages.clock import Clock, elapsed_s
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ALARM, ALARMS
+from messages.history.keeping import KeptPublishers
 from messages.text import check as fault_of
 from messages.text import plain
 
@@ -54,15 +55,16 @@ class Service:
         session: zenoh.Session,
         prefix: str,
         number: int = 0,
+        certificates: Path | None = None,
     ) -> None:
-        """number: of the claim. recordings: the folder that sessions are written to."""
-        self._settings, self._clock, self._since = settings, Clock(), time.time_ns()
-        self._publishers = Publishers(session, prefix)
-        self._publishers.number = number
-        self._site = prefix
+        """number: of the claim. recordings, certificates: folders of this place's."""
+        self._settings, self._clock, self._site = settings, Clock(), prefix
+        kept = settings.state.with_suffix(".published")
+        self._publishers = KeptPublishers(session, prefix, ALARMS, kept, number)
         book, limits, self._users, self._trouble = load(settings.state)
         self._store = Store(most_bytes=MOST_BYTES)
-        self._watch = Watch(self._store, settings, recordings, book)
+        own = Certificates(certificates)
+        self._watch = Watch(self._store, settings, recordings, book, own)
         self._fixed = {limit.name for limit in settings.limits}
         self._own = {one.name: one for one in limits if one.name not in self._fixed}
         for limit in [*settings.limits, *self._own.values()]:
@@ -123,6 +125,7 @@ class Service:
         self._feed.stop()
         for sender in self._senders:
             sender.close()
+        self._publishers.close()
         if tidy and self._watch.book.changed:
             self._save()
 
@@ -163,7 +166,7 @@ class Service:
                 continue
             self._sent[device] = now.s, content
             message = pb.AlarmStatus(alarms=alarms)
-            message.header.device, message.header.run = device, self._since
+            message.header.device, message.header.run = device, self._publishers.run
             message.header.utc_ns, message.header.source = now.utc_ns, source
             self._publishers.put(ALARM, device, message)
 
@@ -316,7 +319,7 @@ def _serve(
     stop: threading.Event,
 ) -> None:
     """Until `stop`, or until another has taken over."""
-    service = Service(settings, recordings, session, bus.prefix, claimed.number)
+    service = Service(settings, recordings, session, bus.prefix, claimed.number, bus.tls)
     log.info("watching %s/*: %d limits", bus.prefix, len(settings.limits))
     try:
         while not (claimed.lost.is_set() or stop.is_set()):

@@ -98,7 +98,16 @@ class HealthSettings(BaseModel):
     inconsistent: LevelOrOff = setting(
         "warning", "its errors are larger than the leading filter believes (NIS)"
     )
-    clock: LevelOrOff = setting("watch", "the gateway's clock was set while it ran")
+    clock: LevelOrOff = setting(
+        "watch",
+        "the gateway's clock was set while it ran, a place's is off, or its offset is not known",
+    )
+    twin: LevelOrOff = setting("critical", "two gateways want one board")
+    service: LevelOrOff = setting("warning", "a service is frozen, or gone without a word")
+    place: LevelOrOff = setting("watch", "nothing is heard of another place of the site")
+    certificate: LevelOrOff = setting(
+        "warning", "a certificate is near its end and was not renewed by itself"
+    )
     blind: LevelOrOff = setting("watch", "the leading filter sees no component of the rate")
     settings: LevelOrOff = setting("watch", "the data contradict a setting")
 
@@ -167,6 +176,15 @@ class AlarmSettings(BaseModel):
     )
     disk_free_bytes: int = setting(
         2 << 30, "an alarm below so much room for recordings", unit="bytes", ge=0
+    )
+    clock_limit_s: float = setting(
+        0.5, "an alarm where a clock is surely further from the site's", unit="s", gt=0
+    )
+    certificate_days: float = setting(
+        14.0,
+        "an alarm when a certificate has less than that left, or less than a sixth of its life",
+        unit="days",
+        ge=0,
     )
     on_delay_s: float = setting(
         0.5, "a fault of the bench is an alarm when it has been there for so long", unit="s", ge=0

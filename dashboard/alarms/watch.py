@@ -11,6 +11,7 @@ from dashboard.alarms.fields import Path as FieldPath
 from dashboard.alarms.fields import Sampled, parsed, sampled
 from dashboard.alarms.judge import Answer, Bounds, Judge, Turn
 from dashboard.alarms.machine import Cause, Now
+from dashboard.alarms.places import Certificates
 from dashboard.alarms.settings import AlarmSettings, LimitSettings
 from dashboard.data.channels import Channel, channels
 from dashboard.data.device import Device
@@ -107,6 +108,7 @@ class Watch:
     settings: AlarmSettings
     recordings: Path
     book: Book
+    certificates: Certificates | None = None
     limits: dict[str, LimitSettings] = field(default_factory=dict)
     eyes: dict[tuple[str, str], Eye] = field(default_factory=dict)  # limit, device
     _turning: dict[tuple[str, str], float] = field(default_factory=dict)  # since, elapsed s
@@ -141,7 +143,9 @@ class Watch:
                     self._health(name, health.of_device(self.store, device, self.settings, at), now)
                     if self.limits:
                         self._limits(device, now)
-            bench = health.of_bench(self.store, self.settings, self.recordings, at)
+            bench = health.of_bench(
+                self.store, self.settings, self.recordings, at, self.certificates
+            )
         self._health("", bench, now)
         for device, id in [key for key in self.book.points if key[0] and key[0] not in names]:
             self.book.unknown(device, id)

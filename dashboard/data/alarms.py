@@ -5,11 +5,13 @@ the summary and the REST interface, so that all three say the same.
 import re
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from dashboard.data.device import BEHIND_STALE_S, Device
+from dashboard.data.fault import Alarm
 from dashboard.data.store import Store
+from dashboard.data.there import service_faults, twin_fault
 from logs.figures.words import words_of
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
@@ -37,32 +39,19 @@ AXIS_MEANINGS = {  # of what is wrong with an axis, for people
 }
 LEVELS = {"critical": 3, "warning": 2, "watch": 1}
 SHOWN = (pb.Alarm.STATE_UNACKNOWLEDGED, pb.Alarm.STATE_ACKNOWLEDGED)
-ALONE = ("clock", "disk", "inconsistent", "recorder")  # that the alarms' service finds, and we not
+ALONE = (
+    "certificate",
+    "clock",
+    "disk",
+    "inconsistent",
+    "recorder",
+)  # that the alarms' service finds, and we not
 MOST = 12  # of one device
 STARTING_S = 8.0  # after a device was first heard of, before which an absent board is no fault
 TURNS_RADPS = 0.035  # 2 deg/s: beyond it a rate is no standstill
 PROCEDURES_SILENT_S = 3.0  # s without a word of who drives a table
 RECORDER_STALE_S = 5.0  # s without a word of the recorder while it records
 _COUNTS = re.compile(r"fixes (\w+) (\d+)")
-
-
-@dataclass(frozen=True)
-class Alarm:
-    """One thing that is wrong."""
-
-    kind: str  # of a kind: "axis", "link", "board", "estimator", "late", "blind", ...
-    title: str  # in a few words
-    text: str  # what was found and what to do
-    page: str  # key of the page that shows it; "" for none
-    about: str = ""  # which axis, filter or fault it is
-    level: str = ""  # watch, warning or critical, where the service has said so
-    state: str = ""  # unacknowledged or acknowledged, likewise
-    raised_s: float = 0.0  # s since 1970, likewise
-
-    @property
-    def id(self) -> str:
-        """Stays while what is said of it changes."""
-        return f"{self.kind}-{self.about}" if self.about else self.kind
 
 
 def words(alarm: Alarm) -> dict[str, str]:
@@ -103,7 +92,8 @@ def alarms(store: Store, device: Device, now: float | None = None) -> list[Alarm
     if store.replay.state(device.name, time.monotonic()) == "ended":
         return []
     now = time.monotonic() if now is None else now
-    return judged(faults(device, now), device, now, False)[:MOST]
+    found = [*twin_fault(store, device.name), *faults(device, now)]
+    return judged(found, device, now, False)[:MOST]
 
 
 def judged(found: list[Alarm], device: Device, now: float, bench: bool) -> list[Alarm]:
@@ -143,7 +133,7 @@ def faults(device: Device, now: float) -> list[Alarm]:
 
 
 def bench_alarms(store: Store, now: float | None = None) -> list[Alarm]:
-    """What is wrong with the recorder and its disk. Call under the store's lock."""
+    """What is wrong with the recorder, its disk and the services. Call under the store's lock."""
     found, now = bench_faults(store, now), time.monotonic() if now is None else now
     told = [one for one in store.devices.values() if not one.stale("alarm", now=now)]
     return judged(found, told[0], now, True) if told else found
@@ -151,17 +141,20 @@ def bench_alarms(store: Store, now: float | None = None) -> list[Alarm]:
 
 def bench_faults(store: Store, now: float | None = None) -> list[Alarm]:
     """As found here. Call under the store's lock."""
+    return [*_recorder(store, now), *service_faults(store)]
+
+
+def _recorder(store: Store, now: float | None) -> Iterator[Alarm]:
     heard = store.recorder
     if heard is None:
-        return []
+        return
+    text = plain(heard.message.message)
     if heard.message.recording and heard.age(now) > RECORDER_STALE_S:
         silent = f"silent for {heard.age(now):.0f} s in the middle of a recording"
-        return [Alarm("recorder", "recorder silent", silent, "")]
-    text = plain(heard.message.message)
-    if not text:
-        return []
-    full = "no space" in text.lower() or "full" in text.lower()
-    return [Alarm("recorder", "disk full" if full else "recording failed", text, "")]
+        yield Alarm("recorder", "recorder silent", silent, "")
+    elif text:
+        full = "no space" in text.lower() or "full" in text.lower()
+        yield Alarm("recorder", "disk full" if full else "recording failed", text, "")
 
 
 def drives(m: pb.ProcedureStatus) -> bool:

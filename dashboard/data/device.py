@@ -67,6 +67,7 @@ class Device:
     t_newest: float = 0.0
     t_first: float = 0.0  # below zero when older data were fetched
     late: list[list[float]] = field(default_factory=list)  # stretches [from, until] filled in, s
+    thin: list[list[float]] = field(default_factory=list)  # [from, until, one row in so many s]
     marks: list[tuple[float, str]] = field(default_factory=list)  # notes: when, s, and their text
     origin: tuple[float, float, float] | None = None  # of n: latitude deg, longitude deg, height m
     run: int = 0

@@ -14,13 +14,18 @@ from google.protobuf.message import Message
 from dashboard.data.device import HISTORY_S, Device, Latest
 from dashboard.data.intake import INTAKE
 from dashboard.data.replayed import Replayed
+from messages.bus.presence import Presence
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 from messages.contract.checks import Refusal
 from messages.contract.door import OTHERS, Door
 
-OF_DEVICES = tuple(t for t in tp.TOPICS if t not in (tp.STATUS, tp.REPLAY, tp.LOG))
+OF_DEVICES = tuple(
+    t for t in tp.TOPICS if t not in (tp.STATUS, tp.REPLAY, tp.LOG, tp.HOLDER, tp.ORDER, tp.BEAT)
+)
 LATE_JOIN_S = 2.0  # repaired stretches nearer than this are one
+THIN = 3.0  # periods of a preview between two rows, beyond which it was interrupted
+THINNED = 200  # stretches of previews that are remembered
 MARKS = 200  # notes and marks of a device that are drawn
 DEVICES = 64  # remembered; a foreign publisher cannot fill the memory
 GONE_S = 60.0  # a device silent for so long makes room for another
@@ -45,9 +50,11 @@ class Store:
         self.lock = threading.RLock()
         self.devices: dict[str, Device] = {}
         self.recorder: Latest | None = None
+        self.presence = Presence()
         self.replay = Replayed()
         self.logs: list[tuple[float, str, str]] = []  # arrived, device, text
         self.dropped = 0  # messages the feed could not keep up with
+        self.preview_hz = 0  # rows a second of a preview over a slow link; 0: everything comes
 
     @property
     def refused(self) -> int:
@@ -138,10 +145,14 @@ class Store:
                 self._put_device(topic, device, estimator, message, arrived)
 
     def put_late(
-        self, name: str, messages: list[tuple[tp.Topic, str, Message]], repaired: bool
+        self,
+        name: str,
+        messages: list[tuple[tp.Topic, str, Message]],
+        repaired: bool,
+        every_s: float = 0.0,
     ) -> None:
         """Take in older messages of a device: what the bus had lost (`repaired`), or what was
-        before we listened.
+        before we listened; every_s: an overview, of one row in so many seconds.
         """
         with self.lock:
             known = self.devices.get(name)
@@ -159,6 +170,8 @@ class Store:
                 row = INTAKE.get(topic.name)
                 if row is not None:
                     row(shadow, estimator, t, message)
+                    if every_s:
+                        _thin(known, t, every_s)
                     known.t_first = min(known.t_first, t)
                     if repaired and topic in (tp.ACCEL, tp.IMU):
                         _stretch(known.late, t)
@@ -207,6 +220,8 @@ class Store:
         if row is not None:
             row(known, estimator, t, message)
             known.t_newest = max(known.t_newest, t)
+            if self.preview_hz:
+                _thin(known, t, 1.0 / self.preview_hz)
 
     def _doubted(
         self, known: Device, topic: tp.Topic, estimator: str, utc_ns: int, arrived: float
@@ -239,6 +254,16 @@ def _stretch(late: list[list[float]], t: float) -> None:
             return
     late.append([t, t])
     del late[:-100]
+
+
+def _thin(device: Device, t: float, every_s: float) -> None:
+    """Around t there is one row in every_s at most, and what lies between is no gap."""
+    reach = THIN * every_s
+    for one in reversed(device.thin[-20:]):
+        if one[2] == every_s and one[0] - reach <= t <= one[1] + reach:
+            one[0], one[1] = min(one[0], t), max(one[1], t)
+            return
+    device.thin = [*device.thin, [t, t, every_s]][-THINNED:]
 
 
 def _note(device: Device, t: float, m: pb.Note) -> None:

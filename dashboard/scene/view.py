@@ -13,8 +13,10 @@ from dashboard.data.device import Device
 from dashboard.data.store import Store
 from dashboard.desk import Desk
 from dashboard.scene.drawing.page import alert, tag
+from dashboard.scene.pace import Pace
 from dashboard.scene.panels import PAGES, Devices, Record, Snapshot, Timeline
 from dashboard.scene.panels.base import Input
+from dashboard.scene.rights import Rights
 from dashboard.scene.scene import Choice, SceneView
 from dashboard.scene.shared import Shared
 from dashboard.scene.span import Span
@@ -26,7 +28,6 @@ TRACK_S = 0.2  # trajectories grow five times a second
 # a replay that begins this near to the opening of a page was asked for by the person at it
 ASKED_FOR_S = 60.0
 ASK, ROLE = "Show", "Role"  # labels of what the page and the relay write into
-VIEWER, OPERATORS = "viewer", ("operator", "admin")  # what the relay says, and after it the name
 FIRST = {"nav": "position", "attitude": "tilt", "rate": "rates"}  # page, by what moves a body
 # Labels of the inputs that change this browser's own view only; anybody may use them, and an order
 # may not have a label that stands here.
@@ -49,8 +50,9 @@ class View:
         self._device_chosen = False  # by the person, or by the replay that it began
         self._opened_at = time.monotonic()
         self._generation = -1
-        self._span, self._size, self._rank = Span(), "l", ""
+        self._span, self._size = Span(), "l"
         self._derived: list[str] = []  # lines of expression.py
+        self._rights_of, self.pace = Rights(desk), Pace()
         self._tracks_at = 0.0
         self._lock = threading.RLock()  # callbacks of the browser against the loops
         self._page = 0
@@ -69,8 +71,7 @@ class View:
     @property
     def orders(self) -> tuple[Input, ...]:
         """Inputs that do more than change this browser's own view."""
-        pages = (handle for page in self._pages for handle in page.orders)
-        return *self._timeline.orders, *pages, self._role
+        return *self._timeline.orders, *(h for page in self._pages for h in page.orders), self._role
 
     # --- ticks
 
@@ -92,6 +93,7 @@ class View:
             if self._alone:
                 self._shared.begin()
             now = time.monotonic()
+            self._bar()
             self._record.update(self._store.recorder, now)
             self._timeline.update(now)
             self._show_replay_asked_for()
@@ -171,6 +173,7 @@ class View:
             dark=self._choice.dark,
             follow=self._choice.follow,
             size=self._size,
+            quality=self.pace.quality,
             layers=[layer for layer in LAYERS if self._choice.layers[layer]],
         )
         if fields != self._said:
@@ -185,10 +188,8 @@ class View:
                 self._wanted = wish.device
             if wish.prefer and not self._device_chosen and not self._wanted:
                 self._choose(wish.prefer, by_person=False)
-            if wish.window:
-                self._span.window = wish.window
-            if wish.zoom is not None:
-                self._span.zoom = wish.zoom
+            self._span.ask(wish.window, wish.zoom)
+            self.pace.choose(wish.quality)
             if wish.derived is not None:
                 self._derived = many(wish.derived)
             if wish.dark is not None and wish.dark != self._choice.dark:
@@ -207,12 +208,12 @@ class View:
             for what in wish.do:
                 if what == "camera":
                     self._reset_camera()
-                if self._rank in OPERATORS:  # an order, by an input that is anybody's
+                if self._rights_of.operates:  # an order, by an input that is anybody's
                     self._timeline.do(what)
             self._say_state(self._device())
 
     def _turn_to(self, wish: Wish) -> None:
-        """Open the page asked for, else the one that was open last in the workspace asked for."""
+        """Open the page asked for, else the one open last in the workspace asked for."""
         if wish.page in KEYS:
             self._choose_page(KEYS.index(wish.page))
         elif wish.workspace in {room.key for room in WORKSPACES}:
@@ -244,30 +245,30 @@ class View:
         )
 
     def _set_dark(self, dark: bool) -> None:
-        with self._lock:
-            self._choice.dark = dark
-            self._theme()
+        self._choice.dark = dark
+        self._theme()
 
     def _set_rights(self) -> None:
-        """A viewer sees the orders, and that and why they are not his."""
+        """Orders of this browser bear the name of who is signed in."""
         with self._lock:
-            self._rank, _, user = self._role.value.partition(" ")
-            barred = self._rank == VIEWER
-            self._timeline.bar(barred)
+            self._rights_of.become(self._role.value)
             for page in self._pages:
-                page.user = user
-            for handle in self.orders:
-                if handle is not self._role and not isinstance(handle, viser.GuiButtonGroupHandle):
-                    handle.disabled = barred
+                page.user, page.desk = self._rights_of.user, self._rights_of.desk
+            self._bar(anew=True)
+
+    def _bar(self, anew: bool = False) -> None:
+        """Grey the orders that would be refused now; a table may be stopped by whoever orders."""
+        rights = self._rights_of
+        if rights.look() or anew:
+            self._timeline.bar(bool(rights.never))
+            free = *self._timeline.orders, *(one for page in self._pages for one in page.always)
+            rights.grey([one for one in self.orders if one is not self._role], free)
             self._say_rights()
 
     def _say_rights(self) -> None:
-        barred = self._rank == VIEWER and bool(self._pages[self._page].orders)
-        text = "You look as viewer: what gives orders is greyed, it takes the role operator."
-        if barred:
-            self._rights.content = str(alert(text))
-        if self._rights.visible != barred:
-            self._rights.visible = barred
+        barred = bool(self._rights_of.now and self._pages[self._page].orders)
+        self._rights.content = str(alert(self._rights_of.now)) if barred else ""
+        self._rights.visible = barred
 
     def _pause(self, pause: bool) -> None:
         with self._lock, self._store.lock:

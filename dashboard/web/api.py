@@ -10,9 +10,10 @@ from fastapi import APIRouter, Depends, HTTPException, Query, Request
 from fastapi.responses import FileResponse
 
 from dashboard.data.alarms import alarms, bench_alarms
+from dashboard.data.lateness import lateness
 from dashboard.web.auth import Role
 from dashboard.web.control import ControlError
-from dashboard.web.front import Asker, Front, asker, front_of, needs
+from dashboard.web.front import Asker, Front, asker, desk_of, front_of, needs
 from dashboard.web.readings import Reading
 from dashboard.web.schemas import (
     DeviceOut,
@@ -133,16 +134,19 @@ def recording_out(front: Front) -> RecordingOut:
 
 
 def order_recorder(
-    front: Front, action: int, user: str, name: str = "", note: str = ""
+    request: Request, who: Asker, action: int, name: str = "", note: str = ""
 ) -> RecordingOut:
-    """Start or stop; HTTP 503 when the recorder does not answer, 409 when it says no."""
-    if front.desk is None:
+    """Start or stop; HTTP 503 when the recorder does not answer, 409 when it, or who has the
+    command, says no.
+    """
+    front, desk = front_of(request), desk_of(request, who)
+    if desk is None:
         raise HTTPException(503, "this dashboard has no connection to a recorder")
     try:
-        command = pb.RecorderCommand(action=action, name=name, note=note, user=user)
-        status = front.desk.recorder(command)
+        command = pb.RecorderCommand(action=action, name=name, note=note, user=who.name)
+        status = desk.recorder(command)
     except OrderError as error:
-        raise HTTPException(503, str(error)) from None
+        raise HTTPException(409 if desk.barred() else 503, str(error)) from None
     if status.recording != (action == pb.RecorderCommand.ACTION_START):
         raise HTTPException(409, status.message or "the recorder did not do it")
     if front.store is not None:  # what it says next on the bus may take a second
@@ -183,7 +187,12 @@ def devices(request: Request, who: SignedIn) -> list[DeviceOut]:
     with front.store.lock:
         found = [front.store.devices[name] for name in front.store.names()]
         return [
-            device_out(device, front.settings.stale_s, alarms(front.store, device))
+            device_out(
+                device,
+                front.settings.stale_s,
+                alarms(front.store, device),
+                lateness(front.store, device),
+            )
             for device in found
             if device.spoken_of
         ]
@@ -197,12 +206,12 @@ def recording(request: Request, who: SignedIn) -> RecordingOut:
 @routes.post("/recording/start", summary="Begin a recording (operator)")
 def start_recording(request: Request, body: StartRecording, who: Operator) -> RecordingOut:
     action = pb.RecorderCommand.ACTION_START
-    return order_recorder(front_of(request), action, who.name, body.name, body.note)
+    return order_recorder(request, who, action, body.name, body.note)
 
 
 @routes.post("/recording/stop", summary="End the recording (operator)")
 def stop_recording(request: Request, who: Operator) -> RecordingOut:
-    return order_recorder(front_of(request), pb.RecorderCommand.ACTION_STOP, who.name)
+    return order_recorder(request, who, pb.RecorderCommand.ACTION_STOP)
 
 
 @routes.get("/sessions", summary="Recorded sessions, newest first")

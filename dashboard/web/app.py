@@ -25,13 +25,16 @@ from dashboard.web import (
 from dashboard.web.accounts import pages as account_pages
 from dashboard.web.accounts import provider_pages
 from dashboard.web.alarms import routes as alarm_routes
+from dashboard.web.command import routes as command_routes
 from dashboard.web.first import pages as first_pages
 from dashboard.web.frame import proxy
 from dashboard.web.front import Front
 from dashboard.web.guard import Guard
 from dashboard.web.map import routes as map_routes
-from dashboard.web.programs import live_api, users_page
+from dashboard.web.places import routes as place_routes
+from dashboard.web.programs import live_api, metrics, users_page
 from dashboard.web.users import UsersError
+from dashboard.web.wall import routes as wall_routes
 
 STATIC = Path(__file__).parent / "static"
 
@@ -43,9 +46,11 @@ def create_app(front: Front) -> ASGIApp:
     )
     app.state.front = front
     app.state.listeners = Counter()  # user -> open streams
+    app.state.flows = {}  # seat -> what its scenes get
+    app.state.walls = Counter()  # user -> open wall displays
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
     app.include_router(
-        proxy.router(front.settings, front.gate, front.scene_port, front.open_labels)
+        proxy.router(front.settings, front.gate, front.scene_port, front.open_labels, front.seats)
     )
     app.include_router(api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(desk_api.routes, responses={401: {"description": "not signed in"}})
@@ -56,9 +61,13 @@ def create_app(front: Front) -> ASGIApp:
     app.include_router(spectrum_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(compare_api.routes, responses={401: {"description": "not signed in"}})
     app.include_router(alarm_routes.routes, responses={401: {"description": "not signed in"}})
+    app.include_router(metrics.routes, responses={401: {"description": "not signed in"}})
+    app.include_router(place_routes.routes, responses={401: {"description": "not signed in"}})
+    app.include_router(command_routes.routes, responses={401: {"description": "not signed in"}})
     app.include_router(pages.routes)
     app.include_router(session_pages.routes)
     app.include_router(users_page.routes)
+    app.include_router(wall_routes.routes)
     app.include_router(account_pages.routes)
     app.include_router(provider_pages.router(front.gate))
     app.include_router(first_pages.routes)

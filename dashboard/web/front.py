@@ -12,14 +12,19 @@ from dashboard.desk import Desk
 from dashboard.settings import DashboardSettings
 from dashboard.web.accounts.audit import Audit
 from dashboard.web.auth import Gate, Role, SignIn, User, WaitError, same_token
+from dashboard.web.command.seats import Seats
 from dashboard.web.control import Replay
 from dashboard.web.first.control import FirstRun
 from dashboard.web.jobs import Jobs
+from dashboard.web.places.lookers import Lookers
 from dashboard.web.readings import Readings
 from dashboard.web.tls.certificate import Certificate
 from dashboard.web.uploads import Uploads
 from dashboard.web.views import Views
+from messages.contract import gyrofree_pb2 as pb
 from sessions.library.catalogue import Catalogue
+
+METRICS = "/metrics"  # asked for by programs only, as all below /api/ is
 
 
 @dataclass
@@ -42,11 +47,14 @@ class Front:
     certificate: Certificate | None = None  # of the port, where it speaks TLS by itself
     open_labels: Collection[str] = ()  # of the scene's inputs that concern nobody else
     ended: Counter[str] = field(default_factory=Counter)  # why -> connections that were ended
+    lookers: Lookers = field(default_factory=Lookers)  # people, by role
     views: Views = field(init=False)
+    seats: Seats = field(init=False)
 
     def __post_init__(self) -> None:
         users = self.settings.users
         self.views = Views(users.with_name(users.name + ".views"))
+        self.seats = Seats(self.gate)
 
 
 @dataclass(frozen=True)
@@ -66,6 +74,19 @@ class Asker:
         return self.user.role
 
 
+def seat_of(request: Request, who: Asker) -> pb.Seat:
+    """The seat that a request orders from: a sign-in, or a token."""
+    front = front_of(request)
+    name = f"t-{who.token}" if who.token else front.seats.of_key(front.gate.key_of(request))
+    return pb.Seat(id=name, user=who.name[:60], admin=who.role >= Role.admin)
+
+
+def desk_of(request: Request, who: Asker) -> Desk | None:
+    """The desk of who asks; None without a bus."""
+    desk = front_of(request).desk
+    return None if desk is None else desk.of(seat_of(request, who))
+
+
 def front_of(request: Request) -> Front:
     """The Front of the application this request came to."""
     return request.app.state.front
@@ -80,12 +101,16 @@ def asker(request: Request) -> Asker:
     """Who asks: by his cookie, or for REST by an API token in `Authorization: Bearer`; HTTP 401
     for nobody.
     """
-    if "authorization" in request.headers and request.url.path.startswith("/api/"):
+    path = request.url.path
+    if "authorization" in request.headers and (path.startswith("/api/") or path == METRICS):
         return _by_token(request)
-    found = front_of(request).gate.session_of(request)
+    front = front_of(request)
+    found = front.gate.session_of(request)
     if found is None:
         raise HTTPException(401, "sign in first")
-    return Asker(*found)
+    who = Asker(*found)
+    front.lookers.saw(who.session.csrf, who.role.name)
+    return who
 
 
 def _by_token(request: Request) -> Asker:

@@ -15,7 +15,7 @@ from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Resp
 from dashboard.settings import DashboardSettings
 from dashboard.web import api
 from dashboard.web.auth import Role, WaitError, same_token
-from dashboard.web.front import Asker, address_of, asker, front_of
+from dashboard.web.front import Asker, Front, address_of, asker, front_of
 from dashboard.web.users import UsersError
 from logs.figures.words import TERMS
 from messages.text import template_value
@@ -86,8 +86,17 @@ def render(
         "version": version(),
         "provider": front.settings.oidc_suffix if front.settings.oidc_issuer else "",
         "path": request.url.path,
+        "barred": "" if who is None else barred(front, who),
     }
     return HTMLResponse(_templates.get_template(template).render(common | values), status)
+
+
+def barred(front: Front, who: Asker) -> str:
+    """Why no order is this person's, wherever the command is; empty: orders are."""
+    if who.role < Role.operator:
+        return f"This takes the role operator; you look as {who.role.name}."
+    watching = front.desk.watching if front.desk is not None else ""
+    return f"{watching}." if watching else ""
 
 
 def error_page(request: Request, status: int, text: str) -> HTMLResponse:
@@ -274,7 +283,7 @@ def sessions_page(
 ) -> HTMLResponse:
     front = front_of(request)
     rows = api.list_sessions(front, q)
-    can_replay = front.replay is not None and who.role >= Role.operator
+    can_replay = front.replay is not None and not barred(front, who)
     can_import = front.jobs is not None and who.role >= Role.operator
     return render(
         request, "sessions.html", who, rows=rows, q=q, can_replay=can_replay, can_import=can_import

@@ -1,5 +1,6 @@
 """What the REST interface takes and gives: SI units, times in s since 1970."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Annotated, Any
@@ -8,6 +9,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from dashboard.data.alarms import Alarm, words
 from dashboard.data.device import Device
+from dashboard.data.lateness import Lateness
 from messages import text
 from messages.contract import gyrofree_pb2 as pb
 from sessions.library.catalogue import SessionInfo
@@ -73,6 +75,18 @@ class AlarmOut(BaseModel):
     words: dict[str, str] = Field(description="words of the trade in it, with their meanings")
 
 
+class LateOut(BaseModel):
+    known: bool
+    late: bool = Field(description="surely more than a second")
+    shown: bool = Field(description="stands in the head of the page: late, or not known from afar")
+    age_s: float | None = Field(description="of its newest sample by the site's clock")
+    bound_s: float | None = Field(description="the most that this may be wrong by")
+    clock_ahead_s: float | None = Field(description="this dashboard's clock minus the site's")
+    clock_bound_s: float | None
+    said: str
+    details: str
+
+
 class DeviceOut(BaseModel):
     name: str
     source: str = Field(description="hardware, simulated, emulated, played or unknown")
@@ -94,6 +108,9 @@ class DeviceOut(BaseModel):
     axes: int
     estimators: list[EstimatorOut]
     alarms: list[AlarmOut] = Field(description="what is wrong, the worst first")
+    late: LateOut | None = Field(
+        default=None, description="how old its picture is; null: a replay, or no samples yet"
+    )
 
 
 class RecordingOut(BaseModel):
@@ -147,7 +164,31 @@ def alarms_out(found: Iterable[Alarm]) -> list[AlarmOut]:
     return [AlarmOut(**asdict(alarm), id=alarm.id, words=words(alarm)) for alarm in found]
 
 
-def device_out(device: Device, stale_s: float, found: Iterable[Alarm] = ()) -> DeviceOut:
+def late_out(found: Lateness | None) -> LateOut | None:
+    """An age as JSON."""
+    if found is None:
+        return None
+    numbers = found.age_s, found.bound_s, found.clock_ahead_s, found.clock_bound_s
+    age_s, bound_s, ahead_s, ahead_bound_s = (n if math.isfinite(n) else None for n in numbers)
+    return LateOut(
+        known=found.known,
+        late=found.late,
+        shown=found.shown,
+        age_s=age_s,
+        bound_s=bound_s,
+        clock_ahead_s=ahead_s,
+        clock_bound_s=ahead_bound_s,
+        said=found.said,
+        details=found.details,
+    )
+
+
+def device_out(
+    device: Device,
+    stale_s: float,
+    found: Iterable[Alarm] = (),
+    late: Lateness | None = None,
+) -> DeviceOut:
     """One device as JSON; a device that never sent a link status has zeros and says so in
     `message`. Call under the store's lock.
     """
@@ -198,6 +239,7 @@ def device_out(device: Device, stale_s: float, found: Iterable[Alarm] = ()) -> D
         axes=board.axes,
         estimators=estimators,
         alarms=alarms_out(found),
+        late=late_out(late),
     )
 
 

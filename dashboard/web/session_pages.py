@@ -11,7 +11,7 @@ from fastapi.responses import HTMLResponse
 from dashboard.web import api
 from dashboard.web.auth import Role
 from dashboard.web.front import Front, front_of
-from dashboard.web.pages import SignedIn, render
+from dashboard.web.pages import SignedIn, barred, render
 from dashboard.web.schemas import session_out
 from dashboard.web.session_api import REPORT_FOLDER, find_session
 from dashboard.web.trend import Point, Trend, draw
@@ -64,7 +64,7 @@ def session_page(request: Request, session: str, who: SignedIn) -> HTMLResponse:
         completeness=_completeness(manifest),
         formats=list(FORMATS),
         derived=parse_qs(front.views.of(who.name, "session")).get("derived", [""])[0],
-        can_replay=front.replay is not None and who.role >= Role.operator,
+        can_replay=front.replay is not None and not barred(front, who),
         can_change=who.role >= Role.operator,
         can_delete=who.role >= Role.admin,
     )

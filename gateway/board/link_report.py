@@ -104,7 +104,7 @@ class LinkReport:
             refused=self._door.counts(),
             stops=self._stops,
             stopped_s=self._stopped_s,
-            clock_offset_s=self._wall.offset_s,
+            clock_offset_s=self._wall.difference_s,
         )
         for name, count in self._gnss.refused.items():
             status.refused[f"receiver: {name}"] = count

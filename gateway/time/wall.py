@@ -31,6 +31,11 @@ class WallClock:
         """By how much the wall clock was set since the start, s."""
         return self._clock.offset_ns * 1e-9
 
+    @property
+    def difference_s(self) -> float:
+        """Likewise, with what is too little for a step."""
+        return self._clock.difference_ns * 1e-9
+
     def follow(self) -> None:
         """Look at the wall clock; a step is said."""
         step = self._clock.look()

@@ -10,10 +10,14 @@ from gyrofree.commands import run as logs
 from gyrofree.commands.board import board
 from gyrofree.commands.demo import demo, play
 from gyrofree.commands.installation import alarms, certs, config, site
+from gyrofree.commands.installation.backup import backup, restore
 from gyrofree.commands.installation.completion import answer_the_shell, completion
 from gyrofree.commands.installation.doctor import doctor
+from gyrofree.commands.installation.log_level import log_level
+from gyrofree.commands.installation.orders import orders
 from gyrofree.commands.installation.setup import setup
 from gyrofree.commands.installation.up import up
+from gyrofree.commands.installation.zenohd import zenohd_config
 from gyrofree.commands.options import say
 from gyrofree.commands.parser import Commands, run_main
 from gyrofree.commands.replay import replay
@@ -41,6 +45,7 @@ app = Commands(
 app.add_typer(users.app, name="users")
 app.add_typer(alarms.app, name="alarms")
 app.add_typer(config.app, name="config")
+site.app.command("zenohd-config")(zenohd_config)
 app.add_typer(site.app, name="site")
 app.add_typer(certs.app, name="certs")
 app.add_typer(layout.app, name="layout")
@@ -65,6 +70,10 @@ for command in (
     play,
     replay,
     doctor,
+    log_level,
+    backup,
+    restore,
+    orders,
     completion,
 ):
     app.command()(command)

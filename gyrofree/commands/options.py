@@ -9,7 +9,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from gyrofree.config import ConfigError, Settings, load_or_default
+from gyrofree.config import DEFAULT_PATH, ConfigError, Settings, load_or_default
+from gyrofree.operations.backup.parts import BackupError
+from gyrofree.operations.backup.swap import settle
 from gyrofree.running.process import EXIT_CONFIG, fail
 from messages.text import printed
 
@@ -41,10 +43,14 @@ UnitsAsNamed = Annotated[
 
 
 def settings_of(path: Path | None) -> Settings:
-    """The configuration a command was given; ends the command with one line per fault."""
+    """The configuration a command was given; ends the command with one line per fault. What a
+    restore that was killed had moved is brought back first.
+    """
     try:
+        if said := settle((path or DEFAULT_PATH).absolute().parent):
+            say(said, file=sys.stderr)
         return load_or_default(path)
-    except ConfigError as error:
+    except (ConfigError, BackupError) as error:
         raise fail(error, EXIT_CONFIG) from None
 
 

@@ -4,7 +4,8 @@
 
 import logging
 import threading
-from typing import Annotated
+from collections.abc import Callable
+from typing import Annotated, Any
 
 import typer
 
@@ -14,6 +15,7 @@ from gyrofree.commands.options import (
     settings_of,
 )
 from gyrofree.config import ConfigError
+from gyrofree.operations.attending import attended
 from gyrofree.running.process import command, run_service
 
 log = logging.getLogger(__name__)
@@ -24,17 +26,35 @@ def router(config: Config = None, verbose: Verbose = False) -> None:
     settings = settings_of(config)
 
     def body(stop: threading.Event) -> None:
+        from gyrofree.running.supervisor import die_with_parent
         from gyrofree.setup.site import router_rules
+        from messages.bus.beating import Beating, tell_time
         from messages.bus.session import open_router
+        from messages.bus.zenohd import Zenohd
 
         rules, mesh = router_rules(settings)
-        with open_router(settings.bus.acting_as("router"), rules, mesh):
-            log.info("router listens on %s", ", ".join(settings.bus.listen))
-            if mesh:
-                log.info("and calls %s", ", ".join(mesh))
-            stop.wait()
+        bus = settings.bus.acting_as("router")
 
-    run_service(body, verbose)
+        def serve(session: Any, wait: Callable[[], object]) -> None:
+            # at a site its home tells the time; who is none asks the router
+            telling = tell_time(session, bus.prefix) if bus.tls is None else None
+            with Beating(session, bus):
+                log.info("router listens on %s", ", ".join(settings.bus.listen))
+                if mesh:
+                    log.info("and calls %s", ", ".join(mesh))
+                wait()
+            if telling is not None:
+                telling.undeclare()
+
+        if bus.zenohd is None:
+            with open_router(bus, rules, mesh) as session:
+                serve(session, stop.wait)
+            return
+        with Zenohd(bus, rules, mesh, stop, die_with_parent) as program:
+            log.info("%s routes", bus.zenohd)
+            serve(program.session, program.wait)
+
+    run_service(body, verbose, attended(settings, "router"))
 
 
 def gateway(config: Config = None, verbose: Verbose = False) -> None:
@@ -49,7 +69,8 @@ def gateway(config: Config = None, verbose: Verbose = False) -> None:
         leave_when_alone(stop)
         service.run(settings.gateway, settings.bus.acting_as("gateway"), stop, keeper)
 
-    guard(lambda keeper: run_service(lambda stop: body(stop, keeper), verbose))
+    who = attended(settings, "gateway")
+    guard(lambda keeper: run_service(lambda stop: body(stop, keeper), verbose, who))
 
 
 def estimator(config: Config = None, verbose: Verbose = False) -> None:
@@ -67,7 +88,7 @@ def estimator(config: Config = None, verbose: Verbose = False) -> None:
         except UnknownEstimator as error:
             raise ConfigError(str(error)) from None
 
-    run_service(body, verbose)
+    run_service(body, verbose, attended(settings, "estimator"))
 
 
 def record(config: Config = None, verbose: Verbose = False) -> None:
@@ -83,7 +104,7 @@ def record(config: Config = None, verbose: Verbose = False) -> None:
         kept = settings.model_dump(mode="json", exclude={"alarms": {"webhook", "mail"}})
         service.run(settings.recorder, settings.bus.acting_as("recorder"), stop, kept)
 
-    run_service(body, verbose)
+    run_service(body, verbose, attended(settings, "recorder"))
 
 
 def procedures(config: Config = None, verbose: Verbose = False) -> None:
@@ -99,7 +120,7 @@ def procedures(config: Config = None, verbose: Verbose = False) -> None:
         except TableError as error:
             raise ConfigError(str(error)) from None
 
-    run_service(body, verbose)
+    run_service(body, verbose, attended(settings, "procedures"))
 
 
 def dashboard(
@@ -119,7 +140,7 @@ def dashboard(
         from dashboard.web.jobs import Jobs
         from dashboard.web.tls.certificate import CertificateError
         from dashboard.web.users import UsersError
-        from gyrofree.setup.site import only_watching
+        from gyrofree.setup.site import is_afar, only_watching, place_of
 
         options = ["--config", str(config)] if config else []
         replayer = command("replay", "--stay", *options)
@@ -129,8 +150,18 @@ def dashboard(
         bus = settings.bus.acting_as("dashboard")
         watching = only_watching(settings)
         try:
-            service.run(settings.dashboard, bus, stop, replay, jobs, first, watching)
+            service.run(
+                settings.dashboard,
+                bus,
+                stop,
+                replay,
+                jobs,
+                first,
+                watching,
+                place_of(settings),
+                is_afar(settings),
+            )
         except (CertificateError, UsersError) as error:
             raise ConfigError(str(error)) from None
 
-    run_service(body, verbose)
+    run_service(body, verbose, attended(settings, "dashboard"))

@@ -78,14 +78,14 @@ def guard(serve: Callable[[Keeper], None]) -> None:
 
     def forward(number: int, _: object) -> None:
         if child[0]:
-            os.kill(child[0], signal.SIGTERM)
+            os.kill(child[0], number if number == signal.SIGUSR1 else signal.SIGTERM)
 
     # A signal that comes just before poll() sleeps does not wake it, and its handler would wait for
     # the child's end.
     awake, wake = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
     while True:
         born = time.monotonic()
-        for number in (signal.SIGTERM, signal.SIGINT):
+        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1):
             signal.signal(number, forward)
         signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
         mine, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)

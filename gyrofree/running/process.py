@@ -19,14 +19,16 @@ import typer
 import zenoh
 
 from gyrofree.config import ConfigError
+from gyrofree.operations import log_form
+from gyrofree.operations.attending import Attended
+from gyrofree.operations.settings import LogSettings
 from messages.bus.faults import BusUnavailable, IdentityError
-from messages.text import plain, printed, reason
+from messages.text import printed, reason
 
 EXIT_FAILED = 1
 EXIT_CONFIG = 2
 EXIT_TAKEN = 3
 
-LINE = 4000  # characters of a message in the log
 SETTLED = 8.0  # s after the start: imports and compiled functions are loaded
 
 log = logging.getLogger(__name__)
@@ -41,34 +43,14 @@ def command(*arguments: str) -> list[str]:
     return [sys.executable, "-P", "-m", "gyrofree", *arguments]
 
 
-class OneLine(logging.Formatter):
-    """A message is one line: text from outside can neither begin another nor move the cursor."""
-
-    def formatMessage(self, record: logging.LogRecord) -> str:
-        record.message = plain(record.message, LINE)
-        return super().formatMessage(record)
+def start_logging(settings: LogSettings | None = None, verbose: bool = False) -> None:
+    """Log on stderr, one line an event."""
+    log_form.start("gyrofree", settings, verbose)
 
 
-def start_logging(verbose: bool = False) -> None:
-    """One line per event on stderr; below a supervisor without time, which the supervisor writes
-    itself.
-    """
-    supervised = "GYROFREE_SUPERVISED" in os.environ
-    form = (
-        "%(levelname)s %(message)s"
-        if supervised
-        else "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
-    )
-    handler = logging.StreamHandler(sys.stderr)
-    handler.setFormatter(OneLine(form))
-    level = logging.DEBUG if verbose else logging.INFO
-    logging.basicConfig(level=level, handlers=[handler], force=True)
-    for noisy in ("websockets", "uvicorn.access", "httpx", "asyncio", "httpcore"):
-        logging.getLogger(noisy).setLevel(logging.WARNING)
-
-
-def stop_on_signals() -> threading.Event:
-    """An event that SIGTERM and Ctrl-C set. To be called in the main thread.
+def stop_on_signals(toggle: Callable[[], None] | None = None) -> threading.Event:
+    """An event that SIGTERM and Ctrl-C set. To be called in the main thread. toggle: what SIGUSR1
+    does.
 
     Not set by a handler in Python: that runs in the main thread once it wakes, and not at all while
     it sleeps and the signal met another one; and awake, it may be inside stop.wait() and hold the
@@ -81,11 +63,12 @@ def stop_on_signals() -> threading.Event:
     os.set_blocking(tell, False)
 
     def listen() -> None:
-        os.read(told, 1)
+        while os.read(told, 1)[0] == signal.SIGUSR1:
+            toggle()  # type: ignore[misc]
         stop.set()
 
     threading.Thread(target=listen, name="signals", daemon=True).start()
-    for number in (signal.SIGTERM, signal.SIGINT):
+    for number in (signal.SIGTERM, signal.SIGINT, *([signal.SIGUSR1] if toggle else [])):
         signal.signal(number, lambda *_: None)
     signal.set_wakeup_fd(tell, warn_on_full_buffer=False)
     atexit.register(_end_in_peace)
@@ -133,10 +116,20 @@ def fail(why: str | Exception, code: int = EXIT_FAILED) -> typer.Exit:
     return typer.Exit(code)
 
 
-def run_service(body: Callable[[threading.Event], None], verbose: bool = False) -> None:
-    """Run a service until it ends or is told to; faults become one line and an exit code."""
-    start_logging(verbose)
-    stop = stop_on_signals()
+def run_service(
+    body: Callable[[threading.Event], None],
+    verbose: bool = False,
+    attended: Attended | None = None,
+) -> None:
+    """Run a service until it ends or is told to; faults become one line and an exit code.
+
+    attended: where it is one that others look after, with a name of its own.
+    """
+    if attended is None:
+        start_logging(verbose=verbose)
+        stop = stop_on_signals()
+    else:
+        stop = stop_on_signals(attended.start(verbose).toggle)
     settled = threading.Timer(SETTLED, _spare_the_collector)
     settled.daemon = True
     settled.start()

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from rich.console import Console
 from rich.text import Text
 
+from gyrofree.operations.log_form import FORMAT, SUPERVISED, said
 from gyrofree.running.process import EXIT_CONFIG, EXIT_TAKEN, command
 from messages.text import printed
 
@@ -54,7 +55,7 @@ class Child:
     )
 
 
-def _die_with_parent() -> None:
+def die_with_parent() -> None:
     """Ask Linux for SIGTERM when the supervisor is gone, however it went."""
     ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
@@ -62,8 +63,13 @@ def _die_with_parent() -> None:
 class Supervisor:
     """Starts children in order, keeps them alive, stops them in reverse order."""
 
-    def __init__(self, console: Console | None = None, name: str = "gyrofree") -> None:
-        """name: of the command, before the supervisor's own lines."""
+    def __init__(
+        self, console: Console | None = None, name: str = "gyrofree", as_json: bool = False
+    ) -> None:
+        """name: of the command, before the supervisor's own lines. as_json: every line is an
+        object, as the children's are then.
+        """
+        self.as_json = as_json
         self.name = name
         self.console = console or Console(stderr=True, highlight=False)
         self.children: list[Child] = []
@@ -95,6 +101,9 @@ class Supervisor:
 
     def say(self, text: str, style: str = "bold") -> None:
         """A line of the supervisor's own."""
+        if self.as_json:
+            self._print_json(self.name, text, _level(style))
+            return
         self._print(self.name, "bold white", text, style)
 
     def start(self) -> None:
@@ -159,10 +168,12 @@ class Supervisor:
             text=True,
             errors="replace",
             bufsize=1,
-            env=os.environ | {"GYROFREE_SUPERVISED": "1", "PYTHONUNBUFFERED": "1"},
+            env=os.environ
+            | {SUPERVISED: "1", "PYTHONUNBUFFERED": "1"}
+            | {FORMAT: "json" if self.as_json else "text"},
             # Ctrl-C reaches the supervisor alone, which then ends them in order
             start_new_session=True,
-            preexec_fn=_die_with_parent,
+            preexec_fn=die_with_parent,
         )
         reader = threading.Thread(target=self._read, args=(child, child.process), daemon=True)
         reader.start()
@@ -202,9 +213,22 @@ class Supervisor:
                 child.hushed = None
             if child.hushed and child.hushed[0] in line:
                 continue
+            if self.as_json:
+                self._print_json(child.name, line.rstrip())
+                continue
             self._print(
                 child.name, child.colour, rest if known else line.rstrip(), LEVELS.get(level, "")
             )
+
+    def _print_json(self, name: str, line: str, level: str = "") -> None:
+        """A child's object as it is; what it said otherwise, such as a fault of the interpreter,
+        as one.
+        """
+        whole = line.startswith("{") and line.endswith("}") and not level
+        with self._printing:
+            text = line if whole else said(name, level or "error", printed(line))
+            print(text, file=self.console.file, flush=True)
+            self.lines, self.last_line = self.lines + 1, time.monotonic()
 
     def _print(self, name: str, colour: str, text: str, style: str) -> None:
         clock = time.strftime("%H:%M:%S")
@@ -214,3 +238,8 @@ class Supervisor:
         with self._printing:
             self.console.print(line, soft_wrap=True)
             self.lines, self.last_line = self.lines + 1, time.monotonic()
+
+
+def _level(style: str) -> str:
+    """Of a line that is shown so."""
+    return "error" if "red" in style else "warning" if style == "yellow" else "info"

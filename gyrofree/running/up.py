@@ -20,6 +20,7 @@ from dashboard.web.users import (
     remove_user,
 )
 from gyrofree.config import DEFAULT_PATH, ConfigError, Settings, load
+from gyrofree.operations.log_form import wanted
 from gyrofree.running.doctor import port_taken
 from gyrofree.running.process import (
     EXIT_CONFIG,
@@ -87,11 +88,11 @@ class FirstBoard:
 
 def run(plan: Plan) -> None:
     """Run until Ctrl-C; raises typer.Exit with a code when it cannot."""
-    start_logging()
+    settings = plan.settings
+    start_logging(settings.log)
     stop = stop_on_signals()
     _look_for_others(plan)
-    settings = plan.settings
-    supervisor = Supervisor(name="up")
+    supervisor = Supervisor(name="up", as_json=wanted(settings.log) == "json")
     for service in plan.services:
         words = COMMANDS.get(service, (service,))
         options = ["--config", str(plan.config)] if plan.config else []

@@ -40,6 +40,16 @@ def only_watching(settings: Settings) -> str:
     return f"{place.place} watches {place.site}: its home, {place.home}, gave it no right to order"
 
 
+def place_of(settings: Settings) -> str:
+    """The name of this place in its site; empty without one. Raises ConfigError."""
+    return "" if settings.bus.tls is None else _place(settings.bus.tls).place
+
+
+def is_afar(settings: Settings) -> bool:
+    """Are the boards at another place of the site? Raises ConfigError."""
+    return settings.bus.tls is not None and not _place(settings.bus.tls).at_home
+
+
 def router_rules(settings: Settings) -> tuple[dict[str, Any] | None, tuple[str, ...]]:
     """What the router lets through, and the routers that it calls; no rules without a site."""
     folder = settings.bus.tls

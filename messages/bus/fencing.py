@@ -24,6 +24,7 @@ from messages.contract.topics import (
     CLAIMED,
     GATEWAY,
     RECORDER,
+    REPLAY_SUFFIX,
     TopicError,
     claim_key,
     fence_key,
@@ -112,11 +113,13 @@ class Fence:
         self.claims = Claims()
 
     def admit(self, key: str, attachment: "zenoh.ZBytes | None") -> bool:
-        """Is this message of the newest publisher of its key? One without a number always is, and
-        one of a topic that nobody has for himself.
+        """Is this message of the newest publisher of its key? One without a number is where nobody
+        has claimed the key, and one of a topic that nobody has for himself always.
         """
-        if attachment is None or len(attachment) != BYTES or not _fenced(key):
+        if not _fenced(key):
             return True
+        if attachment is None or len(attachment) != BYTES:
+            return self._without_number(key)
         number = int.from_bytes(attachment.to_bytes(), "little")
         known = self._numbers.get(key, 0)
         if number == known:
@@ -133,6 +136,16 @@ class Fence:
         if len(self._numbers) < KEYS or key in self._numbers:
             self._numbers[key] = number
         return True
+
+    def _without_number(self, key: str) -> bool:
+        """A replay speaks under names of its own, also where an estimator serves."""
+        if device_of(key).endswith(REPLAY_SUFFIX):
+            return True
+        claimed = self.claims.numbers(key)
+        if claimed:
+            wanted = f"the number that its publisher has claimed: {max(claimed)}"
+            self.refuse(key, Refusal("claim", "publisher", "none", wanted), device_of(key))
+        return not claimed
 
     def highest(self, device: str, source: str) -> int:
         """The greatest number heard of a device's topics of one source."""

@@ -14,6 +14,7 @@ import zenoh
 from google.protobuf.message import DecodeError, Message
 
 from messages.bus.claiming import OVERDUE, id_of, newest
+from messages.bus.command.watch import Watch, given_by
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 from messages.contract.checks import MESSAGE_BYTES, check
@@ -21,6 +22,7 @@ from messages.contract.topics import (
     TopicError,
     alarms_control_key,
     check_name,
+    command_control_key,
     control_key,
     recorder_control_key,
     replay_control_key,
@@ -57,6 +59,8 @@ class Kind(Generic[C, A]):
     patience_s: float
     key: Callable[[str, str], str]  # of (prefix, device)
     source: str  # of the topics on which it publishes: who has claimed them is who answers
+    # of a command: does it take the site's command, which one operator has at a time?
+    commanded: Callable[[C], bool] = lambda command: True  # noqa: ARG005
 
 
 RECORDER = Kind(
@@ -67,6 +71,7 @@ RECORDER = Kind(
     10.0,  # it may have to close a file
     lambda prefix, device: recorder_control_key(prefix),
     tp.RECORDER,
+    lambda command: command.action != pb.RecorderCommand.ACTION_STATUS,
 )
 ESTIMATOR = Kind(
     "the estimator",
@@ -85,6 +90,7 @@ BOARD = Kind(
     8.0,  # a self-test of the sensors takes up to 4 s
     lambda prefix, device: control_key(prefix, device, "board-control"),
     tp.GATEWAY,
+    lambda command: not command.ask,
 )
 PROCEDURES = Kind(
     "the procedures",
@@ -94,6 +100,7 @@ PROCEDURES = Kind(
     25.0,  # a recording is closed and another begun
     lambda prefix, device: control_key(prefix, device, "procedure-control"),
     tp.PROCEDURES,
+    lambda command: command.action != pb.ProcedureCommand.ACTION_STOP,  # anybody may stop a table
 )
 REPLAY = Kind(
     "the replay",
@@ -103,6 +110,7 @@ REPLAY = Kind(
     5.0,
     lambda prefix, device: replay_control_key(prefix),
     tp.REPLAY.source,
+    lambda command: False,  # noqa: ARG005 it speaks under names of its own
 )
 ALARMS = Kind(
     "the alarms",
@@ -112,6 +120,26 @@ ALARMS = Kind(
     15.0,  # a notice that is tried out waits for somebody else's server
     lambda prefix, device: alarms_control_key(prefix),
     tp.ALARMS,
+    lambda command: False,  # noqa: ARG005 whoever sees an alarm may take note of it
+)
+SEAT = Kind(
+    "who keeps the command",
+    pb.SeatCommand,
+    pb.SeatReply,
+    "see that `gyrofree procedures` runs and reaches the router",
+    5.0,
+    lambda prefix, device: command_control_key(prefix),
+    tp.PROCEDURES,
+    lambda command: False,  # noqa: ARG005 it is about the command itself
+)
+LOG_LEVEL = Kind(
+    "the service",
+    pb.LogLevelCommand,
+    pb.Reply,
+    "see that it runs and reaches the router",
+    3.0,
+    lambda prefix, device: control_key(prefix, device, "log-level"),
+    "process",  # nobody claims to be the only one
 )
 
 
@@ -122,12 +150,13 @@ def give(
     command: C,
     device: str = "",
     timeout_s: float | None = None,
+    by: pb.OrderBy | None = None,
 ) -> A:
     """Give an order and wait for its answer, by default as long as this kind of orders may take.
 
-    `device` for the kinds that are for one board or its estimators. Raises Refused with the
-    service's own reason, NoAnswer without an answer, TopicError for a name that cannot be a
-    device's.
+    `device` for the kinds that are for one board or its estimators; `by`: who gives it. Raises
+    Refused with the service's own reason, NoAnswer without an answer, TopicError for a name that
+    cannot be a device's.
     """
     if session is None:
         raise NoAnswer(f"{kind.who}: no connection to the router yet")
@@ -141,6 +170,7 @@ def give(
         replies = session.get(
             key,
             payload=command.SerializeToString(),
+            attachment=None if by is None else by.SerializeToString(),
             timeout=patience_s,
             consolidation=zenoh.ConsolidationMode.NONE,  # the first answer, at once
         )
@@ -204,18 +234,32 @@ class Order(Generic[C, A]):
         self._query.drop()
 
 
+class Taking:
+    """Orders are taken until undeclare()."""
+
+    def __init__(self, queryable: zenoh.Queryable, watch: Watch) -> None:
+        self._queryable, self._watch = queryable, watch
+
+    def undeclare(self) -> None:
+        """Take no more."""
+        self._queryable.undeclare()
+        self._watch.close()
+
+
 def take(
     session: zenoh.Session,
     prefix: str,
     kind: Kind[C, A],
     handler: Callable[[Order[C, A]], None],
     device: str = "",
-) -> zenoh.Queryable:
+) -> Taking:
     """Call handler(order) on Zenoh's thread for each order; undeclare the result at the end.
 
-    `device` "*" takes the orders for any device. Bytes that are no command, values
-    that the contract does not allow, and orders for several devices at once, are refused here.
+    `device` "*" takes the orders for any device. Bytes that are no command, values that the
+    contract does not allow, orders for several devices at once, and those of whom does not have
+    the command where they take it, are refused here.
     """
+    watch = Watch(session, prefix)
 
     def on_query(query: zenoh.Query) -> None:
         asked = str(query.key_expr)
@@ -233,9 +277,14 @@ def take(
         if "*" in asked:
             query.reply_err(f"an order is for one device, not for {asked}".encode())
             return
+        by = given_by(query.attachment)
+        if kind.commanded(command) and (reason := watch.refusal(by)):
+            log.warning("%s: an order of %s is refused: %s", kind.who, by.seat.user, reason)
+            query.reply_err(reason.encode())
+            return
         try:
             handler(Order(query, check_name(asked.split("/")[1]), command))
         except TopicError as error:
             query.reply_err(str(error).encode())
 
-    return session.declare_queryable(kind.key(prefix, device), on_query)
+    return Taking(session.declare_queryable(kind.key(prefix, device), on_query), watch)

@@ -11,113 +11,30 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterable
-from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, TypeVar
 
 import zenoh
 from google.protobuf.message import Message
-from pydantic import BaseModel, ConfigDict, PrivateAttr
 
-from messages.bus import tls
+from messages.bus import attending, tls
 from messages.bus.faults import BusUnavailable
-from messages.bus.fencing import packed
+from messages.bus.fencing import Fence, packed
+from messages.bus.settings import BusSettings, configuration
 from messages.contract.door import read
-from messages.contract.names import Name
 from messages.contract.topics import REPLAY_SUFFIX, Topic
 from messages.history.spool import Spool
-from messages.setting import setting
 
 PATIENCE_S = 3.0  # for a router that starts together with its clients
 CLOSING_S = 5.0
-LARGEST = 16 << 20  # bytes; messages have at most 1 MB, answers to questions 8
 
 log = logging.getLogger(__name__)
 
 M = TypeVar("M", bound=Message)
 
 
-class BusSettings(BaseModel):
-    """[bus]: how the processes find one another."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    prefix: Name = setting(
-        "gyrofree",
-        "first part of every bus key; two installations on one router differ in it",
-        shown=True,
-    )
-    router: str = setting("tcp/127.0.0.1:7447", "where all processes find the router", shown=True)
-    listen: list[str] = setting(
-        ["tcp/127.0.0.1:7447"],
-        "where the router listens; beyond loopback read docs/deployment.md first",
-        shown=True,
-    )
-    tls: Path | None = setting(
-        None,
-        "folder of this place's certificates, which `gyrofree site` makes: every link is then"
-        " encrypted, and each process may say only what its role needs; without it plain TCP, for"
-        " the loopback of one machine",
-    )
-    # 2 s noticed a frozen process sooner, but on a machine busy with drawing in software it also
-    # cut off live ones, and lost 3 % of all messages.
-    lease_ms: int = setting(
-        10_000, "a peer that shows no life for so long is cut off", unit="ms", ge=200, le=60_000
-    )
-
-    _role: str = PrivateAttr("operator")
-
-    def acting_as(self, role: str) -> Self:
-        """The same for a process of this role, which shows its certificate."""
-        copy = self.model_copy()
-        copy._role = role
-        return copy
-
-    @property
-    def role(self) -> str:
-        """What this process is; a person's command is an operator's."""
-        return self._role
-
-
 def _config(settings: BusSettings, mode: str, mesh: Iterable[str] = ()) -> zenoh.Config:
     config = zenoh.Config()
-    patience_us = 100_000
-    values = {
-        "mode": mode,
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": False,
-        "timestamping/enabled": True,
-        # A pool of 16 MiB in every process for messages above 3 kB, left in /dev/shm by every one
-        # that is killed.
-        "transport/shared_memory/enabled": False,
-        "transport/link/tx/lease": settings.lease_ms,
-        # A process that gets no processor for a while must not lose messages: room for 16 batches
-        # of 64 KiB, and some patience before DROP drops. Express publishing would be no faster at
-        # these rates (measured), but takes a batch for each message: bursts of 17 were cut off.
-        "transport/link/tx/queue/size/data": 16,
-        # A larger message is put together nowhere: Zenoh would take a GB for one, in each process
-        # that listens.
-        "transport/link/rx/max_message_size": LARGEST,
-        "transport/link/tx/queue/congestion_control/drop/wait_before_drop": patience_us,
-    }
-    if settings.tls is not None:
-        values |= tls.values(settings.tls, settings.role)
-    if mode == "router":
-        values["listen/endpoints"] = settings.listen
-        values["connect/endpoints"] = list(mesh)
-        values["connect/timeout_ms"] = -1  # another site may come later
-        values["connect/exit_on_failure"] = False
-    else:
-        values["connect/endpoints"] = [settings.router]
-        values["connect/timeout_ms"] = 1000
-        values["listen/endpoints"] = []
-        # Look for a router that went away every second: what was missed shall be on the screen
-        # within five.
-        values["connect/retry"] = {
-            "period_init_ms": 500,
-            "period_max_ms": 1000,
-            "period_increase_factor": 1.5,
-        }
-    for key, value in values.items():
+    for key, value in configuration(settings, mode, mesh).items():
         config.insert_json5(key, json.dumps(value))
     return config
 
@@ -132,22 +49,25 @@ def open_router(
     config = _config(settings, "router", mesh)
     if access is not None:
         config.insert_json5("access_control", json.dumps(access))
-    return zenoh.open(config)
+    return attending.opened(zenoh.open(config), settings)
 
 
 def open_client(
-    settings: BusSettings, stop: threading.Event | None = None, timeout_s: float | None = None
+    settings: BusSettings,
+    stop: threading.Event | None = None,
+    timeout_s: float | None = None,
+    warn: bool = True,
 ) -> zenoh.Session:
-    """A connected client session; waits for the router, for ever by default.
+    """A connected client session; waits for the router, for ever by default. warn: say so.
 
     Raises BusUnavailable after timeout_s or when `stop` is set first.
     """
     stop = stop or threading.Event()
     end = None if timeout_s is None else time.monotonic() + timeout_s
-    start, said = time.monotonic(), False
+    start, said = time.monotonic(), not warn
     while True:
         try:
-            return zenoh.open(_config(settings, "client"))
+            return attending.opened(zenoh.open(_config(settings, "client")), settings)
         except zenoh.ZError:
             if stop.is_set() or (end is not None and time.monotonic() > end):
                 raise BusUnavailable(
@@ -178,11 +98,16 @@ class LateSession:
     hear it.
     """
 
-    def __init__(self, settings: BusSettings, opened: Callable[[zenoh.Session], object]) -> None:
+    def __init__(
+        self,
+        settings: BusSettings,
+        opened: Callable[[zenoh.Session], object],
+        warn: bool = True,
+    ) -> None:
         """`opened` gets the session, on a thread of its own; what it returns is kept as long as
-        this is.
+        this is. warn: say that the router does not answer.
         """
-        self._settings, self._opened = settings, opened
+        self._settings, self._opened, self._warn = settings, opened, warn
         self._session: zenoh.Session | None = None
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._open, name="late session", daemon=True)
@@ -190,7 +115,7 @@ class LateSession:
 
     def _open(self) -> None:
         try:
-            self._session = open_client(self._settings, self._closing)
+            self._session = open_client(self._settings, self._closing, warn=self._warn)
         except BusUnavailable:
             return
         self._kept = self._opened(self._session)
@@ -212,6 +137,8 @@ class Publishers:
     With a spool, every message is kept there before it goes out, and its sequences go on where the
     spool's end; a session may then come later (`attach`): until it does, messages are only kept.
     """
+
+    heard: Callable[[Topic, str, str, Message], None] | None = None  # gets each, for figures
 
     def __init__(
         self, session: zenoh.Session | None, prefix: str, spool: Spool | None = None
@@ -269,6 +196,8 @@ class Publishers:
                 header.sequence = self._sequence[key]
             if self._sequence[key] <= self._published.get(key, 0):
                 return
+        if Publishers.heard is not None:
+            Publishers.heard(topic, device, estimator, message)
         payload = message.SerializeToString()
         if self._spool is not None and not device.endswith(REPLAY_SUFFIX):
             name = key.split("/", 2)[2]
@@ -306,12 +235,15 @@ def subscribe(
     prefix: str,
     handler: Callable[[str, M], None],
     device: str = "*",
+    fence: Fence | None = None,
 ) -> zenoh.Subscriber:
     """Call handler(key, message) on Zenoh's thread for each message; handlers only append to a
-    queue.
+    queue. With a fence, for those of the process that serves.
     """
 
     def on_sample(sample: zenoh.Sample) -> None:
+        if fence is not None and not fence.admit(str(sample.key_expr), sample.attachment):
+            return
         message = decode(topic, sample.payload.to_bytes())
         if message is not None:
             handler(str(sample.key_expr), message)

@@ -5,12 +5,15 @@ writes them. With a folder every link is TLS with certificates on both sides; th
 """
 
 import datetime as dt
+import json
 from pathlib import Path
 from typing import Any
 
 from cryptography import x509
+from cryptography.x509.oid import NameOID
 
 from messages.bus.faults import IdentityError
+from messages.contract.names import NAME
 
 TRUSTED = "ca.pem"
 
@@ -41,6 +44,36 @@ def values(folder: Path, role: str) -> dict[str, Any]:
             "close_link_on_expiration": True,
         },
     }
+
+
+def place_of(folder: Path, role: str) -> str:
+    """The place that a process speaks for: of its folder or, where that was handed out for another
+    machine, the machine's name in its certificate. Empty where neither can be read.
+    """
+    try:
+        name = json.loads((folder / "place.json").read_bytes())["place"]
+    except (OSError, ValueError, KeyError, TypeError):
+        name = common_name(folder, role).partition(".")[2]
+    return name if isinstance(name, str) and NAME.fullmatch(name) else ""
+
+
+def common_name(folder: Path, role: str) -> str:
+    """Of a role's certificate; empty where it cannot be read."""
+    try:
+        certificate = x509.load_pem_x509_certificate((folder / f"{role}.pem").read_bytes())
+    except (OSError, ValueError):
+        return ""
+    found = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
+    return str(found[0].value) if found else ""
+
+
+def life(folder: Path, role: str) -> tuple[dt.datetime, dt.datetime] | None:
+    """When a role's certificate begins and ends; None where it cannot be read."""
+    try:
+        certificate = x509.load_pem_x509_certificate((folder / f"{role}.pem").read_bytes())
+    except (OSError, ValueError):
+        return None
+    return certificate.not_valid_before_utc, certificate.not_valid_after_utc
 
 
 def trouble(folder: Path, role: str) -> str:

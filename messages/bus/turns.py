@@ -4,8 +4,9 @@ import contextlib
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
+from messages.bus.beating import Beating
 from messages.bus.claiming import Claim, Claimant, claim
 from messages.bus.faults import BusUnavailable
 from messages.bus.fencing import heard_of
@@ -16,8 +17,12 @@ log = logging.getLogger(__name__)
 
 
 @contextlib.contextmanager
-def sessions(bus: BusSettings, stop: threading.Event) -> Iterator[Claimant | None]:
-    """Sessions to publish and to ask with; None when `stop` came before a router."""
+def sessions(
+    bus: BusSettings, stop: threading.Event, devices: Iterable[str] = ()
+) -> Iterator[Claimant | None]:
+    """Sessions to publish and to ask with, and the first of them beats; None when `stop` came
+    before a router. devices: boards that this process has.
+    """
     with contextlib.ExitStack() as open_ones:
         try:
             both = [open_ones.enter_context(open_client(bus, stop)) for _ in range(2)]
@@ -25,6 +30,8 @@ def sessions(bus: BusSettings, stop: threading.Event) -> Iterator[Claimant | Non
             both = []
             if not stop.is_set():
                 raise
+        if both:
+            open_ones.enter_context(Beating(both[0], bus, devices))
         yield Claimant(*both) if both else None
 
 

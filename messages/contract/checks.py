@@ -39,6 +39,7 @@ KINDS = (  # what a refusal can be counted as
     "answer",  # of a publisher: not what was asked for
     "stale",  # of a publisher whose place another has taken
     "claim",  # of a publisher that has claimed no such number, or nothing
+    "twin",  # of another publisher of the name, for a time that one was heard
     "repeated",  # it has come before, byte for byte
     "failure",  # we could not take it: a fault of ours
 )

@@ -959,6 +959,130 @@ class Reply(_message.Message):
     message: str
     def __init__(self, ok: _Optional[bool] = ..., message: _Optional[str] = ...) -> None: ...
 
+class Seat(_message.Message):
+    __slots__ = ("id", "user", "place", "admin", "service")
+    ID_FIELD_NUMBER: _ClassVar[int]
+    USER_FIELD_NUMBER: _ClassVar[int]
+    PLACE_FIELD_NUMBER: _ClassVar[int]
+    ADMIN_FIELD_NUMBER: _ClassVar[int]
+    SERVICE_FIELD_NUMBER: _ClassVar[int]
+    id: str
+    user: str
+    place: str
+    admin: bool
+    service: bool
+    def __init__(self, id: _Optional[str] = ..., user: _Optional[str] = ..., place: _Optional[str] = ..., admin: _Optional[bool] = ..., service: _Optional[bool] = ...) -> None: ...
+
+class OrderBy(_message.Message):
+    __slots__ = ("seat", "epoch")
+    SEAT_FIELD_NUMBER: _ClassVar[int]
+    EPOCH_FIELD_NUMBER: _ClassVar[int]
+    seat: Seat
+    epoch: int
+    def __init__(self, seat: _Optional[_Union[Seat, _Mapping]] = ..., epoch: _Optional[int] = ...) -> None: ...
+
+class CommandStatus(_message.Message):
+    __slots__ = ("header", "epoch", "holder", "since_utc_ns", "asks", "left_s", "answer_s", "away_s", "last")
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    EPOCH_FIELD_NUMBER: _ClassVar[int]
+    HOLDER_FIELD_NUMBER: _ClassVar[int]
+    SINCE_UTC_NS_FIELD_NUMBER: _ClassVar[int]
+    ASKS_FIELD_NUMBER: _ClassVar[int]
+    LEFT_S_FIELD_NUMBER: _ClassVar[int]
+    ANSWER_S_FIELD_NUMBER: _ClassVar[int]
+    AWAY_S_FIELD_NUMBER: _ClassVar[int]
+    LAST_FIELD_NUMBER: _ClassVar[int]
+    header: Header
+    epoch: int
+    holder: Seat
+    since_utc_ns: int
+    asks: Seat
+    left_s: float
+    answer_s: float
+    away_s: float
+    last: str
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., epoch: _Optional[int] = ..., holder: _Optional[_Union[Seat, _Mapping]] = ..., since_utc_ns: _Optional[int] = ..., asks: _Optional[_Union[Seat, _Mapping]] = ..., left_s: _Optional[float] = ..., answer_s: _Optional[float] = ..., away_s: _Optional[float] = ..., last: _Optional[str] = ...) -> None: ...
+
+class OrderGiven(_message.Message):
+    __slots__ = ("header", "at_utc_ns", "user", "place", "whom", "device", "what", "outcome", "text", "seconds")
+    class Outcome(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        OUTCOME_NONE: _ClassVar[OrderGiven.Outcome]
+        OUTCOME_DONE: _ClassVar[OrderGiven.Outcome]
+        OUTCOME_REFUSED: _ClassVar[OrderGiven.Outcome]
+        OUTCOME_NO_ANSWER: _ClassVar[OrderGiven.Outcome]
+    OUTCOME_NONE: OrderGiven.Outcome
+    OUTCOME_DONE: OrderGiven.Outcome
+    OUTCOME_REFUSED: OrderGiven.Outcome
+    OUTCOME_NO_ANSWER: OrderGiven.Outcome
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    AT_UTC_NS_FIELD_NUMBER: _ClassVar[int]
+    USER_FIELD_NUMBER: _ClassVar[int]
+    PLACE_FIELD_NUMBER: _ClassVar[int]
+    WHOM_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    WHAT_FIELD_NUMBER: _ClassVar[int]
+    OUTCOME_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    SECONDS_FIELD_NUMBER: _ClassVar[int]
+    header: Header
+    at_utc_ns: int
+    user: str
+    place: str
+    whom: str
+    device: str
+    what: str
+    outcome: OrderGiven.Outcome
+    text: str
+    seconds: float
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., at_utc_ns: _Optional[int] = ..., user: _Optional[str] = ..., place: _Optional[str] = ..., whom: _Optional[str] = ..., device: _Optional[str] = ..., what: _Optional[str] = ..., outcome: _Optional[_Union[OrderGiven.Outcome, str]] = ..., text: _Optional[str] = ..., seconds: _Optional[float] = ...) -> None: ...
+
+class SeatCommand(_message.Message):
+    __slots__ = ("action", "seat", "text", "most", "to")
+    class Action(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        ACTION_LOOK: _ClassVar[SeatCommand.Action]
+        ACTION_TAKE: _ClassVar[SeatCommand.Action]
+        ACTION_ASK: _ClassVar[SeatCommand.Action]
+        ACTION_GRANT: _ClassVar[SeatCommand.Action]
+        ACTION_DENY: _ClassVar[SeatCommand.Action]
+        ACTION_RELEASE: _ClassVar[SeatCommand.Action]
+        ACTION_KEEP: _ClassVar[SeatCommand.Action]
+        ACTION_FORCE: _ClassVar[SeatCommand.Action]
+    ACTION_LOOK: SeatCommand.Action
+    ACTION_TAKE: SeatCommand.Action
+    ACTION_ASK: SeatCommand.Action
+    ACTION_GRANT: SeatCommand.Action
+    ACTION_DENY: SeatCommand.Action
+    ACTION_RELEASE: SeatCommand.Action
+    ACTION_KEEP: SeatCommand.Action
+    ACTION_FORCE: SeatCommand.Action
+    ACTION_FIELD_NUMBER: _ClassVar[int]
+    SEAT_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    MOST_FIELD_NUMBER: _ClassVar[int]
+    TO_FIELD_NUMBER: _ClassVar[int]
+    action: SeatCommand.Action
+    seat: Seat
+    text: str
+    most: int
+    to: Seat
+    def __init__(self, action: _Optional[_Union[SeatCommand.Action, str]] = ..., seat: _Optional[_Union[Seat, _Mapping]] = ..., text: _Optional[str] = ..., most: _Optional[int] = ..., to: _Optional[_Union[Seat, _Mapping]] = ...) -> None: ...
+
+class SeatReply(_message.Message):
+    __slots__ = ("ok", "message", "status", "history", "lost")
+    OK_FIELD_NUMBER: _ClassVar[int]
+    MESSAGE_FIELD_NUMBER: _ClassVar[int]
+    STATUS_FIELD_NUMBER: _ClassVar[int]
+    HISTORY_FIELD_NUMBER: _ClassVar[int]
+    LOST_FIELD_NUMBER: _ClassVar[int]
+    ok: bool
+    message: str
+    status: CommandStatus
+    history: _containers.RepeatedCompositeFieldContainer[OrderGiven]
+    lost: int
+    def __init__(self, ok: _Optional[bool] = ..., message: _Optional[str] = ..., status: _Optional[_Union[CommandStatus, _Mapping]] = ..., history: _Optional[_Iterable[_Union[OrderGiven, _Mapping]]] = ..., lost: _Optional[int] = ...) -> None: ...
+
 class Note(_message.Message):
     __slots__ = ("header", "text", "author", "kind", "at_utc_ns", "seconds")
     class Kind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
@@ -1215,7 +1339,7 @@ class ProcedureCommand(_message.Message):
     def __init__(self, action: _Optional[_Union[ProcedureCommand.Action, str]] = ..., device: _Optional[str] = ..., procedure: _Optional[str] = ..., unit: _Optional[str] = ..., user: _Optional[str] = ..., text: _Optional[str] = ..., own_session: _Optional[bool] = ..., run: _Optional[str] = ..., step: _Optional[int] = ...) -> None: ...
 
 class ProcedureStatus(_message.Message):
-    __slots__ = ("header", "state", "run", "procedure", "title", "sha256", "toml", "unit", "operator", "session", "step", "instruction", "progress", "message", "steps", "table", "table_radps", "offered", "started_utc_ns", "up_b", "reference", "alarm")
+    __slots__ = ("header", "state", "run", "procedure", "title", "sha256", "toml", "unit", "operator", "session", "step", "instruction", "progress", "message", "steps", "table", "table_radps", "offered", "started_utc_ns", "up_b", "reference", "alarm", "if_lost")
     class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATE_IDLE: _ClassVar[ProcedureStatus.State]
@@ -1318,6 +1442,7 @@ class ProcedureStatus(_message.Message):
     UP_B_FIELD_NUMBER: _ClassVar[int]
     REFERENCE_FIELD_NUMBER: _ClassVar[int]
     ALARM_FIELD_NUMBER: _ClassVar[int]
+    IF_LOST_FIELD_NUMBER: _ClassVar[int]
     header: Header
     state: ProcedureStatus.State
     run: str
@@ -1340,7 +1465,8 @@ class ProcedureStatus(_message.Message):
     up_b: _containers.RepeatedScalarFieldContainer[float]
     reference: _containers.RepeatedScalarFieldContainer[str]
     alarm: str
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., state: _Optional[_Union[ProcedureStatus.State, str]] = ..., run: _Optional[str] = ..., procedure: _Optional[str] = ..., title: _Optional[str] = ..., sha256: _Optional[str] = ..., toml: _Optional[str] = ..., unit: _Optional[str] = ..., operator: _Optional[str] = ..., session: _Optional[str] = ..., step: _Optional[int] = ..., instruction: _Optional[str] = ..., progress: _Optional[float] = ..., message: _Optional[str] = ..., steps: _Optional[_Iterable[_Union[ProcedureStatus.Step, _Mapping]]] = ..., table: _Optional[str] = ..., table_radps: _Optional[float] = ..., offered: _Optional[_Iterable[str]] = ..., started_utc_ns: _Optional[int] = ..., up_b: _Optional[_Iterable[float]] = ..., reference: _Optional[_Iterable[str]] = ..., alarm: _Optional[str] = ...) -> None: ...
+    if_lost: str
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., state: _Optional[_Union[ProcedureStatus.State, str]] = ..., run: _Optional[str] = ..., procedure: _Optional[str] = ..., title: _Optional[str] = ..., sha256: _Optional[str] = ..., toml: _Optional[str] = ..., unit: _Optional[str] = ..., operator: _Optional[str] = ..., session: _Optional[str] = ..., step: _Optional[int] = ..., instruction: _Optional[str] = ..., progress: _Optional[float] = ..., message: _Optional[str] = ..., steps: _Optional[_Iterable[_Union[ProcedureStatus.Step, _Mapping]]] = ..., table: _Optional[str] = ..., table_radps: _Optional[float] = ..., offered: _Optional[_Iterable[str]] = ..., started_utc_ns: _Optional[int] = ..., up_b: _Optional[_Iterable[float]] = ..., reference: _Optional[_Iterable[str]] = ..., alarm: _Optional[str] = ..., if_lost: _Optional[str] = ...) -> None: ...
 
 class Alarm(_message.Message):
     __slots__ = ("id", "device", "kind", "title", "text", "page", "level", "state", "active", "unknown", "value", "limit", "unit", "raised_utc_ns", "returned_utc_ns", "acknowledged_by", "acknowledged_utc_ns", "note", "shelved_by", "shelved_s", "reason", "times", "chattering", "first_out")
@@ -1550,3 +1676,60 @@ class AlarmReply(_message.Message):
     ways: _containers.RepeatedCompositeFieldContainer[AlarmReply.Way]
     trouble: str
     def __init__(self, ok: _Optional[bool] = ..., message: _Optional[str] = ..., alarms: _Optional[_Iterable[_Union[Alarm, _Mapping]]] = ..., limits: _Optional[_Iterable[_Union[AlarmLimit, _Mapping]]] = ..., history: _Optional[_Iterable[_Union[AlarmReply.Event, _Mapping]]] = ..., ways: _Optional[_Iterable[_Union[AlarmReply.Way, _Mapping]]] = ..., trouble: _Optional[str] = ...) -> None: ...
+
+class LogLevelCommand(_message.Message):
+    __slots__ = ("level", "seconds", "user")
+    LEVEL_FIELD_NUMBER: _ClassVar[int]
+    SECONDS_FIELD_NUMBER: _ClassVar[int]
+    USER_FIELD_NUMBER: _ClassVar[int]
+    level: str
+    seconds: float
+    user: str
+    def __init__(self, level: _Optional[str] = ..., seconds: _Optional[float] = ..., user: _Optional[str] = ...) -> None: ...
+
+class Beat(_message.Message):
+    __slots__ = ("header", "role", "session", "since_utc_ns", "devices", "viewers", "leaving", "certificate_ends_utc_ns", "certificate_life_s", "certificate", "clock_ahead_s", "clock_bound_s", "version")
+    class Viewers(_message.Message):
+        __slots__ = ("role", "count")
+        ROLE_FIELD_NUMBER: _ClassVar[int]
+        COUNT_FIELD_NUMBER: _ClassVar[int]
+        role: str
+        count: int
+        def __init__(self, role: _Optional[str] = ..., count: _Optional[int] = ...) -> None: ...
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    ROLE_FIELD_NUMBER: _ClassVar[int]
+    SESSION_FIELD_NUMBER: _ClassVar[int]
+    SINCE_UTC_NS_FIELD_NUMBER: _ClassVar[int]
+    DEVICES_FIELD_NUMBER: _ClassVar[int]
+    VIEWERS_FIELD_NUMBER: _ClassVar[int]
+    LEAVING_FIELD_NUMBER: _ClassVar[int]
+    CERTIFICATE_ENDS_UTC_NS_FIELD_NUMBER: _ClassVar[int]
+    CERTIFICATE_LIFE_S_FIELD_NUMBER: _ClassVar[int]
+    CERTIFICATE_FIELD_NUMBER: _ClassVar[int]
+    CLOCK_AHEAD_S_FIELD_NUMBER: _ClassVar[int]
+    CLOCK_BOUND_S_FIELD_NUMBER: _ClassVar[int]
+    VERSION_FIELD_NUMBER: _ClassVar[int]
+    header: Header
+    role: str
+    session: str
+    since_utc_ns: int
+    devices: _containers.RepeatedScalarFieldContainer[str]
+    viewers: _containers.RepeatedCompositeFieldContainer[Beat.Viewers]
+    leaving: bool
+    certificate_ends_utc_ns: int
+    certificate_life_s: float
+    certificate: str
+    clock_ahead_s: float
+    clock_bound_s: float
+    version: str
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., role: _Optional[str] = ..., session: _Optional[str] = ..., since_utc_ns: _Optional[int] = ..., devices: _Optional[_Iterable[str]] = ..., viewers: _Optional[_Iterable[_Union[Beat.Viewers, _Mapping]]] = ..., leaving: _Optional[bool] = ..., certificate_ends_utc_ns: _Optional[int] = ..., certificate_life_s: _Optional[float] = ..., certificate: _Optional[str] = ..., clock_ahead_s: _Optional[float] = ..., clock_bound_s: _Optional[float] = ..., version: _Optional[str] = ...) -> None: ...
+
+class ClockReply(_message.Message):
+    __slots__ = ("received_ns", "answered_ns", "wall_ns")
+    RECEIVED_NS_FIELD_NUMBER: _ClassVar[int]
+    ANSWERED_NS_FIELD_NUMBER: _ClassVar[int]
+    WALL_NS_FIELD_NUMBER: _ClassVar[int]
+    received_ns: int
+    answered_ns: int
+    wall_ns: int
+    def __init__(self, received_ns: _Optional[int] = ..., answered_ns: _Optional[int] = ..., wall_ns: _Optional[int] = ...) -> None: ...

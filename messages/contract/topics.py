@@ -21,9 +21,11 @@ M = TypeVar("M", bound=Message)
 REPLAY_SUFFIX = "-replay"  # of a device's name when a recording of it is played on the bus
 RECORDER = "recorder"  # the device name under which the recorder speaks
 
-# processes by the topics' `source`: those that keep what they publish, and all of which one serves
+# processes by the topics' `source`; those that keep what they publish, and all of which one serves
 GATEWAY, ESTIMATES, PROCEDURES = "gateway", "estimator", "procedures"
 ALARMS = "alarms"
+KEEPING = (GATEWAY, ESTIMATES, PROCEDURES, ALARMS)
+COMMAND = "command"  # the device name under which it is said who has the command, and orders are
 CLAIMED = (GATEWAY, ESTIMATES, PROCEDURES, RECORDER, "replay", ALARMS)
 
 
@@ -95,9 +97,16 @@ PROCEDURE = Topic(
     "procedure", pb.ProcedureStatus, 4, "procedures", "a test as it runs, step by step"
 )
 ALARM = Topic("alarm", pb.AlarmStatus, 0.5, "alarms", "what is wrong, and who took note of it")
+HOLDER = Topic(
+    "holder", pb.CommandStatus, 1, "procedures", "who has the command of the site", recorded=False
+)
+ORDER = Topic("order", pb.OrderGiven, 0, "any", "an order and what came of it", recorded=False)
 NOTE = Topic("note", pb.Note, 0, "any", "remarks on the data by people and programs")
 REPLAY = Topic("replay", pb.ReplayStatus, 5, "replay", "where a replay stands", recorded=False)
 STATUS = Topic("status", pb.RecorderStatus, 1, "recorder", "state of the recording", recorded=False)
+BEAT = Topic(
+    "beat", pb.Beat, 2, "all", "a process is there and runs", per_estimator=True, recorded=False
+)
 LOG = Topic("log", Log, 0, "any", "warnings worth keeping with the data")
 
 TOPICS: tuple[Topic, ...] = (
@@ -122,11 +131,14 @@ TOPICS: tuple[Topic, ...] = (
     WIRING,
     PROCEDURE,
     ALARM,
+    HOLDER,
+    ORDER,
     NOTE,
     REPLAY,
     STATUS,
     LOG,
     MUTE,
+    BEAT,
 )
 
 BY_NAME = {topic.name: topic for topic in TOPICS}
@@ -228,9 +240,27 @@ def replay_control_key(prefix: str) -> str:
     return f"{check_name(prefix)}/{REPLAY.name}/control"
 
 
+def command_control_key(prefix: str) -> str:
+    """Key of the queryable of who keeps the command: SeatCommand in, SeatReply out."""
+    return f"{check_name(prefix)}/{COMMAND}/control"
+
+
 def alarms_control_key(prefix: str) -> str:
     """Key of the alarms' queryable: AlarmCommand in, AlarmReply out."""
     return f"{check_name(prefix)}/{ALARMS}/control"
+
+
+def alive_key(prefix: str, place: str, process: str) -> str:
+    """Key of the token of a process that is there; its beats have the same last part."""
+    for name in (place, process):
+        if name != "*":
+            check_name(name)
+    return f"{check_name(prefix)}/{place}/alive/{process}"
+
+
+def clock_key(prefix: str) -> str:
+    """Key of a queryable that tells the time of the site: nothing in, ClockReply out."""
+    return f"{check_name(prefix)}/site/clock"
 
 
 def markdown() -> str:

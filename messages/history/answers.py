@@ -29,6 +29,7 @@ MOST_REPLY_BYTES = 32 << 20  # of all replies to a question that we read
 MOST_REPLIES = 16  # to one question; a device has one publisher, or two that take turns
 PATIENCE_S = 1800.0  # with one that is there, but does not answer in time
 LEAST_BYTES = 1 << 15  # of an answer that a busier machine is asked for
+MOST_UNANSWERED = 4096  # publishers that are remembered for not answering
 
 
 def declare(
@@ -156,6 +157,7 @@ class Asker:
 
     RETRIES = 4  # a link that is just back may carry samples before it carries questions
     RETRY_S = 0.5
+    ALONE_S = 60.0  # after nobody answered about a publisher that nobody claims to be: one try
 
     def __init__(
         self,
@@ -169,6 +171,7 @@ class Asker:
         self._session, self._prefix, self._done = session, prefix, done
         self._fence, self._patience_s = fence, patience_s
         self._questions: queue.SimpleQueue[tuple | None] = queue.SimpleQueue()
+        self._unanswered: dict[tuple[str, str], float] = {}  # and when, s, monotonic
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="history", daemon=True)
         self._thread.start()
@@ -195,7 +198,8 @@ class Asker:
         """Ask until there is an answer, or nobody to be waited for."""
         query, began, nobody, said = pb.HistoryQuery(), time.monotonic(), 0, False
         query.CopyFrom(asked)
-        while nobody < self.RETRIES and time.monotonic() - began < self._patience_s:
+        tries = self.RETRIES if self._may_be_there(device, source) else 1
+        while time.monotonic() - began < self._patience_s:
             asked_at = time.monotonic()
             try:
                 reply = ask(self._session, self._prefix, device, source, query, fence=self._fence)
@@ -218,9 +222,23 @@ class Asker:
                 )
             if slow and query.every_s <= 0.0:  # whoever was slow is asked for less at a time
                 query.max_bytes = max(LEAST_BYTES, (query.max_bytes or REPLY_BYTES) // 2)
+            if nobody >= tries:
+                self._unanswered[device, source] = time.monotonic()
+                break
             if self._stop.wait(self.RETRY_S):
                 break
         return None
+
+    def _may_be_there(self, device: str, source: str) -> bool:
+        """Is it worth waiting for? A name that somebody made up has many gaps and no publisher:
+        the questions about it must not hold up those about others.
+        """
+        if self._serves(device, source):
+            return True
+        if len(self._unanswered) > MOST_UNANSWERED:
+            self._unanswered.clear()
+        since = self._unanswered.get((device, source))
+        return since is None or time.monotonic() - since > self.ALONE_S
 
     def _serves(self, device: str, source: str) -> bool:
         """Is there a publisher, as far as can be known?"""

@@ -107,6 +107,9 @@ class Mender:
         if arrival.topic.source not in self._sources or arrival.device.endswith(REPLAY_SUFFIX):
             return [arrival]
         stream = self._streams.setdefault((arrival.device, arrival.topic.source), Stream())
+        header = header_of(arrival)
+        if header is not None:
+            stream.heard(header, arrival.at_ns)
         if self._hold and stream.asking:
             if stream.hold(arrival, self._max_held, MAX_HELD_BYTES):
                 return []
@@ -133,7 +136,7 @@ class Mender:
             if skipped is not None:
                 self._ask(skipped)
                 return out
-            out += self._fill(question.stream[0], item)
+            out += self._fill(stream, question.stream[0], item)
         if reply is not None and reply.next:
             refusal = question.goes_on(reply)
             if refusal is None:
@@ -248,7 +251,7 @@ class Mender:
         query.of, query.after_run, query.after_sequence = begin
         return Question(question.stream, query, question.replies + 1)
 
-    def _fill(self, device: str, item: pb.HistoryItem) -> list[Arrival]:
+    def _fill(self, stream: Stream, device: str, item: pb.HistoryItem) -> list[Arrival]:
         name, _, estimator = item.topic.partition("/")
         topic = BY_NAME.get(name)
         if topic is None:
@@ -259,6 +262,10 @@ class Mender:
         key = self._keys.get((device, item.topic))
         if key is None:
             return []  # never heard live: not this consumer's gap
+        twin = stream.twin(header_of(arrival))
+        if twin is not None:
+            self._refuse(f"{device}/{item.topic}", twin, device)
+            return []
         for gap in key.missing:
             if gap[0] == item.run and gap[1] <= item.sequence <= gap[2]:
                 if self._hold and (item.run, item.sequence) < (key.run, key.last):

@@ -19,6 +19,7 @@ log = logging.getLogger(__name__)
 MOST_REPLIES = 10_000  # of one answer; a reply has about a MB
 MOST_IDLE = 64  # of those in a row: what is missing of one topic has others around it
 CLOCKS_NS = 5_000_000_000  # two clocks that are set by one another differ by less
+SPLIT_NS = 2_000_000_000  # two that were heard at once by less are one after the other
 FARTHEST = 10_000_000  # messages; a sequence that jumps further has begun anew: a day at 100 Hz
 
 
@@ -111,6 +112,19 @@ class KeyState:
 
 
 @dataclass
+class Heard:
+    """What came, live, of one run."""
+
+    run: int = 0
+    at_ns: int = 0  # when the newest came
+    newest_ns: int = 0  # the latest of their own times
+
+    def take(self, header: pb.Header, at_ns: int) -> None:
+        """One more."""
+        self.at_ns, self.newest_ns = at_ns, max(self.newest_ns, header.utc_ns)
+
+
+@dataclass
 class Stream:
     asking: bool = False
     full: bool = False  # holds max_held: the newest were not taken
@@ -118,6 +132,33 @@ class Stream:
     held_bytes: int = 0
     waiting: deque[pb.HistoryQuery] = field(default_factory=deque)
     tried: set[tuple[str, int, int]] = field(default_factory=set)  # beginnings that were asked for
+    live: Heard = field(default_factory=Heard)  # the newest run that is heard, live ...
+    before: Heard = field(default_factory=Heard)  # ... and the one before it
+    taken: tuple[int, int] = (0, 0)  # a run, and the time up to which another was heard beside it
+
+    def heard(self, header: pb.Header, at_ns: int) -> None:
+        """A live message came at at_ns (0: nobody says when). Of two publishers of one name, each
+        heard while the link between them was cut, the time of the one that was heard is taken:
+        the other has spoken for longer than the one has been silent.
+        """
+        if not at_ns or not header.run or header.run < self.live.run:
+            return
+        if header.run > self.live.run:
+            self.before, self.live = self.live, Heard(header.run)
+        self.live.take(header, at_ns)
+        spoken_ns, silent_ns = header.utc_ns - header.run, at_ns - self.before.at_ns
+        beside_ns = self.before.newest_ns - header.run
+        if self.before.run and min(spoken_ns - silent_ns, beside_ns) > SPLIT_NS:
+            self.taken = header.run, self.before.newest_ns
+
+    def twin(self, header: pb.Header | None) -> Refusal | None:
+        """Why a message that is filled in is not taken: it is of a time when another publisher of
+        that name was heard.
+        """
+        if header is None or header.run != self.taken[0] or header.utc_ns >= self.taken[1]:
+            return None
+        wanted = "a time in which no other publisher of this name was heard"
+        return Refusal("twin", "header.utc_ns", str(header.utc_ns), wanted)
 
     def hold(self, arrival: Arrival, most: int, most_bytes: int) -> bool:
         """Keep a live message until a gap is filled; False: there is no room."""

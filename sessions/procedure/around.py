@@ -7,8 +7,10 @@ from collections.abc import Callable
 
 import zenoh
 
+from messages.bus.fencing import Fence
 from messages.bus.session import connected, subscribe
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.door import Door
 from messages.contract.topics import LINK, RECORDER, STATUS, parse
 
 GATEWAY_S = 3.0  # s without a word on a line, of which one comes every second
@@ -22,10 +24,18 @@ class Around:
         self.recorder: deque[pb.RecorderStatus] = deque(maxlen=10)
         self._session, self._found = session, found
         self._lines: dict[str, tuple[float, pb.LinkStatus]] = {}  # heard when, and what
+        # a table turns by what is heard: only from those who have claimed to say it
+        self.fence = Fence(Door("procedures").refuse)
         self._kept = [
-            subscribe(session, LINK, prefix, self._on_link),
+            self.fence.declare(session, prefix),
+            subscribe(session, LINK, prefix, self._on_link, fence=self.fence),
             subscribe(
-                session, STATUS, prefix, lambda _, status: self.recorder.append(status), RECORDER
+                session,
+                STATUS,
+                prefix,
+                lambda _, status: self.recorder.append(status),
+                RECORDER,
+                self.fence,
             ),
         ]
 

@@ -12,6 +12,7 @@ from messages import text
 from messages.bus import orders
 from messages.contract import gyrofree_pb2 as pb
 from sessions.procedure import library
+from sessions.procedure.driven.table import RateTable
 from sessions.procedure.model import DEG
 from sessions.procedure.run import Journal
 from sessions.procedure.settings import ProcedureSettings
@@ -19,6 +20,7 @@ from sessions.procedure.settings import ProcedureSettings
 log = logging.getLogger(__name__)
 
 ACTION = pb.RecorderCommand
+SELF = pb.OrderBy(seat=pb.Seat(id="procedures", user="procedures", service=True))
 
 
 class ProcedureDesk:
@@ -105,4 +107,14 @@ class ProcedureDesk:
     def _give(self, action: int, **more: str) -> pb.RecorderStatus:
         """Raises OrderError."""
         command = ACTION(action=action, **more)
-        return orders.give(self._session, self._prefix, orders.RECORDER, command)
+        return orders.give(self._session, self._prefix, orders.RECORDER, command, by=SELF)
+
+
+def if_lost(table: RateTable | None) -> str:
+    """What a person is told before he starts a test: what becomes of it when his page is gone."""
+    goes_on = (
+        "When this page or the link to the lab is lost, the test goes on there by itself to its end"
+    )
+    if table is None:
+        return f"{goes_on}; steps that want a person wait. You turn the table by hand."
+    return f"{goes_on}, and the table turns with it. In the lab: {table.if_lost}."

@@ -12,7 +12,8 @@ import zenoh
 
 from messages.bus import orders
 from messages.bus.claiming import Claim
-from messages.bus.session import BusSettings, Publishers, subscribe
+from messages.bus.command.keeper import Keeper
+from messages.bus.session import BusSettings, subscribe
 from messages.bus.turns import in_turn, sessions
 from messages.clock import elapsed_ns
 from messages.contract import gyrofree_pb2 as pb
@@ -27,10 +28,11 @@ from messages.contract.topics import (
     RATE,
     TACHO,
 )
+from messages.history.keeping import KeptPublishers
 from sessions.procedure import library, seen
 from sessions.procedure.around import Around
 from sessions.procedure.conductor import Conductor
-from sessions.procedure.desk import ProcedureDesk
+from sessions.procedure.desk import ProcedureDesk, if_lost
 from sessions.procedure.driven.description import TableError, described
 from sessions.procedure.driven.table import RateTable, TextTable
 from sessions.procedure.run import Journal, unfinished
@@ -73,9 +75,8 @@ class Service:
         """number: of the claim. Raises TableError."""
         self._settings, self._session, self._prefix = settings, session, prefix
         self._tables = Tables(settings)
-        self._publishers = Publishers(session, prefix)
-        self._publishers.number = number
-        self._since = time.time_ns()
+        kept = settings.root / ".published"
+        self._publishers = KeptPublishers(session, prefix, PROCEDURES, kept, number)
         self._devices: dict[str, float] = {}  # heard, and when its idle status is due
         self._conductors: dict[str, Conductor] = {}
         self._ended: dict[str, Conductor] = {}
@@ -84,6 +85,7 @@ class Service:
         self._orders: deque[orders.Order[COMMAND, pb.Reply]] = deque()
         self._due: dict[str, float] = {}
         self._around = Around(session, prefix, lambda name: self._devices.setdefault(name, 0.0))
+        self._keeper = Keeper(session, prefix, settings.root, number)
         self._taking = orders.take(session, prefix, orders.PROCEDURES, self._on_order, "*")
 
     # --- on Zenoh's threads
@@ -132,6 +134,7 @@ class Service:
 
     def step(self) -> None:
         """Orders, data, status; call it every TICK_S."""
+        self._keeper.step()
         while self._orders:
             self._obey(self._orders.popleft())
         while self._around.recorder:
@@ -158,18 +161,22 @@ class Service:
     def close(self) -> None:
         """Stop listening; runs go on with the next life. Driven tables stand meanwhile."""
         self._taking.undeclare()
+        self._keeper.close()
         self._around.close()
         for device, conductor in self._conductors.items():
             self._silence(device)
             conductor.drive.stop()
+        self._publishers.close()
 
     def abandon(self) -> None:
         """Another process has taken over: say nothing more, least of all to its tables."""
         self._taking.undeclare()
+        self._keeper.close()
         self._around.close()
         for device, conductor in self._conductors.items():
             self._silence(device)
             conductor.abandon()
+        self._publishers.close()
 
     def _obey(self, order: orders.Order[COMMAND, pb.Reply]) -> None:
         command, device = order.command, order.device
@@ -215,7 +222,7 @@ class Service:
         def say(text: str, at_utc_ns: int, seconds: float) -> None:
             note = pb.Note(text=text[:500], author="procedure", kind=pb.Note.KIND_EVENT)
             note.at_utc_ns, note.seconds = at_utc_ns, seconds
-            note.header.device, note.header.run = device, self._since
+            note.header.device, note.header.run = device, self._publishers.run
             note.header.utc_ns = at_utc_ns or time.time_ns()
             self._publishers.put(NOTE, device, note)
 
@@ -232,6 +239,7 @@ class Service:
                 self._prefix,
                 lambda _, message: self._on_data(device, message),
                 device,
+                self._around.fence,
             )
             for topic in DATA
         ]
@@ -260,7 +268,8 @@ class Service:
         self._publish(device, message)
 
     def _publish(self, device: str, message: pb.ProcedureStatus) -> None:
-        message.header.device, message.header.run = device, self._since
+        message.if_lost = if_lost(self._tables.get(device))
+        message.header.device, message.header.run = device, self._publishers.run
         message.header.utc_ns = message.header.utc_ns or time.time_ns()
         self._publishers.put(PROCEDURE, device, message)
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import Refusal
 from messages.contract.door import Door
+from messages.contract.topics import KEEPING
 from messages.history.mending import Mender
 from messages.history.mending_state import Arrival, Question
 from sessions.recording.manifest import Manifest
@@ -50,7 +51,7 @@ class Intake:
         self._mender = (
             None
             if ask is None
-            else Mender(ask, since_ns=since_ns, refuse=door.refuse, now_ns=now_ns)
+            else Mender(ask, sources=KEEPING, since_ns=since_ns, refuse=door.refuse, now_ns=now_ns)
         )
         self._newest: deque[int] = deque()  # hashes of the newest messages, and the same as a set
         self._known: set[int] = set()

@@ -10,12 +10,13 @@ import hashlib
 import json
 import logging
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from pydantic import ValidationError
 
 from inertial.whole_file import put_in_place
+from sites.copying.roads import Ask, all_of
 from sites.copying.shelf import FILE, SEGMENT, SESSION, Listed, Listing, list_file
 from sites.place import SiteError, write
 
@@ -23,8 +24,6 @@ PART = ".part"
 BOOK = "copies.json"
 LAST = "session.json"
 LARGEST = 64 << 20  # bytes of a list
-
-Ask = Callable[[str], bytes]  # a question below segment_key; raises SiteError
 
 log = logging.getLogger(__name__)
 
@@ -37,17 +36,17 @@ class Copies:
         self._root, self._book = root, folder / BOOK
         self.known: dict[str, dict] = load_copies(folder)
 
-    def round(self, ask: Ask, stop: Callable[[], bool]) -> int:
-        """Copy what is new or has changed; how many sessions became equal. Raises SiteError when
-        home does not answer, OSError when nothing can be written here.
+    def round(self, asks: Sequence[Ask], stop: Callable[[], bool]) -> int:
+        """Copy what is new or has changed, on all roads at once; how many sessions became equal.
+        Raises SiteError when home does not answer, OSError when nothing can be written here.
         """
-        there, count = _index(ask("index")), 0
+        there, count = _index(asks[0]("index")), 0
         for session in sorted(there, reverse=True):
             if stop():
                 break
             if self.known.get(session, {}).get("stamp") == there[session]:
                 continue
-            proof = self._session(session, ask, stop)
+            proof = self._session(session, asks, stop)
             if proof is not None:
                 now = dt.datetime.now(dt.UTC).isoformat(timespec="seconds")
                 self.known[session] = {"stamp": there[session], "equal_since": now, "files": proof}
@@ -56,10 +55,10 @@ class Copies:
                 count += 1
         return count
 
-    def _session(self, session: str, ask: Ask, stop: Callable[[], bool]) -> dict | None:
+    def _session(self, session: str, asks: Sequence[Ask], stop: Callable[[], bool]) -> dict | None:
         """By file home's hash and the one here; None while it has not come to its end."""
-        listing = _listing(ask(session))
-        recording = _open(listing, session, ask)
+        listing = _listing(asks[0](session))
+        recording = _open(listing, session, asks[0])
         folder = self._root / session
         folder.mkdir(parents=True, exist_ok=True)
         proof = {}
@@ -69,7 +68,7 @@ class Copies:
             wanted, path = listing.files[name], folder / name
             if recording:
                 wanted = _full(wanted)  # its end changes with every message
-            if not self._file(path, wanted, lambda part, s=session: ask(f"{s}/{part}"), stop):
+            if not self._file(path, wanted, asks, stop):
                 return None
             if recording:
                 continue
@@ -81,7 +80,9 @@ class Copies:
             proof[name] = {"home_sha256": wanted.sha256, "here_sha256": here.sha256}
         return proof
 
-    def _file(self, path: Path, wanted: Listed, ask: Ask, stop: Callable[[], bool]) -> bool:
+    def _file(
+        self, path: Path, wanted: Listed, asks: Sequence[Ask], stop: Callable[[], bool]
+    ) -> bool:
         """Bring the draft of a file to what home has; False when `stop` came first."""
         part = _part(path)
         if not part.exists() and path.exists():
@@ -89,18 +90,20 @@ class Copies:
         descriptor = os.open(part, os.O_RDWR | os.O_CREAT, 0o644)
         with os.fdopen(descriptor, "r+b") as stream:
             stream.truncate(min(os.fstat(descriptor).st_size, wanted.size))
-            for first, sha256 in _missing(stream, wanted):
-                if stop():
-                    return False
-                piece = ask(f"{path.name}/{first}-{sha256}")
+
+            def keep(first: int, sha256: str, piece: bytes) -> bool:
                 if hashlib.sha256(piece).hexdigest() != sha256:
                     log.info("%s: a segment changed while it was fetched", path.name)
                     return False
                 stream.seek(first)
                 stream.write(piece)
+                return True
+
+            name = f"{path.parent.name}/{path.name}"
+            whole = all_of(_missing(stream, wanted), name, asks, keep, stop)
             stream.flush()
             os.fsync(descriptor)
-        return True
+        return whole
 
 
 def load_copies(folder: Path) -> dict[str, dict]:

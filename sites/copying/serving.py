@@ -8,7 +8,7 @@ from pathlib import Path
 import zenoh
 
 from sites.copying.shelf import Shelf, ShelfError
-from sites.roles import segment_key
+from sites.roles import SEGMENTS, segment_key
 
 MOST_WAITING = 256  # questions; more are refused, and asked again
 
@@ -23,7 +23,11 @@ class Serving:
         self._asked: queue.Queue[zenoh.Query | None] = queue.Queue(MOST_WAITING)
         self._thread = threading.Thread(target=self._serve, name="copies", daemon=True)
         self._thread.start()
-        self._queryable = session.declare_queryable(f"{self._key}/**", self._on_query)
+        self._queryable = self.at(session, self._key)
+
+    def at(self, session: zenoh.Session, key: str) -> zenoh.Queryable:
+        """Answer the same questions below another key, which ends as segment_key does."""
+        return session.declare_queryable(f"{key}/**", self._on_query)
 
     def close(self) -> None:
         """Answer nothing any more."""
@@ -41,7 +45,7 @@ class Serving:
         while (query := self._asked.get()) is not None:
             key = str(query.key_expr)
             try:
-                query.reply(key, self._answer(key[len(self._key) + 1 :].split("/")))
+                query.reply(key, self._answer(key.partition(SEGMENTS)[2].split("/")))
             except (ShelfError, OSError) as error:
                 query.reply_err(str(error).encode())
             except Exception:  # whatever a stranger asks, the service goes on

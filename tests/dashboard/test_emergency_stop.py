@@ -26,6 +26,12 @@ class Desk:
     def __init__(self):
         self.given, self.reply = [], pb.Reply(ok=True, message="stopped")
 
+    watching = ""
+
+    def of(self, seat):
+        self.seat = seat
+        return self
+
     def procedure(self, command):
         self.given.append(command)
         if self.reply is None:

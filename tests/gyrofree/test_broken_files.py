@@ -38,6 +38,8 @@ VALUES = {  # of what is no file
     "address": "127.0.0.1",
     "id": "link/cube",
     "minutes": "5",
+    "service": "router",
+    "level": "debug",
 }
 GOOD = {  # of a file that is wanted beside the broken one
     "log": "cube.csv",
@@ -45,6 +47,7 @@ GOOD = {  # of a file that is wanted beside the broken one
     "card": "card.toml",
     "session": "session.mcap",
     "sessions": "session.mcap",
+    "archive": "cube.csv",
 }
 ALSO = {  # further ways of a command
     "run": [[], ["--attitude"], ["--estimators", "least-squares", "--resolve", "--tacho-aid"]],
@@ -87,7 +90,7 @@ def no_services(monkeypatch):
     for module in pkgutil.iter_modules(gyrofree.commands.__path__):
         loaded = importlib.import_module(f"gyrofree.commands.{module.name}")
         if hasattr(loaded, "run_service"):
-            monkeypatch.setattr(loaded, "run_service", lambda body, verbose=False: None)
+            monkeypatch.setattr(loaded, "run_service", lambda *_: None)
     monkeypatch.setattr("gyrofree.running.demo.run", lambda plan: None)
     monkeypatch.setattr("gyrofree.running.up.run", lambda plan: None)
 
@@ -103,6 +106,8 @@ def arguments(command, spoilt, value, seeds, place):
                 last.append(str(seeds["session.mcap"]))
         elif parameter.name in OUTPUTS and option and parameter.name in ("out", "layout_out"):
             words.append(f"{option}={place / 'out'}")
+        elif parameter.name in OUTPUTS and parameter.required:
+            last.append(str(place / "out"))
         elif parameter.required:
             known = seeds[GOOD[parameter.name]] if parameter.name in GOOD else None
             word = known or VALUES.get(parameter.name)

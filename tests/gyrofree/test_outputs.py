@@ -66,8 +66,11 @@ def walker():
 
 def line(name, output, value, seeds):
     """A good command line whose output is `value`."""
-    words = [*name.split(), *MORE.get(name, []), f"{output.opts[0]}={value}"]
-    last = []
+    words, last = [*name.split(), *MORE.get(name, [])], []
+    if output.opts[0].startswith("--"):
+        words.append(f"{output.opts[0]}={value}")
+    else:
+        last.append(str(value))
     for parameter in COMMANDS[name].params:
         if parameter is output or not parameter.required:
             continue

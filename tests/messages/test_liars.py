@@ -12,13 +12,13 @@ from messages.bus import orders
 from messages.bus.claiming import Claim, Claimant, newest
 from messages.bus.fencing import Fence
 from messages.bus.session import (
-    LARGEST,
     BusSettings,
     Publishers,
     connected,
     open_client,
     open_router,
 )
+from messages.bus.settings import LARGEST
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import Refusal
 from messages.contract.topics import (
@@ -226,3 +226,20 @@ def test_a_huge_message_is_put_together_nowhere(bench):
         bench.honest.put("t/cube/accel", bytes(LARGEST // 2), congestion_control=wait)
         time.sleep(0.5)
     assert max(heard) == LARGEST // 2 and connected(bench.consumer) and connected(bench.honest)
+
+
+def test_many_gaps_of_a_name_that_nobody_has_are_not_asked_for_again_and_again(monkeypatch):
+    asked: list[str] = []
+    monkeypatch.setattr(
+        answers, "ask", lambda session, prefix, device, *_, **__: asked.append(device)
+    )
+    monkeypatch.setattr(Asker, "RETRY_S", 0.0)
+    done = threading.Event()
+    fence = Fence(lambda *_: None)
+    asker = Asker(None, "t", lambda token, _: done.set() if token == "last" else None, fence)
+    for number in range(200):
+        asker.ask(number, "made-up", GATEWAY, pb.HistoryQuery())
+    asker.ask("last", "cube", GATEWAY, pb.HistoryQuery())
+    assert done.wait(60.0)
+    asker.close()
+    assert asked.count("made-up") == 199 + Asker.RETRIES and asked.count("cube") == Asker.RETRIES

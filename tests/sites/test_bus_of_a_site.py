@@ -12,8 +12,10 @@ import zenoh
 from support.stack import free_port
 
 from messages.bus import orders
+from messages.bus.beating import Beating, tell_time
 from messages.bus.faults import BusUnavailable, IdentityError
-from messages.bus.session import BusSettings, open_client, open_router
+from messages.bus.presence import Presence, Watching, viewers
+from messages.bus.session import BusSettings, open_client, open_router, subscribe
 from messages.bus.tls import TRUSTED
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
@@ -72,9 +74,28 @@ def test_each_certificate_may_do_what_its_role_needs_and_nothing_else(home: Path
     assert not [v.text for v in found if v.role == "viewer" and v.allowed]
     assert sum(verdict.allowed for verdict in found) > 15
     # with a rule left out, the check finds it and says what to do
-    rules["policies"] = rules["policies"][1:]
+    ids = [s["id"] for s in rules["subjects"] if "gateway.lab" in s["cert_common_names"]]
+    rules["policies"] = [p for p in rules["policies"] if p["subjects"] != ids]
     spoilt = try_all(home, place, rules, ["gateway"], BOARD)
     assert any("dropped without a word" in verdict.text for verdict in spoilt)
+
+
+def watched(session: zenoh.Session) -> Presence:
+    """Who is there, as this session hears it."""
+    presence = Presence("lab")
+    Watching(session, "lab", presence)
+
+    def heard(key: str, beat: pb.Beat) -> None:
+        presence.beat(key.split("/")[1], key.split("/")[3], beat)
+        presence.look(time.monotonic())
+
+    subscribe(session, tp.BEAT, "lab", heard)
+    return presence
+
+
+def forged_beat(place: str) -> bytes:
+    """As a process of that place would say it."""
+    return pb.Beat(header=pb.Header(device=place), role="dashboard").SerializeToString()
 
 
 def foreign(tmp_path: Path) -> Path:
@@ -167,6 +188,26 @@ def test_an_office_joins_hears_everything_may_order_nothing_and_can_be_sent_away
         with pytest.raises(orders.OrderError):
             orders.give(page, "lab", orders.BOARD, pb.BoardCommand(), BOARD, 2.0)
         assert not taken
+        # who is there is known at both places, and how far their clocks are from one another
+        near, server = (
+            running.enter_context(open_client(bus(home, at_home, role), timeout_s=10))
+            for role in ("dashboard", "authority")
+        )
+        presence, clock = watched(near), tell_time(server, "lab")
+        people = running.enter_context(
+            Beating(page, bus(office, at_office, "dashboard"), viewers=lambda: {"viewer": 3})
+        )
+        until(lambda: "office" in presence.places(), 30.0, "home sees the office")
+        until(lambda: viewers(presence.all()) == {"viewer": 3}, 30.0, "home sees its people")
+        until(lambda: people.clock_ahead()[1] < 1.0, 30.0, "the office's clock is compared")
+        assert abs(people.clock_ahead()[0]) <= people.clock_ahead()[1]
+        page.put(tp.BEAT.key("lab", "lab", "dashboard-1"), forged_beat("lab"))
+        page.put(tp.BEAT.key("lab", "office", "dashboard-2"), forged_beat("office"))
+        until(
+            lambda: ("office", "dashboard-2") in presence.processes, 30.0, "its own name is let in"
+        )
+        assert ("lab", "dashboard-1") not in presence.processes
+        clock.undeclare()
     assert remove(home, "office") >= 4
     heard.clear()
     with ExitStack() as running:

@@ -46,6 +46,18 @@ def test_secrets_are_for_the_owner_alone(home: Path) -> None:
     assert all(stat.S_IMODE(path.stat().st_mode) == 0o600 for path in secret)
 
 
+@pytest.mark.parametrize("address", ["office.example.org", "192.0.2.7", "[2001:db8::1]"])
+def test_the_certificate_of_an_invitation_is_good_for_the_address_that_home_calls(
+    home: Path, address: str
+) -> None:
+    """Home's router asks whoever answers there for it before the place has any of its own."""
+    invitation, here = invite(home, "office", "viewer", f"tls/{address}:7447", WEEK)
+    certificate = x509.load_pem_x509_certificate(invitation.certificate.encode())
+    extension = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName)
+    assert address.strip("[]") in {str(name.value) for name in extension.value}
+    assert here.peers[-1].hosts == (address.strip("[]"),)
+
+
 def test_a_place_joins_once_and_the_same_question_gets_an_answer_again(
     home: Path, tmp_path: Path
 ) -> None:

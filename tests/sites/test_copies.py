@@ -68,7 +68,7 @@ def roots(tmp_path: Path) -> tuple[Path, Path, Path]:
 
 
 def go(copies: Copies, home: Home) -> int:
-    return copies.round(home, lambda: False)
+    return copies.round([home], lambda: False)
 
 
 def test_newest_first_equal_and_proven_and_asked_for_once(roots: tuple[Path, Path, Path]) -> None:
@@ -197,5 +197,5 @@ def test_a_list_that_cannot_be_is_refused(roots: tuple[Path, Path, Path], answer
         return f"{ONE} x".encode() if what == "index" else answer
 
     with pytest.raises(SiteError, match="list of segments"):
-        Copies(here, place).round(ask, lambda: False)
+        Copies(here, place).round([ask], lambda: False)
     assert not list(here.iterdir())

@@ -104,12 +104,14 @@ def drawn(
     shades: Sequence[Shade] = (),
     cursors: tuple[float, float] | tuple[()] = (),
     origin: str = "",
+    thin: Sequence[Sequence[float]] = (),
 ) -> Drawn:
     """The window [t0, t1] of curves; gaps are those of the curve number `primary`.
 
     Stretches [from, until] of `late` get a strip at the bottom: filled in after a loss. Each of
     `ranges` is drawn with its name. A shade lies behind the times it names. Between the
-    cursors all samples are measured; `origin` says what the time counts from.
+    cursors all samples are measured; `origin` says what the time counts from; `thin`
+    are stretches [from, until, one sample in so many s] of a preview, which are no gaps.
     """
     shades = [shade for shade in shades if len(shade.t)]
     inside = [one for one in ranges if one.t1 >= t0 and one.t0 <= t1][-MOST_RANGES:]
@@ -127,7 +129,7 @@ def drawn(
     curves = [curve for curve in curves if len(curve.t)]
     if not curves:
         return Drawn(heading)
-    data = _data(curves, t0, t1, min(primary, len(curves) - 1), late, shades)
+    data = _data(curves, t0, t1, min(primary, len(curves) - 1), late, shades, thin)
     signature = (
         dark,
         *(s.label for s in shades),
@@ -247,6 +249,7 @@ def _data(
     primary: int,
     late: Sequence[Sequence[float]] = (),
     shades: Sequence[Shade] = (),
+    thin: Sequence[Sequence[float]] = (),
 ) -> tuple[np.ndarray, ...]:
     """The arrays of a chart: time, each curve with the edges of its band, and the masks of shades,
     of what was filled in and of gaps; all of one length, in the smallest type that serves.
@@ -275,7 +278,7 @@ def _data(
     if not np.isfinite(y).any():
         t = t[:0]  # samples without a value are no values: all of it is a gap
     pause = max(gap_limit(t), 2.5 * (edges[1] - edges[0]))
-    out.append(series.gap_mask(t, edges, pause).astype(np.uint8))
+    out.append(series.gap_mask(t, edges, pause, thin).astype(np.uint8))
     return tuple(out)
 
 

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+THIN = 3.0  # usual pauses of a preview that are none yet
 POINTS = 300  # per series: two per bucket
 
 
@@ -46,19 +47,35 @@ def decimate(t: np.ndarray, y: np.ndarray, edges: np.ndarray) -> tuple[np.ndarra
     return np.interp(at, (held[:, None] + quarter).ravel(), values), filled
 
 
-def gap_mask(t: np.ndarray, edges: np.ndarray, gap_s: float) -> np.ndarray:
+def gap_mask(
+    t: np.ndarray,
+    edges: np.ndarray,
+    gap_s: float,
+    thin: Sequence[Sequence[float]] = (),
+) -> np.ndarray:
     """1 where no sample is nearer than a pause longer than gap_s, else 0; (2 b,) for b buckets.
+    In the stretches [from, until, one sample in so many s] of `thin` a pause is THIN of these.
 
     The time before the first and after the last sample counts as a pause too, when it is that long.
     """
     centres = (edges[:-1, None] + np.array([0.25, 0.75]) * (edges[1] - edges[0])).ravel()
     if not len(t):
         return np.ones(len(centres))
-    before = edges[0] if t[0] - edges[0] <= gap_s else -np.inf
-    behind = edges[-1] if edges[-1] - t[-1] <= gap_s else np.inf
+    limits = [(begin, end, max(gap_s, THIN * every_s)) for begin, end, every_s in thin]
+
+    def most(at: float) -> float:
+        return max([gap_s, *(limit for begin, end, limit in limits if begin <= at <= end)])
+
+    before = edges[0] if t[0] - edges[0] <= most(t[0]) else -np.inf
+    behind = edges[-1] if edges[-1] - t[-1] <= most(t[-1]) else np.inf
     bounds = np.concatenate([[before], t, [behind]])
     after = np.clip(np.searchsorted(bounds, centres), 1, len(bounds) - 1)
-    return (bounds[after] - bounds[after - 1] > gap_s).astype(float)
+    pauses, allowed = bounds[after] - bounds[after - 1], np.full(len(centres), gap_s)
+    for begin, end, limit in limits:
+        near = (bounds[after - 1] <= end) & (bounds[after] >= begin)
+        allowed[near] = np.maximum(allowed[near], limit)
+    gaps = pauses > allowed
+    return gaps.astype(float)
 
 
 def stretch_mask(stretches: Sequence[Sequence[float]], edges: np.ndarray) -> np.ndarray:

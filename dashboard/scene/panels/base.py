@@ -34,6 +34,7 @@ log = logging.getLogger(__name__)
 DEG = 180.0 / np.pi
 CHARTS = 36  # of one page
 CURVES = 16  # of one chart
+COARSE_S = 0.5  # between two samples of a preview: a stretch of it is named
 NO_RATE = "no rate estimator speaks of this device: is `gyrofree estimator` running?"
 
 Input = viser.GuiInputHandle | viser.GuiButtonHandle | viser.GuiButtonGroupHandle
@@ -157,6 +158,7 @@ class Panel:
                 s.t1,
                 s.dark,
                 late=s.device.late,
+                thin=s.device.thin,
                 ranges=ranges(s.device),
                 cursors=s.cursors,
                 origin=f"s since {when(s.device.utc0_ns)} UTC",
@@ -181,6 +183,11 @@ class Panel:
     @property
     def orders(self) -> tuple[Input, ...]:
         """Inputs that do more than change this browser's own view: a viewer may not use them."""
+        return ()
+
+    @property
+    def always(self) -> tuple[Input, ...]:
+        """Of the orders, those that an operator may give whoever has the command."""
         return ()
 
     def update(self, s: Snapshot) -> None:
@@ -243,6 +250,11 @@ def ranges(device: Device) -> list[Range]:
     """Notes, what was filled in, and the steps of a procedure that runs, on the device's axis."""
     found = [Range(at, at, text[:60]) for at, text in device.marks]
     found += [Range(begin, end, "filled in", "late") for begin, end in device.late]
+    found += [
+        Range(begin, end, f"coarse: one sample in {every_s:.3g} s", "coarse")
+        for begin, end, every_s in device.thin
+        if every_s >= COARSE_S
+    ]
     procedure = device.get("procedure")
     for step in procedure.message.steps if procedure is not None else ():
         if step.from_utc_ns and step.until_utc_ns >= step.from_utc_ns:

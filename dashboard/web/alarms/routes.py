@@ -14,7 +14,7 @@ from pydantic import BaseModel, Field
 from dashboard.alarms.settings import LEVELS
 from dashboard.data.alarms import words_in
 from dashboard.web.auth import Role
-from dashboard.web.front import Asker, asker, front_of, needs
+from dashboard.web.front import Asker, asker, desk_of, needs
 from dashboard.web.pages import render
 from dashboard.web.schemas import Line, Lines, Strict
 from messages.bus.orders import NoAnswer, OrderError
@@ -244,13 +244,13 @@ def _out(reply: pb.AlarmReply) -> AlarmsOut:
     )
 
 
-def _order(request: Request, action: int, who: str = "", **fields: Any) -> AlarmsOut:
+def _order(request: Request, action: int, who: Asker, **fields: Any) -> AlarmsOut:
     """HTTP 503 where the service does not answer, 409 where it says no."""
-    desk = front_of(request).desk
+    desk = desk_of(request, who)
     if desk is None:
         raise HTTPException(503, "this dashboard has no connection to the bus")
     try:
-        command = pb.AlarmCommand(action=action, user=who[:60], **fields)
+        command = pb.AlarmCommand(action=action, user=who.name[:60], **fields)
         reply = desk.alarms(command)
     except NoAnswer as error:
         raise HTTPException(503, str(error)) from None
@@ -268,38 +268,38 @@ def page(request: Request, who: SignedIn) -> HTMLResponse:
 
 @routes.get("/api/alarms", summary="Alarms, limits and what happened to them")
 def alarms(request: Request, who: SignedIn) -> AlarmsOut:
-    return _order(request, pb.AlarmCommand.ACTION_LIST)
+    return _order(request, pb.AlarmCommand.ACTION_LIST, who)
 
 
 @routes.post("/api/alarms/acknowledge", summary="Take note of an alarm (operator)")
 def acknowledge(request: Request, body: Acknowledge, who: Operator) -> AlarmsOut:
     action = pb.AlarmCommand.ACTION_ACKNOWLEDGE
-    return _order(request, action, who.name, device=body.device, id=body.id, text=body.note)
+    return _order(request, action, who, device=body.device, id=body.id, text=body.note)
 
 
 @routes.post("/api/alarms/shelve", summary="Silence an alarm for a while (operator)")
 def shelve(request: Request, body: Shelve, who: Operator) -> AlarmsOut:
     action, fields = pb.AlarmCommand.ACTION_SHELVE, {"text": body.reason, "seconds": body.seconds}
-    return _order(request, action, who.name, device=body.device, id=body.id, **fields)
+    return _order(request, action, who, device=body.device, id=body.id, **fields)
 
 
 @routes.post("/api/alarms/unshelve", summary="End the silence of an alarm (operator)")
 def unshelve(request: Request, body: About, who: Operator) -> AlarmsOut:
     action = pb.AlarmCommand.ACTION_UNSHELVE
-    return _order(request, action, who.name, device=body.device, id=body.id)
+    return _order(request, action, who, device=body.device, id=body.id)
 
 
 @routes.post("/api/alarms/limits", summary="Set a limit, or change one of its name (operator)")
 def set_limit(request: Request, body: LimitIn, who: Operator) -> AlarmsOut:
     limit = pb.AlarmLimit(**body.model_dump(exclude_none=True))
-    return _order(request, pb.AlarmCommand.ACTION_SET_LIMIT, who.name, limit=limit)
+    return _order(request, pb.AlarmCommand.ACTION_SET_LIMIT, who, limit=limit)
 
 
 @routes.post("/api/alarms/limits/remove", summary="Remove a limit and its alarms (operator)")
 def remove_limit(request: Request, body: RemoveLimit, who: Operator) -> AlarmsOut:
-    return _order(request, pb.AlarmCommand.ACTION_REMOVE_LIMIT, who.name, id=body.name)
+    return _order(request, pb.AlarmCommand.ACTION_REMOVE_LIMIT, who, id=body.name)
 
 
 @routes.post("/api/alarms/test", summary="Send a notice through every way out (operator)")
 def test(request: Request, who: Operator) -> AlarmsOut:
-    return _order(request, pb.AlarmCommand.ACTION_TEST, who.name)
+    return _order(request, pb.AlarmCommand.ACTION_TEST, who)

@@ -19,6 +19,8 @@ from starlette.websockets import WebSocketDisconnect
 
 from dashboard.settings import DashboardSettings
 from dashboard.web.auth import Gate, Role
+from dashboard.web.command.seats import Seats
+from dashboard.web.frame.flow import Flow
 from dashboard.web.frame.scene_messages import (
     DROPPED_QUIETLY,
     OPERATOR_MAY,
@@ -63,6 +65,7 @@ def router(
     gate: Gate,
     scene_port: Callable[[], int],
     open_labels: Collection[str],
+    seats: Seats,
 ) -> APIRouter:
     """GET /scene/ and the WebSocket /scene/; scene_port gives viser's port on the loopback."""
     routes = APIRouter(include_in_schema=False)
@@ -103,7 +106,7 @@ def router(
             return
         open_scenes[user] += 1
         try:
-            await Relay(settings, gate, socket, open_labels).run(scene_port())
+            await Relay(settings, gate, socket, open_labels, seats).run(scene_port())
         finally:
             open_scenes[user] -= 1
 
@@ -123,14 +126,17 @@ class Relay:
         gate: Gate,
         socket: WebSocket,
         open_labels: Collection[str],
+        seats: Seats,
     ) -> None:
         self._settings, self._gate, self._socket = settings, gate, socket
         self._widgets = Widgets(open_labels)
         self._key = gate.key_of(socket)
+        self._seat = seats.of_key(self._key)
         self._rate = Rate(settings.message_rate)
         self._refused: set[str] = set()  # names said already
         self._who = "nobody"
         self._told = ""  # role and name that the scene knows of
+        self._flow = Flow()
 
     async def run(self, port: int) -> None:
         """Until either side ends."""
@@ -155,9 +161,16 @@ class Relay:
             log.error("scene at 127.0.0.1:%d does not answer: %s", port, error)
             await self._socket.close(1013, "the scene does not answer; try again")
             return
+        flows: dict[str, list[Flow]] = self._socket.app.state.flows
         async with scene:
             await self._socket.accept(protocol)
-            await self._join(scene)
+            flows.setdefault(self._seat, []).append(self._flow)
+            try:
+                await self._join(scene)
+            finally:
+                flows[self._seat].remove(self._flow)
+                if not flows[self._seat]:
+                    del flows[self._seat]
 
     async def _join(self, scene: websockets.ClientConnection) -> None:
         tasks = [
@@ -194,6 +207,7 @@ class Relay:
                     await self._socket.send_bytes(
                         message if isinstance(message, bytes) else message.encode()
                     )
+                self._flow.add(len(message))
             except TimeoutError:
                 log.warning(
                     "browser of %s took nothing for %g s: dropped",
@@ -250,7 +264,7 @@ class Relay:
     async def _tell_role(self, scene: websockets.ClientConnection) -> None:
         """Let the scene know who looks: it greys what is not his, and orders bear his name."""
         found = self._gate.look_up(self._key)
-        who = "" if found is None else f"{found[1].role.name} {found[1].name}"
+        who = "" if found is None else f"{found[1].role.name} {found[1].name}\t{self._seat}"
         if who and self._widgets.role and who != self._told:
             self._told = who
             await scene.send(update(self._widgets.role, who))

@@ -19,6 +19,7 @@ from messages.clock import Moment
 from messages.text import check as fault_in
 
 PREFIX = "gyf_"
+WALL = "wall"  # kind of the tokens of wall displays, which are good for nothing else
 DAYS_MAX = 3650.0
 MOST = 200  # tokens in all
 PER_SECOND, BURST = 20.0, 60.0  # requests by one token
@@ -37,6 +38,7 @@ class Token:
     created: float
     ends: float
     moment: list[str | int] = field(default_factory=list)  # of its making: messages.clock.Moment
+    kind: str = ""  # of a program; or WALL
 
     @property
     def over(self) -> bool:
@@ -84,7 +86,7 @@ def _save(users_file: Path, tokens: dict[str, Token]) -> None:
 
 
 def issue_token(
-    users_file: Path, user: str, name: str, role: str, days: float
+    users_file: Path, user: str, name: str, role: str, days: float, kind: str = ""
 ) -> tuple[str, Token]:
     """A new token, which is told only here, and its entry. Raises UsersError for what is not
     acceptable: more than the user may do, no end.
@@ -113,6 +115,7 @@ def issue_token(
         now,
         now + days * DAY_S,
         list(Moment.now()),
+        kind,
     )
     _save(users_file, tokens | {entry.id: entry})
     return secret, entry
@@ -157,10 +160,12 @@ class TokenStore:
         self.uses: dict[str, Use] = {}
         self.refused = 0  # requests with a token that is none
 
-    def find(self, secret: str) -> tuple[Token, User] | None:
-        """A token that is good now, and its user with the lesser of both roles."""
+    def find(self, secret: str, kind: str = "") -> tuple[Token, User] | None:
+        """A token of a kind that is good now, and its user with the lesser of both roles."""
         token = self._all().get(digest(secret)) if secret.startswith(PREFIX) else None
-        user = self._user_of(token.user) if token is not None and not token.over else None
+        if token is not None and (token.over or token.kind != kind):
+            token = None
+        user = self._user_of(token.user) if token is not None else None
         if token is None or user is None:
             with self._lock:
                 self.refused += 1

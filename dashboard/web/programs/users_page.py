@@ -8,7 +8,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from dashboard.web.auth import Role
 from dashboard.web.front import Asker, address_of, check_role, front_of
 from dashboard.web.pages import SignedIn, render, signed_form
-from dashboard.web.programs.tokens import issue_token, load_tokens, revoke_token
+from dashboard.web.programs.tokens import WALL, issue_token, load_tokens, revoke_token
 from dashboard.web.users import UsersError, add_user, remove_user, set_role
 from messages.text import plain
 
@@ -18,12 +18,18 @@ routes = APIRouter(include_in_schema=False)
 @routes.get("/users")
 def users_page(request: Request, who: SignedIn) -> HTMLResponse:
     check_role(who, Role.admin, request)
-    return _users(request, who)
+    return users_with(request, who)
 
 
-def _users(
-    request: Request, who: Asker, fault: str = "", status: int = 200, secret: str = ""
+def users_with(
+    request: Request,
+    who: Asker,
+    fault: str = "",
+    status: int = 200,
+    secret: str = "",
+    wall: str = "",
 ) -> HTMLResponse:
+    """The page, with what went wrong, or a new secret that is shown this once."""
     gate = front_of(request).gate
     users = sorted(gate.users.all().values(), key=lambda user: user.name)
     tokens = sorted(load_tokens(gate.settings.users).values(), key=lambda one: one.created)
@@ -35,7 +41,9 @@ def _users(
         users=users,
         roles=[role.name for role in Role],
         fault=fault,
-        tokens=[(one, gate.tokens.uses.get(one.id)) for one in tokens],
+        tokens=[(one, gate.tokens.uses.get(one.id)) for one in tokens if one.kind != WALL],
+        walls=[one for one in tokens if one.kind == WALL],
+        wall=wall,
         refused_tokens=gate.tokens.refused,
         secret=secret,
         ended=front_of(request).ended.most_common(),
@@ -55,7 +63,7 @@ async def change_users(request: Request) -> Response:
     try:
         act = await asyncio.to_thread(_change, request, who, fields)
     except UsersError as error:
-        return _users(request, who, str(error), 422)
+        return users_with(request, who, str(error), 422)
     gate = front_of(request).gate
     gate.audit.done(act, who.name, address_of(request), plain(fields.get("name", ""), 64))
     gate.bell.ring()
@@ -102,7 +110,7 @@ async def change_tokens(request: Request) -> Response:
         named = (fields.get("user", ""), fields.get("name", ""), fields.get("role", ""))
         secret, entry = issue_token(users_file, *named, days)
     except UsersError as error:
-        return _users(request, who, str(error), 422)
+        return users_with(request, who, str(error), 422)
     text = f"{entry.id} ({entry.name}) of {entry.user}, {entry.role}"
     gate.audit.done("token made", who.name, address_of(request), text)
-    return _users(request, who, secret=secret)
+    return users_with(request, who, secret=secret)

@@ -4,7 +4,7 @@ import { beep, notifies, possible, setNotify, setSound, sounds, tell } from "/st
 
 const byId = (id) => document.getElementById(id);
 const mayOperate = byId("alarm-page").dataset.operator === "1";
-const BARRED = "This takes the role operator; you look as viewer";
+const BARRED = byId("alarm-page").dataset.barred;
 const EVERY_MS = 2000;
 const WORDS = { unacknowledged: "not acknowledged", acknowledged: "acknowledged", returned: "over, not acknowledged", shelved: "shelved" };
 const form = byId("limit"), ask = byId("ask"), sound = byId("sound"), notify = byId("notify");

@@ -11,7 +11,7 @@ const ROOMS = ["watch", "test", "diagnose", "calibrate", "navigate"];
 const KEPT = ["w", "p", "device", "window", "layers", "derived", "zoom"];
 const SAVE_MS = 1500;
 export const mayOperate = desk.dataset.operator === "1";
-const BARRED = "Takes the role operator; you look as viewer";
+export const BARRED = desk.dataset.barred; // why no order here is this person's
 
 const root = document.documentElement;
 const isDark = () => (root.dataset.theme ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light")) === "dark";

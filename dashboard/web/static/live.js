@@ -1,12 +1,13 @@
 // The bar above the scene: device, where its data come from, alarms, recording, replay. Polled once a second.
 import "/static/live_charts.js";
 import { call, toast } from "/static/rest.js";
-import { mayOperate, turnTo } from "/static/desk.js";
+import { command, whenCommand } from "/static/command.js";
+import { BARRED, mayOperate, turnTo } from "/static/desk.js";
 import { tell } from "/static/told.js";
 import { state } from "/static/view.js";
 
 const byId = (id) => document.getElementById(id);
-const device = byId("device"), choice = byId("devices"), source = byId("source"), alarms = byId("alarms");
+const device = byId("device"), choice = byId("devices"), source = byId("source"), late = byId("late"), alarms = byId("alarms");
 const record = byId("record"), replay = byId("replay"), session = byId("session");
 const SURE_MS = 4000; // in which a second click ends the recording
 const SHOWN = 3; // alarms; the others are counted
@@ -19,6 +20,9 @@ const clock = (s) => `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStar
 function showDevices(devices) {
   const one = devices.find((d) => d.name === state?.device) ?? devices.find((d) => d.connected) ?? devices[0];
   showChoice(state?.devices ?? devices.map((d) => d.name), state?.device ?? one?.name);
+  late.hidden = !one?.late?.shown;
+  late.textContent = one?.late?.said ?? "";
+  late.title = one?.late?.details ?? "";
   if (!one) {
     source.hidden = true;
     return showDevice("none", state?.device || "no device yet", state?.device ? "" : "waiting for a gateway");
@@ -105,7 +109,8 @@ function alarmButton(alarm) {
 
 function showRecording(now) {
   recording = now;
-  record.disabled = !mayOperate || !now.available;
+  const may = mayOperate && command.may;
+  record.disabled = !may || !now.available;
   record.classList.toggle("on", now.recording);
   record.setAttribute("aria-pressed", String(now.recording));
   if (!now.recording) sure = 0;
@@ -113,14 +118,14 @@ function showRecording(now) {
   record.classList.toggle("asks", asks);
   record.querySelector("span").textContent = now.recording ? `${asks ? "Really stop" : "Stop"} ${clock(now.seconds)}` : "Record";
   record.title = now.message || (now.recording ? `${now.session}, ${now.messages} messages, ${now.lost} lost` : "");
-  session.disabled = !mayOperate || !now.available || now.recording;
+  session.disabled = !may || !now.available || now.recording;
   session.placeholder = now.recording ? now.session : "Session name";
   session.title = now.recording ? now.session : "Empty: it is called by its time";
-  if (!mayOperate) record.title = session.title = "Recording takes the role operator; you look as viewer";
+  if (!may) record.title = session.title = BARRED || command.why;
   replay.hidden = !now.replaying;
   replay.disabled = !mayOperate;
   replay.textContent = `Stop replay`;
-  replay.title = mayOperate ? now.replaying : `${now.replaying}: to end it takes the role operator`;
+  replay.title = mayOperate ? now.replaying : `${now.replaying}: ${BARRED}`;
 }
 
 async function poll() {
@@ -173,5 +178,6 @@ replay.addEventListener("click", async () => {
   }
 });
 
+whenCommand(() => recording && showRecording(recording));
 poll();
 

@@ -10,6 +10,7 @@ from google.protobuf.json_format import MessageToDict
 from rich.table import Table
 
 from gyrofree.commands.options import AsJson, Config, Verbose, say, settings_of, show_table
+from gyrofree.operations.attending import attended
 from gyrofree.running.process import fail, run_service
 from messages.contract import gyrofree_pb2 as pb
 
@@ -42,7 +43,7 @@ def service(context: typer.Context, config: Config = None, verbose: Verbose = Fa
         bus = settings.bus.acting_as("alarms")
         alarms.run(settings.alarms, settings.recorder.root, bus, stop)
 
-    run_service(body, verbose)
+    run_service(body, verbose, attended(settings, "alarms"))
 
 
 def _ask(config: Any, **command: Any) -> pb.AlarmReply:

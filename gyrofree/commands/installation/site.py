@@ -11,9 +11,11 @@ import typer
 import zenoh
 from rich.table import Table
 
+from gyrofree.commands.installation.site_status import site_status
 from gyrofree.commands.options import AsJson, Config, Verbose, say, settings_of, show_table
 from gyrofree.commands.parser import Commands, output_folder
 from gyrofree.config import DEFAULT_PATH, ConfigError, Settings
+from gyrofree.operations.attending import attended
 from gyrofree.running.process import (
     EXIT_CONFIG,
     EXIT_FAILED,
@@ -163,6 +165,9 @@ def site_show(as_json: AsJson = False, config: Config = None) -> None:
         say(f"  certificate of {role} until {end:%Y-%m-%d %H:%M UTC}")
 
 
+app.command("status")(site_status)
+
+
 @app.command("copies")
 def site_copies(as_json: AsJson = False, config: Config = None) -> None:
     """Home's recordings that are here, with the sha256 of both."""
@@ -246,11 +251,12 @@ def site_serve(config: Config = None, verbose: Verbose = False) -> None:
 
         try:
             sessions = Path(settings.recorder.root)
-            service.run(folder, sessions, settings.bus.acting_as("authority"), stop)
+            bus = settings.bus.acting_as("authority")
+            service.run(folder, sessions, bus, stop, settings.site)
         except SiteError as error:
             raise ConfigError(str(error)) from None
 
-    run_service(body, verbose)
+    run_service(body, verbose, attended(settings, "authority"))
 
 
 def _folder(settings: Settings) -> Path:

@@ -1,5 +1,6 @@
 """`gyrofree up`: everything that a real board needs, as one command."""
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -7,6 +8,7 @@ import typer
 
 from gyrofree.commands.options import Config, say, settings_of
 from gyrofree.config import DEFAULT_PATH, ConfigError
+from gyrofree.operations.log_form import FORMAT
 from gyrofree.running.process import EXIT_CONFIG, fail
 from gyrofree.running.watch import SERVICES
 
@@ -23,12 +25,19 @@ def up(
         bool,
         typer.Option("--systemd", help="Start nothing: print a systemd unit that runs the same."),
     ] = False,
+    log_format: Annotated[
+        str, typer.Option(help="text, or json: one object a line; default [log] format.")
+    ] = "",
     config: Config = None,
 ) -> None:
     """Start the services of gyrofree.toml, keep them alive, and print the page's address.
 
     `gyrofree setup` writes the configuration. Ctrl-C ends everything in order.
     """
+    if log_format not in ("", "text", "json"):
+        raise typer.BadParameter(f"{log_format!r}: want text or json", param_hint="--log-format")
+    if log_format:
+        os.environ[FORMAT] = log_format
     settings = settings_of(config)
     from gyrofree.running import up as running
     from gyrofree.setup.site import services
@@ -44,6 +53,7 @@ def up(
 
         arguments = [f"--only={name}" for name in only or []]
         arguments += [f"--without={name}" for name in without or []]
+        arguments += [f"--log-format={log_format}"] if log_format else []
         return say(unit(source, arguments, Path.cwd()), end="")
     running.run(running.Plan(settings, source, chosen))
 

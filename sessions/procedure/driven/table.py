@@ -10,7 +10,7 @@ from typing import Protocol
 import serial
 
 from sessions.procedure.driven.description import Description, TableError
-from sessions.procedure.driven.guard import Guard
+from sessions.procedure.driven.guard import HANGS_S, Guard
 
 LONGEST = 4096  # bytes of one reply
 DRAIN_S = 0.2
@@ -26,6 +26,11 @@ class RateTable(Protocol):
     @property
     def name(self) -> str:
         """For people."""
+        ...
+
+    @property
+    def if_lost(self) -> str:
+        """What stops it when nobody drives it any more, in words."""
         ...
 
     @property
@@ -80,6 +85,19 @@ class TextTable:
     def name(self) -> str:
         """Of the description."""
         return self._said.title
+
+    @property
+    def if_lost(self) -> str:
+        """What stops it when nobody drives it any more, in words."""
+        commands, watchdog_s = self._said.commands, self._said.watchdog_s
+        own = (
+            f"when this machine or the line to it fails, the table stops by its own watchdog after"
+            f" {watchdog_s:g} s"
+            if commands.watchdog
+            else "the table has no watchdog of its own: when this machine or the line to it fails,"
+            " it TURNS ON until somebody switches it off"
+        )
+        return f"when the procedures are killed or hang for {HANGS_S:g} s, a guard stops it; {own}"
 
     @property
     def limit(self) -> float:

@@ -48,6 +48,11 @@ COUNTERS = (  # of STATUS, under the words that people read
     ("stack never used, bytes", ("free_stack",)),
 )
 
+IF_LOST = (
+    "The self-test stops sampling, deflects the sensors and starts sampling again: three orders."
+    " When this page or the link to the lab is lost between them, sampling stays stopped until"
+    " somebody presses Start sampling."
+)
 LEAST = {"free_stack": 1}  # a board that does not know says 0
 
 
@@ -126,7 +131,8 @@ class Board(Panel):
                     for name in names
                 )
                 items.append((words, " · ".join(told)))
-        self._table = self.html(said + rows(items, s.stale("board")), self._table)
+        lost = note(IF_LOST)
+        self._table = self.html(said + rows(items, s.stale("board")) + lost, self._table)
 
     def _order(self, names: tuple[str, ...], value: int = 0) -> None:
         texts, good = [], True

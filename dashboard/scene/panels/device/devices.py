@@ -8,6 +8,7 @@ import time
 import numpy as np
 
 from dashboard.data.alarms import TURNS_RADPS, alarms, bench_alarms, counts, waits
+from dashboard.data.lateness import lateness
 from dashboard.data.pose import roll_pitch
 from dashboard.data.whereabouts import QUALITIES
 from dashboard.scene.drawing.geometry import MODES
@@ -80,6 +81,9 @@ class Devices(Panel):
             return bad(f"■ stale, {age(old)}")
         if replay:
             return tag("b", "▶ replay", class_="gf-replay")
+        late = lateness(s.store, s.device)
+        if late is not None and late.shown:
+            return tag("b", f"◷ {late.said}", class_="gf-replay", title=late.details)
         return tag("span", "● live", class_="gf-live")
 
     @staticmethod

@@ -79,6 +79,10 @@ class ProcedurePanel(Guided):
         """Buttons, and what is given with them."""
         return *super().orders, self._choice, self._unit, self._read
 
+    @property
+    def always(self) -> tuple[Input, ...]:
+        return (self._buttons[ACTION.ACTION_STOP],)
+
     @classmethod
     def missing(cls, device: Device) -> str:
         if device.get("procedure") is not None:
@@ -165,7 +169,8 @@ def content(m: pb.ProcedureStatus, gone: bool, dark: bool, user: str = "") -> Ma
             " with a report."
         )
         who = f"Operator: {user}, who is signed in." if user else EMPTY
-        return alarm + note(text) + note(table) + (note(who) if who else EMPTY)
+        lost = note(m.if_lost) if m.if_lost else EMPTY
+        return alarm + note(text) + note(table) + lost + (note(who) if who else EMPTY)
     done = sum(s.state in (STEP.STATE_DONE, STEP.STATE_SKIPPED) for s in m.steps)
     state = tag("span", STATES.get(m.state, ""), class_="gf-name")
     detail = tag("span", f"{done} of {len(m.steps)} steps")

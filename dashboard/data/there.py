@@ -1,0 +1,75 @@
+"""What is wrong with who is there: a service that is frozen or gone, a place out of reach, one
+board of two gateways.
+"""
+
+from collections.abc import Iterator
+
+from dashboard.data.fault import Alarm
+from dashboard.data.store import Store
+from messages.bus.presence import Process, State
+
+PERSONS = ("operator",)  # roles of commands that people begin and end
+WRONG = (State.FROZEN, State.GONE)
+CALM_S = (
+    3.0  # without a word before that is a fault: a machine that starts much is busy for a while
+)
+
+
+def service_faults(store: Store) -> Iterator[Alarm]:
+    """Services and places. Call under the store's lock."""
+    presence, said = store.presence, set()
+    for place in presence.places():
+        if presence.out_of_reach(place):
+            said.add(place)
+            text = (
+                f"nothing is heard of any service of {place}: the link between the places is cut,"
+                " or that place has no power"
+            )
+            yield Alarm("place", f"{place} out of reach", text, "", place)
+    told: set[tuple[str, str]] = set()
+    for one in presence.all():
+        key, silent_s = (one.place, one.role), presence.now_s - one.heard_s
+        if silent_s < CALM_S and not (one.state is State.GONE and not one.froze):
+            continue
+        if one.place in said or one.role in PERSONS or one.state not in WRONG or key in told:
+            continue
+        told.add(key)
+        title = f"{one.role} at {one.place} {one.state.value}"
+        text = _wrong(one, silent_s)
+        yield Alarm("service", title, text, "", f"{one.place}-{one.role}")
+
+
+def _wrong(one: Process, silent_s: float) -> str:
+    since = _round(silent_s)
+    if one.state is State.FROZEN:
+        return (
+            f"its connection stands and it has said nothing for {since}: it was stopped (a signal,"
+            " a debugger), or its machine has no time for it or sleeps"
+        )
+    if one.froze:
+        return (
+            f"it was frozen, has said nothing for {since} and was cut off: its machine has no time"
+            " for it, sleeps, or is out of reach"
+        )
+    return (
+        f"it went without a word {since} ago: killed, or its machine is cut off; does `gyrofree up`"
+        " run there?"
+    )
+
+
+def twin_fault(store: Store, device: str) -> Iterator[Alarm]:
+    """Of one board. Call under the store's lock."""
+    who = store.presence.twins().get(device)
+    if who is not None:
+        text = (
+            f"{who} want to publish {device}: one at a time is heard, and the others wait; stop all"
+            " but the one that has the board, or give the boards different names"
+        )
+        yield Alarm("twin", "two gateways of one board", text, "link", device)
+
+
+def _round(seconds: float) -> str:
+    """A time that does not change with every look."""
+    if seconds < 10:
+        return "some seconds"
+    return f"{seconds // 10 * 10:.0f} s" if seconds < 120 else f"{seconds // 60:.0f} min"

@@ -1,0 +1,1 @@
+"""What keeps an installation running: logs, figures, backups, the list of its parts."""

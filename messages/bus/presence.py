@@ -1,0 +1,318 @@
+"""Who is there: what tokens and beats (beating.py) say of every process of every place.
+
+A process whose beats end while its token stands is frozen; one whose token went without its last
+word is gone. Time is counted by the looks of whoever watches, at most LOOK_S from one to the next:
+a watcher that was frozen itself, or had no router, blames nobody for it.
+"""
+
+import threading
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from enum import Enum
+
+import zenoh
+
+from messages.bus.claiming import WAITING, rank_of
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import GATEWAY, check_name
+
+FROZEN_S = 1.5  # without a beat, of which there are two a second
+SETTLE_S = 5.0  # after a router came back, for all others to find it too
+QUIET_S = 0.75  # without a beat of anybody of a place, of several: the way there is stuck
+AGAIN_S = 1.0  # after that, for the next beat of each
+LOOK_S = 0.25  # the longest time between two looks that counts
+OUT_S = 3.0  # without a beat of anybody of another place
+ENDED_S = 10.0  # one that ended as it should is listed for so long
+GONE_S = 3600.0  # and one that went without a word
+MOST = 512  # processes
+ROUTER = "router"  # role
+
+
+class State(Enum):
+    """Of a process, as whoever watches sees it."""
+
+    RUNNING = "running"
+    FROZEN = "frozen"
+    GONE = "gone"
+    ENDED = "ended"
+    UNKNOWN = "not known"  # the router does not answer us
+
+
+@dataclass
+class Process:
+    """What is known of one process."""
+
+    place: str
+    name: str  # among those of its place
+    beat: pb.Beat = field(default_factory=pb.Beat)
+    token: bool = False
+    beats: int = 0  # that were heard
+    heard_s: float = 0.0  # when the last one was, by the watch
+    state: State = State.RUNNING
+    since_s: float = 0.0  # that it is in this state, by the watch
+    froze: bool = False  # before it went
+
+    @property
+    def role(self) -> str:
+        """From its name: a process that never beat has one, too."""
+        return self.beat.role or self.name.rpartition("-")[0] or self.name
+
+
+@dataclass(frozen=True)
+class Change:
+    """A process turned to another state."""
+
+    process: Process
+    before: State
+
+
+class Claimants:
+    """Who serves and who waits for a gateway's boards; filled by Zenoh's thread."""
+
+    def __init__(self) -> None:
+        self._there: dict[str, dict[str, str]] = {}  # device -> name of a token -> id of a session
+
+    def heard(self, key: str, there: bool) -> None:
+        """A token of a claim came or went."""
+        parts = key.split("/")
+        device, name = parts[1], parts[-1]
+        rank = rank_of(name.removeprefix(f"{WAITING}-"))
+        if rank is None or (device not in self._there and len(self._there) >= MOST):
+            return
+        known = self._there.setdefault(device, {})
+        if not there:
+            known.pop(name, None)
+        elif len(known) < MOST:
+            known[name] = rank[1]
+        if not known:
+            del self._there[device]
+
+    def serving(self, device: str) -> set[str]:
+        """Ids of the sessions that have claimed it."""
+        known = dict(self._there.get(device, {}))
+        return {id_ for name, id_ in known.items() if not name.startswith(WAITING)}
+
+    def waiting(self, device: str) -> set[str]:
+        """Ids of those that wait to."""
+        known = dict(self._there.get(device, {}))
+        return {id_ for name, id_ in known.items() if name.startswith(WAITING)}
+
+    def contested(self) -> dict[str, list[str]]:
+        """Boards that more than one gateway wants, and by which sessions."""
+        return {
+            device: sorted(ids)
+            for device in list(self._there)
+            if len(ids := self.serving(device) | self.waiting(device)) > 1
+        }
+
+
+class Presence:
+    """All processes; beats and looks come from one thread, tokens from Zenoh's."""
+
+    def __init__(self, at: str = "") -> None:
+        """at: our own place; empty: what our own beats say, if we have any."""
+        self._at = at
+        self.own = ""  # id of our own session
+        self.processes: dict[tuple[str, str], Process] = {}
+        self.claimants = Claimants()
+        self.refused = 0  # processes beyond what is remembered
+        self.now_s = 0.0  # by the watch
+        self._looked: float | None = None
+        self._settled_s = -SETTLE_S  # since when there is a router
+        self._connected = True
+        self._quiet: dict[str, float] = {}  # places of which nobody is heard; until when, by now
+        self._lock = threading.RLock()
+
+    # --- what is heard
+
+    def beat(self, place: str, name: str, beat: pb.Beat) -> None:
+        """A beat came in."""
+        with self._lock:
+            one = self._process(place, name)
+            if one is not None:
+                one.beat, one.heard_s, one.beats = beat, self.now_s, one.beats + 1
+
+    def token(self, key: str, there: bool) -> None:
+        """Zenoh's thread: a token of a process (alive_key) came or went."""
+        parts = key.split("/")
+        with self._lock:
+            known = len(parts) == 4 and (there or (parts[1], parts[3]) in self.processes)
+            one = self._process(parts[1], parts[3]) if known else None
+            if one is not None:
+                if there and not one.token:
+                    one.heard_s = self.now_s  # the first beat is given its time
+                one.token = there
+
+    def _process(self, place: str, name: str) -> Process | None:
+        known = self.processes.get((place, name))
+        if known is None:
+            if len(self.processes) >= MOST:
+                self.refused += 1
+                return None
+            known = self.processes[place, name] = Process(place, name, heard_s=self.now_s)
+            known.since_s = self.now_s
+        return known
+
+    # --- what that comes to
+
+    def look(self, monotonic_s: float, connected: bool = True) -> list[Change]:
+        """Judge all, after what waited has been taken in; what turned to another state."""
+        with self._lock:
+            passed = 0.0 if self._looked is None else monotonic_s - self._looked
+            self._looked = monotonic_s
+            if connected and not self._connected:
+                self._settled_s = self.now_s
+            self._connected = connected
+            if connected:
+                self.now_s += min(max(passed, 0.0), LOOK_S)
+            self._listen()
+            changes = []
+            for key, one in list(self.processes.items()):
+                state = self._judge(one)
+                if state is not one.state:
+                    changes.append(Change(one, one.state))
+                    one.froze = state is State.GONE and one.state is State.FROZEN
+                    one.state, one.since_s = state, self.now_s
+                if self._done_with(one):
+                    del self.processes[key]
+            return changes
+
+    def _is_near(self, one: Process) -> bool:
+        """Ourselves, or our router: what they say says nothing of what passes it."""
+        own = bool(self.own) and one.beat.session == self.own
+        return own or (one.role, one.place) == (ROUTER, self.here)
+
+    def _listen(self) -> None:
+        """Of which places nothing is heard at all: none of their several services is to blame."""
+        heard: dict[str, list[float]] = {}
+        for one in self.processes.values():
+            if one.state not in (State.GONE, State.ENDED) and not self._is_near(one):
+                heard.setdefault(one.place, []).append(one.heard_s)
+        for place, times in heard.items():
+            if len(times) > 1 and self.now_s - max(times) > QUIET_S:
+                self._quiet[place] = self.now_s + AGAIN_S
+        for place in [p for p, until_s in self._quiet.items() if until_s < self.now_s]:
+            del self._quiet[place]
+
+    def _judge(self, one: Process) -> State:
+        if not self._connected:
+            return State.UNKNOWN if one.state is not State.ENDED else State.ENDED
+        if one.beat.leaving:
+            return State.ENDED
+        silent = self.now_s - one.heard_s > FROZEN_S
+        if not silent:
+            return State.RUNNING
+        stuck = one.place in self._quiet and not self._is_near(one)
+        if stuck or self.now_s - self._settled_s < SETTLE_S:
+            return one.state if one.state is not State.RUNNING else State.UNKNOWN
+        return State.FROZEN if one.token else State.GONE
+
+    def _done_with(self, one: Process) -> bool:
+        for_s = self.now_s - one.since_s
+        if one.state is State.ENDED:
+            return for_s > ENDED_S
+        if one.state is not State.GONE and (one.state is not State.UNKNOWN or one.token):
+            return False
+        replaced = any(
+            other.place == one.place and other.role == one.role and other.state is State.RUNNING
+            for other in self.processes.values()
+        )
+        return replaced or for_s > GONE_S or not one.beats
+
+    # --- what is asked
+
+    @property
+    def sees(self) -> bool:
+        """Can it be told now who is there?"""
+        own_quiet = self.here in self._quiet
+        return self._connected and not own_quiet and self.now_s - self._settled_s >= SETTLE_S
+
+    def all(self) -> list[Process]:
+        """By place and role."""
+        with self._lock:
+            found = list(self.processes.values())
+        return sorted(found, key=lambda one: (one.place, one.role, one.name))
+
+    def places(self) -> list[str]:
+        """Their names."""
+        return sorted({one.place for one in self.all()})
+
+    def by_session(self, session: str) -> Process | None:
+        """The process with this session; None where none has said so."""
+        return next((one for one in self.all() if session and one.beat.session == session), None)
+
+    @property
+    def mine(self) -> Process | None:
+        """Our own."""
+        return self.by_session(self.own)
+
+    @property
+    def here(self) -> str:
+        """Our own place; empty where that is not known."""
+        mine = self.mine
+        return self._at or (mine.place if mine is not None else "")
+
+    def out_of_reach(self, place: str) -> bool:
+        """Is every process of another place silent? Then it is the way there that is cut, or the
+        whole place.
+        """
+        there = [one for one in self.all() if one.place == place and one.state is not State.ENDED]
+        silent = all(self.now_s - one.heard_s > OUT_S for one in there)
+        return bool(there) and silent and self._connected and self.here not in ("", place)
+
+    def gateway_of(self, device: str) -> Process | None:
+        """Whose gateway publishes a board: the one that claimed it, else the one that names it."""
+        serving = self.claimants.serving(device)
+        named = [one for one in self.all() if device in one.beat.devices]
+        return next((one for one in named if one.beat.session in serving), None) or next(
+            iter(named), None
+        )
+
+    def twins(self) -> dict[str, str]:
+        """Boards that several gateways want, and who they are, in words."""
+        return {
+            device: " and ".join(self._called(id_, device) for id_ in ids)
+            for device, ids in self.claimants.contested().items()
+        }
+
+    def _called(self, session: str, device: str) -> str:
+        one = self.by_session(session)
+        where = f"{one.role} at {one.place}" if one is not None else f"session {session[:8]}"
+        doing = "publishes" if session in self.claimants.serving(device) else "waits"
+        return f"{where} ({doing})"
+
+
+class Watching:
+    """Subscribes a presence to tokens; beats come through whoever listens to the bus, or through
+    `beats`.
+    """
+
+    def __init__(self, session: zenoh.Session, prefix: str, presence: Presence) -> None:
+        check_name(prefix)
+        presence.own = str(session.zid())
+
+        def on(heard: Callable[[str, bool], None]) -> Callable[[zenoh.Sample], None]:
+            return lambda sample: heard(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+
+        wanted = (
+            (f"{prefix}/*/alive/*", on(presence.token)),
+            (f"{prefix}/*/{GATEWAY}/*", on(presence.claimants.heard)),
+        )
+        self._parts = [
+            session.liveliness().declare_subscriber(pattern, handler, history=True)
+            for pattern, handler in wanted
+        ]
+
+    def undeclare(self) -> None:
+        """End."""
+        for part in self._parts:
+            part.undeclare()
+
+
+def viewers(processes: Iterable[Process]) -> dict[str, int]:
+    """People who look, by role, of processes that run."""
+    found: dict[str, int] = {}
+    for one in processes:
+        for many in one.beat.viewers if one.state is State.RUNNING else ():
+            found[many.role] = found.get(many.role, 0) + many.count
+    return found

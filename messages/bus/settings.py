@@ -1,0 +1,105 @@
+"""[bus] of gyrofree.toml, and what it means to Zenoh."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import BaseModel, ConfigDict, PrivateAttr
+
+from messages.bus import tls
+from messages.contract.names import Name
+from messages.setting import setting
+
+LARGEST = 16 << 20  # bytes; messages have at most 1 MB, answers to questions 8
+PATIENCE_US = 100_000  # that a full queue is waited for
+
+
+class BusSettings(BaseModel):
+    """[bus]: how the processes find one another."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    prefix: Name = setting(
+        "gyrofree",
+        "first part of every bus key; two installations on one router differ in it",
+        shown=True,
+    )
+    router: str = setting("tcp/127.0.0.1:7447", "where all processes find the router", shown=True)
+    listen: list[str] = setting(
+        ["tcp/127.0.0.1:7447"],
+        "where the router listens; beyond loopback read docs/deployment.md first",
+        shown=True,
+    )
+    tls: Path | None = setting(
+        None,
+        "folder of this place's certificates, which `gyrofree site` makes: every link is then"
+        " encrypted, and each process may say only what its role needs; without it plain TCP, for"
+        " the loopback of one machine",
+    )
+    # 2 s noticed a frozen process sooner, but on a machine busy with drawing in software it also
+    # cut off live ones, and lost 3 % of all messages.
+    lease_ms: int = setting(
+        10_000, "a peer that shows no life for so long is cut off", unit="ms", ge=200, le=60_000
+    )
+
+    zenohd: Path | None = setting(
+        None,
+        "Zenoh's own router, a program: `gyrofree router` runs it in its own place, with the same"
+        " listeners, certificates and rules (docs/sites.md)",
+    )
+
+    _role: str = PrivateAttr("operator")
+
+    def acting_as(self, role: str) -> Self:
+        """The same for a process of this role, which shows its certificate."""
+        copy = self.model_copy()
+        copy._role = role
+        return copy
+
+    @property
+    def role(self) -> str:
+        """What this process is; a person's command is an operator's."""
+        return self._role
+
+
+def configuration(settings: BusSettings, mode: str, mesh: Iterable[str] = ()) -> dict[str, Any]:
+    """Zenoh's settings for a "client" or the "router", which keeps calling those of `mesh`, by
+    their paths in its configuration. Raises IdentityError without a certificate.
+    """
+    values = {
+        "mode": mode,
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "timestamping/enabled": True,
+        # A pool of 16 MiB in every process for messages above 3 kB, left in /dev/shm by every one
+        # that is killed.
+        "transport/shared_memory/enabled": False,
+        "transport/link/tx/lease": settings.lease_ms,
+        # A process that gets no processor for a while must not lose messages: room for 16 batches
+        # of 64 KiB, and some patience before DROP drops. Express publishing would be no faster at
+        # these rates (measured), but takes a batch for each message: bursts of 17 were cut off.
+        "transport/link/tx/queue/size/data": 16,
+        # A larger message is put together nowhere: Zenoh would take a GB for one, in each process
+        # that listens.
+        "transport/link/rx/max_message_size": LARGEST,
+        "transport/link/tx/queue/congestion_control/drop/wait_before_drop": PATIENCE_US,
+    }
+    if settings.tls is not None:
+        values |= tls.values(settings.tls, settings.role)
+    if mode == "router":
+        values["listen/endpoints"] = settings.listen
+        values["connect/endpoints"] = list(mesh)
+        values["connect/timeout_ms"] = -1  # another site may come later
+        values["connect/exit_on_failure"] = False
+        return values
+    values["connect/endpoints"] = [settings.router]
+    values["connect/timeout_ms"] = 1000
+    values["listen/endpoints"] = []
+    # Look for a router that went away every second: what was missed shall be on the screen within
+    # five.
+    values["connect/retry"] = {
+        "period_init_ms": 500,
+        "period_max_ms": 1000,
+        "period_increase_factor": 1.5,
+    }
+    return values

@@ -1,0 +1,66 @@
+"""Lanes: further connections from home to a place that it calls, for all that is not live.
+
+One TCP connection over a link with losses carries a fraction of it, and what is live would wait in
+it behind what is not: over 1 Mbit/s, 200 ms and 5 % loss CUBIC gets a quarter through. Several
+together fill the link, and the routers' own connection is left to what is live. Home is a plain
+client of the other place's router here, once for each lane; who asks takes the lane by its number.
+"""
+
+import logging
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import zenoh
+
+from messages.bus.session import BusSettings, LateSession
+from messages.previews.frames import lane_key
+from sites.place import SiteError, load_place
+
+LOOK_S = 5.0  # between two looks at who belongs to the site
+
+log = logging.getLogger(__name__)
+
+Declare = Callable[[zenoh.Session, str], list[zenoh.Queryable]]  # below this key, in this session
+
+
+class Lanes:
+    """Connections to every place that home calls, until it is closed."""
+
+    def __init__(self, folder: Path, bus: BusSettings, count: int, declare: Declare) -> None:
+        self._folder, self._bus, self._count, self._declare = folder, bus, count, declare
+        self._open: dict[str, list[LateSession]] = {}  # by address
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="lanes", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Hang up."""
+        self._stop.set()
+        self._thread.join(LOOK_S)
+        for sessions in self._open.values():
+            for one in sessions:
+                one.close()
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            try:
+                place = load_place(self._folder)
+            except SiteError as error:
+                log.warning("lanes stay as they are: %s", error)
+                self._stop.wait(LOOK_S)
+                continue
+            wanted = {peer.address for peer in place.peers if peer.address}
+            for address in wanted - self._open.keys():
+                self._open[address] = [
+                    self._lane(address, lane_key(place.site, number))
+                    for number in range(self._count)
+                ]
+            for address in self._open.keys() - wanted:
+                for one in self._open.pop(address):
+                    one.close()
+            self._stop.wait(LOOK_S)
+
+    def _lane(self, address: str, key: str) -> LateSession:
+        bus = self._bus.model_copy(update={"router": address}).acting_as(self._bus.role)
+        return LateSession(bus, lambda session: self._declare(session, key), warn=False)

@@ -1,0 +1,237 @@
+"""The whole product as real processes around a board on a real pty, for faults to be done to it.
+
+`gyrofree up` looks after all services but the router, which the bench keeps in its own hands so
+that it can be away. Where this is root, recordings and journals lie on small disks of their own.
+"""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable
+from pathlib import Path
+from typing import Self
+
+import psutil
+from support.stack import free_port
+from support.wall_clock import SlowSync, WallClock
+
+from faults.board import Board
+from faults.disk import Disk
+from faults.watch import ESTIMATORS, Watch
+from gyrofree.running.process import command
+from messages.bus.session import BusSettings
+
+ROOT = Path(__file__).resolve().parents[2]
+PATIENCE_S = 120.0  # a busy machine; nothing is judged by it
+STOP_S = 20.0
+LOOK_S = 0.05
+SERVICES = ("gateway", "estimator", "record", "procedures", "alarms", "dashboard")
+CONFIGURATION = """
+[bus]
+router = "{router}"
+listen = ["{router}"]
+lease_ms = 4000
+[gateway]
+journal = "{journals}/gateway"
+[[gateway.devices]]
+name = "cube"
+port = "{folder}/board"
+[estimator]
+journal = "{journals}/estimates"
+axes = "{folder}/axes"
+cards = "{folder}/cards"
+rate = {estimators}
+[recorder]
+root = "{sessions}"
+[procedures]
+root = "{folder}/procedures"
+folder = "{folder}/own-procedures"
+[alarms]
+state = "{folder}/alarms.json"
+disk_free_bytes = 1048576
+[dashboard]
+port = {port}
+users = "{folder}/users.json"
+sessions_root = "{sessions}"
+"""
+
+
+class NotWell(AssertionError):
+    """It did not become as it was wanted, with the end of the log."""
+
+
+class Bench:
+    """A context manager; everything of it ends with it."""
+
+    def __init__(self, folder: Path) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self.folder = folder
+        self.sessions, self.journals = Disk(folder / "sessions"), Disk(folder / "journals")
+        self.wall = WallClock(folder / "wall")
+        self.sync = SlowSync(folder / "sync", self.wall.environment)
+        router = f"tcp/127.0.0.1:{free_port()}"
+        self.bus = BusSettings(router=router, listen=[router])
+        self.port = free_port()
+        self.config = folder / "gyrofree.toml"
+        self.board = Board(folder / "board")
+        self.log = folder / "up.log"
+        self._router: subprocess.Popen | None = None
+        self._up: subprocess.Popen | None = None
+        self.config.write_text(
+            CONFIGURATION.format(
+                router=router,
+                estimators=list(ESTIMATORS),
+                folder=folder,
+                port=self.port,
+                sessions=self.sessions.path,
+                journals=self.journals.path,
+            )
+        )
+
+    def __enter__(self) -> Self:
+        try:
+            self.start_up()
+            self.start_router()
+            self.watch = Watch(self.bus)
+            self.board.boot()
+            self.until(self.well, "a first picture")
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.wall.set(0.0)
+        self.sync.set(0.0)
+        if hasattr(self, "watch"):
+            self.watch.close()
+        self.stop_up()
+        self.stop_router()
+        self.board.close()
+        self.sessions.close()
+        self.journals.close()
+
+    def start_up(self) -> None:
+        """All services but the router."""
+        self._up = self._start("up", "--without", "router", log=self.log)
+
+    def stop_up(self, number: signal.Signals = signal.SIGTERM) -> float:
+        """End them all; how long they took, s."""
+        if self._up is None:
+            return 0.0
+        began = time.monotonic()
+        for process in self.children().values():
+            process.resume()
+        self._up.send_signal(number)
+        try:
+            self._up.wait(STOP_S)
+        except subprocess.TimeoutExpired:
+            self._up.kill()
+            self._up.wait()
+        self.ended, self._up = self._up.returncode, None
+        return time.monotonic() - began
+
+    def start_router(self) -> None:
+        """In a process of its own."""
+        self._router = self._start("router", log=self.folder / "router.log")
+
+    def stop_router(self) -> None:
+        """With kill -9."""
+        if self._router is not None:
+            self._router.kill()
+            self._router.wait()
+            self._router = None
+
+    def _start(self, *words: str, log: Path) -> subprocess.Popen:
+        with log.open("ab") as stream:
+            return subprocess.Popen(
+                command(*words, "--config", str(self.config)),
+                stdin=subprocess.DEVNULL,
+                stdout=stream,
+                stderr=stream,
+                env=self.sync.environment,
+                cwd=self.folder,
+            )
+
+    def children(self) -> dict[str, psutil.Process]:
+        """By service its process; of the gateway, which is guarded, the one that serves."""
+        return {name: found[-1] for name, found in self._all().items()}
+
+    def processes(self, service: str) -> list[psutil.Process]:
+        """All of a service, the guardian first."""
+        return self._all().get(service, [])
+
+    def _all(self) -> dict[str, list[psutil.Process]]:
+        found: dict[str, list[psutil.Process]] = {}
+        if self._up is None:
+            return found
+        below = psutil.Process(self._up.pid).children(recursive=True)
+        for process in sorted(below, key=lambda p: p.pid):
+            try:
+                words = process.cmdline()
+            except psutil.Error:
+                continue  # it has just ended
+            if "gyrofree" in words:
+                found.setdefault(words[words.index("gyrofree") + 1], []).append(process)
+        return found
+
+    def signal(self, service: str, number: signal.Signals) -> None:
+        """Send it to a service; "router" is one."""
+        pid = self._router.pid if service == "router" else self.children()[service].pid
+        os.kill(pid, number)
+
+    def kill(self, service: str) -> None:
+        """kill -9, and until there is another one."""
+        victim = self.children()[service].pid
+        os.kill(victim, signal.SIGKILL)
+        self.until(
+            lambda: self.children().get(service, psutil.Process(1)).pid not in (victim, 1),
+            f"another {service}",
+        )
+
+    def freeze(self, service: str, seconds: float) -> None:
+        """SIGSTOP, and SIGCONT after so long."""
+        self.signal(service, signal.SIGSTOP)
+        time.sleep(seconds)
+        self.signal(service, signal.SIGCONT)
+
+    def text(self) -> str:
+        """The log of all services so far."""
+        return self.log.read_text(errors="replace")
+
+    def until(self, condition: Callable[[], object], what: str) -> float:
+        """Wait for it; how long it took, s. Raises NotWell."""
+        began = time.monotonic()
+        while not condition():
+            if time.monotonic() - began > PATIENCE_S:
+                raise NotWell(f"no {what} within {PATIENCE_S:g} s:\n{self.text()[-4000:]}")
+            time.sleep(LOOK_S)
+        return time.monotonic() - began
+
+    def well(self, since_ns: int = 0) -> bool:
+        """Is everything there: each service, the newest samples with their estimates, the
+        recording without a gap, and the page? since_ns: monotonic; nothing older counts.
+        """
+        return self.watch.well(since_ns) and self.children().keys() >= set(SERVICES) and self.page()
+
+    def page(self) -> bool:
+        """Does the dashboard answer?"""
+        try:
+            with urllib.request.urlopen(f"http://127.0.0.1:{self.port}/api/health", timeout=1.0):
+                return True
+        except (urllib.error.URLError, OSError):
+            return False
+
+    def said(self, pattern: str, since: int) -> bool:
+        """Does the log have such a line behind the character `since`?"""
+        return re.search(pattern, self.text()[since:]) is not None
+
+
+def python(*words: str) -> list[str]:
+    """A script that plays a foreign program."""
+    return [sys.executable, "-P", *words]

@@ -1,0 +1,87 @@
+"""Faults of disks and of the clock."""
+
+import time
+
+from faults.bench import Bench
+from faults.disk import Disk
+from faults.scenario import Alarmed, Scenario, Status
+
+FULL_S = 3.0
+SLOW_S = 2.0  # of each fsync
+HOUR_S = 3600.0
+STEP_S = 2.5  # that a clock is left as it was set
+
+
+def no_room(bench: Bench) -> str:
+    """Why no disk can be filled here."""
+    return "" if bench.sessions.small else "no small disk can be mounted here: not root"
+
+
+def full(disk: Disk) -> None:
+    """To the last byte for a while."""
+    disk.fill()
+    time.sleep(FULL_S)
+    disk.free()
+
+
+def slow(bench: Bench) -> None:
+    """Each fsync takes seconds."""
+    bench.sync.set(SLOW_S)
+    time.sleep(3 * SLOW_S)
+    bench.sync.set(0.0)
+
+
+def clock(bench: Bench, seconds: float) -> None:
+    """The wall clock is set, and set right again."""
+    bench.wall.set(seconds)
+    time.sleep(STEP_S)
+    bench.wall.set(0.0)
+
+
+def steps(state) -> bool:
+    return state.clock_steps > 0
+
+
+DISKS = (
+    Scenario(
+        "disk of the recordings full",
+        "to the last byte for 3 s, in mid-session",
+        lambda bench: full(bench.sessions),
+        said=(
+            Alarmed("recorder"),
+            Status("`message` of the recorder", "states", lambda state: "full" in state.message),
+        ),
+        quick=True,
+        needs=no_room,
+    ),
+    Scenario(
+        "disk of the journals full",
+        "of gateway and estimator, to the last byte for 3 s",
+        lambda bench: full(bench.journals),
+        said=(Alarmed("link-said"),),
+        needs=no_room,
+    ),
+    Scenario(
+        "slow disk",
+        "each `fsync` takes 2 s longer, for 6 s",
+        slow,
+    ),
+    Scenario(
+        "clock set back by an hour",
+        "the wall clock of all processes, and right again after 2.5 s",
+        lambda bench: clock(bench, -HOUR_S),
+        said=(
+            Alarmed("clock"),
+            Status("`clock_steps` of the recorder", "states", steps),
+        ),
+    ),
+    Scenario(
+        "clock set forward by an hour",
+        "the wall clock of all processes, and right again after 2.5 s",
+        lambda bench: clock(bench, HOUR_S),
+        said=(
+            Alarmed("clock"),
+            Status("`clock_steps` of the recorder", "states", steps),
+        ),
+    ),
+)

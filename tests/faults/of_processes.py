@@ -1,0 +1,127 @@
+"""Faults of processes: killed, stopped, and the router away."""
+
+import signal
+import time
+
+from faults.account import Account
+from faults.bench import Bench
+from faults.scenario import Alarmed, Certified, Line, Loss, Scenario, Status
+
+RESTARTED = "{} ended by signal SIGKILL: starting it again"
+
+
+def killed(service: str, *said: Line, **more) -> Scenario:
+    """kill -9 of a service that `up` looks after."""
+    line = Line(RESTARTED.format(service))
+    return Scenario(
+        f"{service} killed",
+        f"`kill -9` of {service}",
+        lambda bench: bench.kill(service),
+        said=(line, *said),
+        **more,
+    )
+
+
+def frozen(service: str, seconds: float, *said, **more) -> Scenario:
+    """SIGSTOP, and SIGCONT after so long."""
+    return Scenario(
+        f"{service} stopped for {seconds:g} s",
+        f"SIGSTOP of {service}, SIGCONT after {seconds:g} s",
+        lambda bench: bench.freeze(service, seconds),
+        said=said,
+        **more,
+    )
+
+
+def away(bench: Bench, seconds: float) -> None:
+    """No router for so long."""
+    bench.stop_router()
+    time.sleep(seconds)
+    bench.start_router()
+
+
+def away_and_gateway_killed(bench: Bench) -> None:
+    """Both at once."""
+    bench.stop_router()
+    time.sleep(2.0)
+    bench.kill("gateway")
+    time.sleep(2.0)
+    bench.start_router()
+
+
+def guardian_killed(bench: Bench) -> None:
+    """The gateway's guardian; its child goes on until the next one is loaded."""
+    run = bench.watch.newest("link").header.run
+    bench.processes("gateway")[0].send_signal(signal.SIGKILL)
+    bench.until(lambda: bench.watch.newest("link").header.run != run, "another gateway")
+
+
+def up_killed(bench: Bench) -> None:
+    """Everything but the router ends, and is started anew."""
+    bench.stop_up(signal.SIGKILL)
+    bench.start_up()
+
+
+def dark(counted: Account) -> bool:
+    return counted.dark_s > 0.0 or not counted.missing
+
+
+PROCESSES = (
+    Scenario(
+        "gateway killed",
+        "`kill -9` of the gateway",
+        lambda bench: bench.kill("gateway"),
+        said=(Line("killed by SIGKILL: starting again"),),
+        quick=True,
+    ),
+    killed("record", Line("recovered"), Line("going on where"), quick=True),
+    killed("estimator", Line("going on from the state of before"), quick=True),
+    killed("procedures"),
+    killed("alarms"),
+    killed("dashboard"),
+    Scenario(
+        "guardian killed",
+        "`kill -9` of the gateway's guardian",
+        guardian_killed,
+        Loss("what the board says while the port changes hands", (0, 500), complete=None),
+        (
+            Line("the process that guards this one is gone: handing over"),
+            Certified("`dark_s` of the certificate, where samples are missing", dark),
+        ),
+    ),
+    frozen(
+        "gateway",
+        1.8,
+        Status("`stops` of the link", "links", lambda link: link.stops > 0),
+    ),
+    frozen("record", 5.0),
+    frozen("estimator", 5.0, Alarmed("estimator-products-ekf")),
+    frozen("procedures", 5.0),
+    frozen("alarms", 5.0),
+    frozen("dashboard", 5.0),
+    frozen("router", 8.0),
+    Scenario(
+        "router killed",
+        "`kill -9` of the router, started again at once",
+        lambda bench: away(bench, 0.0),
+        quick=True,
+    ),
+    Scenario(
+        "router away for 5 s",
+        "router killed, started again after 5 s",
+        lambda bench: away(bench, 5.0),
+        said=(Alarmed("recorder"),),
+    ),
+    Scenario(
+        "router away for 30 s",
+        "router killed, started again after 30 s",
+        lambda bench: away(bench, 30.0),
+        said=(Alarmed("link"), Alarmed("recorder"), Alarmed("estimator-products-ekf")),
+    ),
+    Scenario(
+        "gateway killed while there is no router",
+        "router killed, gateway killed 2 s later, router started again after 2 s more",
+        away_and_gateway_killed,
+        said=(Line("killed by SIGKILL: starting again"),),
+    ),
+)

@@ -1,0 +1,58 @@
+"""`make faults`: every fault and every proof, then the tables of docs/faults.md.
+
+    python tests/faults/run.py [--only TEXT] [--own]
+
+--only: faults whose name has TEXT; --own: not the tests of other rooms.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+
+import pytest  # noqa: E402
+
+from faults import table  # noqa: E402
+from faults.all import PROOFS  # noqa: E402
+
+
+class Book:
+    """A plugin that keeps what each fault came to."""
+
+    def __init__(self) -> None:
+        self.times: dict[str, str] = {}
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """One report of a test."""
+        name = report.nodeid.partition("[")[2].removesuffix("]")
+        found = dict(report.user_properties)
+        if report.when == "call" and report.passed and "well_s" in found and name:
+            self.times[name] = f"{found['well_s']:.1f} s"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--only", default="", help="faults whose name has this text")
+    parser.add_argument("--own", action="store_true", help="not the tests of other rooms")
+    options = parser.parse_args()
+    own = [str(ROOT / "tests" / "faults" / "test_faults.py")]
+    others = [] if options.own or options.only else proofs()
+    words = ["-v", "-m", "faults or not faults", "-p", "no:cacheprovider", "--rootdir", str(ROOT)]
+    words += ["-k", options.only] if options.only else []
+    book = Book()
+    code = pytest.main([*words, *own, *others], plugins=[book])
+    if code in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED):
+        table.write(book.times)
+        print(f"{len(book.times)} faults measured; the tables of {table.PAGE} are written anew")
+    return int(code)
+
+
+def proofs() -> list[str]:
+    """Tests of other rooms, each once."""
+    return sorted({str(ROOT / "tests" / name) for one in PROOFS for name in one.tests})
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,140 @@
+"""A site of two places over an emulated link, all of real processes: a lab with a simulated board,
+and an office that watches it.
+"""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from support.far_link import FarLink, Line, Place, far_link
+
+GYROFREE = [sys.executable, "-P", "-m", "gyrofree"]
+ROOT = Path(__file__).resolve().parents[2]
+SITE, DEVICE = "lab", "cube"
+START_S = 90.0  # for everything to run and the first picture to come; a busy machine takes its time
+STOP_S = 20.0
+BOARD = f"""
+[[gateway.devices]]
+name = "{DEVICE}"
+port = "board"
+layout = "cube"
+"""
+
+
+@dataclass
+class FarSite:
+    """Two folders with a configuration each, and what runs in them."""
+
+    link: FarLink
+    lab: Path
+    office: Path
+    processes: list[subprocess.Popen]
+
+    def begin(self, place: Place, folder: Path, *words: str, **options) -> subprocess.Popen:
+        """`gyrofree WORDS` at a place, its output in a file there."""
+        with (folder / f"{words[0]}.log").open("a") as stream:
+            options = {"stdout": stream, "stderr": subprocess.STDOUT} | options
+            process = place.popen(
+                [*GYROFREE, *words],
+                cwd=folder,
+                env=os.environ | {"PYTHONPATH": str(ROOT)},
+                start_new_session=True,
+                **options,
+            )
+        self.processes.append(process)
+        return process
+
+    def run(self, place: Place, folder: Path, *words: str) -> str:
+        """`gyrofree WORDS` to its end: what it printed."""
+        done = place.run(
+            [*GYROFREE, *words], cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)}
+        )
+        return done.stdout
+
+    def close(self) -> None:
+        """End all that was begun, the last first."""
+        for process in reversed(self.processes):
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGTERM)
+        for process in reversed(self.processes):
+            try:
+                process.wait(STOP_S)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+
+
+@contextlib.contextmanager
+def far_site(folder: Path, line: Line, settings: str = "", office: str = "") -> Iterator[FarSite]:
+    """Made and joined as docs/sites.md says, with `gyrofree up` at both ends.
+
+    settings, office: further lines of the gyrofree.toml of the lab and of the office. Raises
+    NoNamespaces.
+    """
+    with far_link(Line()) as link:
+        made = FarSite(link, folder / "lab", folder / "office", [])
+        made.lab.mkdir(parents=True)
+        made.office.mkdir(parents=True)
+        for place in (link.a, link.b):
+            place.congestion("cubic")  # what most machines have
+        try:
+            _join(made)
+            _append(made.lab, BOARD + settings)
+            _append(made.office, office)
+            link.line = line
+            made.begin(link.a, made.lab, "simulate", "--link", "board", "--profile", "wobble")
+            made.begin(link.a, made.lab, "up")
+            made.begin(link.b, made.office, "up")
+            yield made
+        finally:
+            made.close()
+
+
+def _append(folder: Path, text: str) -> None:
+    with (folder / "gyrofree.toml").open("a") as stream:
+        stream.write(text)
+
+
+def _join(made: FarSite) -> None:
+    link = made.link
+    made.run(link.a, made.lab, "site", "init", SITE, "--simulator")
+    given = made.run(link.a, made.lab, "site", "invite", "office", "--address", link.b.address)
+    router = made.begin(link.a, made.lab, "router")
+    serving = made.begin(link.a, made.lab, "site", "serve")
+    made.run(link.b, made.office, "site", "join", given.strip())
+    for process in (serving, router):
+        os.killpg(process.pid, signal.SIGTERM)
+        process.wait(STOP_S)
+        made.processes.remove(process)
+
+
+def observer(site: FarSite, words: list[str]) -> Iterator[dict]:
+    """What a program at the office prints, one JSON object a line."""
+    process = site.link.b.popen(
+        [sys.executable, "-P", "-u", "-c", *words],
+        cwd=site.office,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    site.processes.append(process)
+    for text in process.stdout:
+        yield json.loads(text)
+
+
+def until(condition: Callable[[], bool], seconds: float, what: str) -> float:
+    """Wait for it; how long it took, s. Raises TimeoutError."""
+    begin = time.monotonic()
+    while not condition():
+        if time.monotonic() > begin + seconds:
+            raise TimeoutError(f"not within {seconds:g} s: {what}")
+        time.sleep(0.05)
+    return time.monotonic() - begin
