@@ -27,7 +27,7 @@ from messages.offset import Exchange, Offset
 BEAT_S = 0.5
 GONE_S = 2.0  # without a router, before that is said
 ASK_FIRST, ASK_S, ASK_FIRST_S = 8, 4.0, 1.0  # questions to the clock: so many each s, then fewer
-ANSWER_S = 2.0
+ANSWER_S = 10.0  # a slow answer has a wide bound, and is better than none
 HERE = "here"  # the place of an installation that belongs to no site
 
 log = logging.getLogger(__name__)
