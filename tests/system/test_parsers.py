@@ -31,7 +31,7 @@ from sites.joining import make_site
 from sites.place import PLACE, SiteError, load_list, load_place
 
 ROOT = Path(__file__).resolve().parents[2]
-EXAMPLES = 25  # of each reader
+EXAMPLES = 15  # of each reader
 EDITS = 6  # of one file
 
 
