@@ -25,6 +25,7 @@ LONGEST = (
     "test_setup",
     "test_mcap_damage",
     "test_service",
+    "test_faults",
 )
 
 
