@@ -187,8 +187,15 @@ def test_one_commands_others_are_refused_by_name_and_everybody_may_stop(site):
         site.otto.command(pb.SeatCommand.ACTION_FORCE)
     site.root.command(pb.SeatCommand.ACTION_FORCE)
     until(lambda: site.holder() == ["root", "root"], "the admin has it")
-    until(lambda: len(site.otto.history("", 20)[0]) >= 5, "all orders are kept")
+    until(lambda: len(site.otto.history("", 20)[0]) >= 8, "all orders are kept")
     rows, why = site.otto.history("", 20)
+    passed = [r.what for r in reversed(rows) if r.whom == "who keeps the command"]
+    assert passed == [
+        "otto (lab) took it, it was free",
+        "otto (lab) gave it to anna (office)",
+        "root (office) took it from anna (office), as admin",
+    ]
+    rows = [r for r in rows if r.whom != "who keeps the command"]
     said = [(r.user, r.place, r.what, r.outcome, r.seconds >= 0.0) for r in reversed(rows)]
     done, refused = pb.OrderGiven.OUTCOME_DONE, pb.OrderGiven.OUTCOME_REFUSED
     assert not why and said == [

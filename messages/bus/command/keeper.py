@@ -84,6 +84,7 @@ class Keeper:
         if after.epoch != before.epoch or after.asks != before.asks:
             if after.epoch != before.epoch:
                 log.info("command: %s", plain(after.last))
+                self._given.append(_passed(after))
             self._save()
             self._publish()
 
@@ -153,6 +154,19 @@ def _done(command: pb.SeatCommand, held: Held, now_s: float, utc_ns: int) -> Hel
         case ACTION.ACTION_FORCE:
             return state.forced(held, seat, *now)
     raise Refusal("no such order")
+
+
+def _passed(held: Held) -> pb.OrderGiven:
+    """That the command has passed on, for the history."""
+    holder = held.holder or Seat("")
+    return pb.OrderGiven(
+        at_utc_ns=time.time_ns(),
+        user=holder.user,
+        place=holder.place,
+        whom="who keeps the command",
+        what=plain(held.last, 200),
+        outcome=pb.OrderGiven.OUTCOME_DONE,
+    )
 
 
 def _seat(said: pb.Seat) -> Seat:
