@@ -10,6 +10,9 @@ from messages.bus.presence import Process, State
 
 PERSONS = ("operator",)  # roles of commands that people begin and end
 WRONG = (State.FROZEN, State.GONE)
+CALM_S = (
+    3.0  # without a word before that is a fault: a machine that starts much is busy for a while
+)
 
 
 def service_faults(store: Store) -> Iterator[Alarm]:
@@ -25,12 +28,14 @@ def service_faults(store: Store) -> Iterator[Alarm]:
             yield Alarm("place", f"{place} out of reach", text, "", place)
     told: set[tuple[str, str]] = set()
     for one in presence.all():
-        key = one.place, one.role
+        key, silent_s = (one.place, one.role), presence.now_s - one.heard_s
+        if silent_s < CALM_S and not (one.state is State.GONE and not one.froze):
+            continue
         if one.place in said or one.role in PERSONS or one.state not in WRONG or key in told:
             continue
         told.add(key)
         title = f"{one.role} at {one.place} {one.state.value}"
-        text = _wrong(one, presence.now_s - one.heard_s)
+        text = _wrong(one, silent_s)
         yield Alarm("service", title, text, "", f"{one.place}-{one.role}")
 
 

@@ -121,6 +121,8 @@ class SceneHandle:
             began = time.monotonic()
             with self._lock:
                 views = list(self._views.items())
+            panels = tick is View.tick_panels
+            views = [(number, view) for number, view in views if view.pace.due(panels)]
             begin()
             with self._waking.once():
                 for number, view in views:

@@ -19,6 +19,11 @@ class Span:
     paused_at: float | None = None  # s on the device's axis
     zoom: tuple[float, float] | tuple[()] = ()  # UTC, s: so that a link means the same moment
 
+    def ask(self, window: str | None, zoom: tuple[float, float] | tuple[()] | None) -> None:
+        """What a person asks for; None: as it is."""
+        self.window = window or self.window
+        self.zoom = self.zoom if zoom is None else zoom
+
     def limits(self, device: Device) -> tuple[float, float]:
         """From and until, s on the device's axis."""
         if self.zoom:

@@ -13,6 +13,7 @@ from dashboard.data.device import Device
 from dashboard.data.store import Store
 from dashboard.desk import Desk
 from dashboard.scene.drawing.page import alert, tag
+from dashboard.scene.pace import Pace
 from dashboard.scene.panels import PAGES, Devices, Record, Snapshot, Timeline
 from dashboard.scene.panels.base import Input
 from dashboard.scene.rights import Rights
@@ -51,7 +52,7 @@ class View:
         self._generation = -1
         self._span, self._size = Span(), "l"
         self._derived: list[str] = []  # lines of expression.py
-        self._rights_of = Rights(desk)
+        self._rights_of, self.pace = Rights(desk), Pace()
         self._tracks_at = 0.0
         self._lock = threading.RLock()  # callbacks of the browser against the loops
         self._page = 0
@@ -172,6 +173,7 @@ class View:
             dark=self._choice.dark,
             follow=self._choice.follow,
             size=self._size,
+            quality=self.pace.quality,
             layers=[layer for layer in LAYERS if self._choice.layers[layer]],
         )
         if fields != self._said:
@@ -186,10 +188,8 @@ class View:
                 self._wanted = wish.device
             if wish.prefer and not self._device_chosen and not self._wanted:
                 self._choose(wish.prefer, by_person=False)
-            if wish.window:
-                self._span.window = wish.window
-            if wish.zoom is not None:
-                self._span.zoom = wish.zoom
+            self._span.ask(wish.window, wish.zoom)
+            self.pace.choose(wish.quality)
             if wish.derived is not None:
                 self._derived = many(wish.derived)
             if wish.dark is not None and wish.dark != self._choice.dark:

@@ -79,6 +79,7 @@ class Wish:
     prefer: str | None = None  # the device to begin with, unless a replay was just asked for
     window: str | None = None
     size: str | None = None  # of the page: s, m, l
+    quality: str = ""  # key of pace.QUALITIES; empty: as it is
     dark: bool | None = None
     pause: bool | None = None
     follow: bool | None = None
@@ -104,6 +105,7 @@ class Wish:
             device=given.get("device"),
             prefer=given.get("prefer"),
             size=given.get("size"),
+            quality=given.get("quality", ""),
             window=given["window"] if given.get("window") in WINDOWS else None,
             dark=switch.get(given.get("dark", "")),
             pause=switch.get(given.get("pause", "")),

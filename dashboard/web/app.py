@@ -46,6 +46,7 @@ def create_app(front: Front) -> ASGIApp:
     )
     app.state.front = front
     app.state.listeners = Counter()  # user -> open streams
+    app.state.flows = {}  # seat -> what its scenes get
     app.state.walls = Counter()  # user -> open wall displays
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
     app.include_router(

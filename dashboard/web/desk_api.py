@@ -12,7 +12,7 @@ from dashboard.data.alarms import drives
 from dashboard.data.channels import channels
 from dashboard.data.store import Store
 from dashboard.web.auth import Role
-from dashboard.web.front import Asker, asker, desk_of, front_of, needs
+from dashboard.web.front import Asker, asker, desk_of, front_of, needs, seat_of
 from dashboard.web.schemas import Lines, Strict
 from dashboard.web.views import LONGEST
 from logs.figures.quantity import HINTS
@@ -54,6 +54,11 @@ class StopOut(BaseModel):
 class ViewIn(Strict):
     view: str = Field(max_length=LONGEST, description="the page's link after the question mark")
     page: Literal["live", "session"] = Field(default="live", description="session: any of them")
+
+
+class FlowOut(BaseModel):
+    updates_hz: float = Field(description="that this browser took, over the last 10 s")
+    bytes_per_s: float
 
 
 class ViewOut(BaseModel):
@@ -165,6 +170,13 @@ def stop(request: Request, device: str, who: Operator) -> StopOut:
 def recording(store: Store) -> bool:
     """Is a recording going on, as last heard?"""
     return store.recorder is not None and store.recorder.message.recording
+
+
+@routes.get("/me/flow", summary="What your open scenes get, each: updates and bytes per second")
+def flow(request: Request, who: SignedIn) -> list[FlowOut]:
+    mine = request.app.state.flows.get(seat_of(request, who).id, [])
+    rates = [one.rates() for one in list(mine)]
+    return [FlowOut(updates_hz=hz, bytes_per_s=bytes_per_s) for hz, bytes_per_s in rates]
 
 
 @routes.get("/me/view", summary="What you last had on the live page")

@@ -18,10 +18,14 @@ from messages.contract.topics import GATEWAY, check_name
 
 FROZEN_S = 1.5  # without a beat, of which there are two a second
 SETTLE_S = 5.0  # after a router came back, for all others to find it too
+QUIET_S = 0.75  # without a beat of anybody of a place, of several: the way there is stuck
+AGAIN_S = 1.0  # after that, for the next beat of each
 LOOK_S = 0.25  # the longest time between two looks that counts
+OUT_S = 3.0  # without a beat of anybody of another place
 ENDED_S = 10.0  # one that ended as it should is listed for so long
 GONE_S = 3600.0  # and one that went without a word
 MOST = 512  # processes
+ROUTER = "router"  # role
 
 
 class State(Enum):
@@ -116,7 +120,8 @@ class Presence:
         self._looked: float | None = None
         self._settled_s = -SETTLE_S  # since when there is a router
         self._connected = True
-        self._lock = threading.Lock()
+        self._quiet: dict[str, float] = {}  # places of which nobody is heard; until when, by now
+        self._lock = threading.RLock()
 
     # --- what is heard
 
@@ -160,6 +165,7 @@ class Presence:
             self._connected = connected
             if connected:
                 self.now_s += min(max(passed, 0.0), LOOK_S)
+            self._listen()
             changes = []
             for key, one in list(self.processes.items()):
                 state = self._judge(one)
@@ -171,6 +177,23 @@ class Presence:
                     del self.processes[key]
             return changes
 
+    def _is_near(self, one: Process) -> bool:
+        """Ourselves, or our router: what they say says nothing of what passes it."""
+        own = bool(self.own) and one.beat.session == self.own
+        return own or (one.role, one.place) == (ROUTER, self.here)
+
+    def _listen(self) -> None:
+        """Of which places nothing is heard at all: none of their several services is to blame."""
+        heard: dict[str, list[float]] = {}
+        for one in self.processes.values():
+            if one.state not in (State.GONE, State.ENDED) and not self._is_near(one):
+                heard.setdefault(one.place, []).append(one.heard_s)
+        for place, times in heard.items():
+            if len(times) > 1 and self.now_s - max(times) > QUIET_S:
+                self._quiet[place] = self.now_s + AGAIN_S
+        for place in [p for p, until_s in self._quiet.items() if until_s < self.now_s]:
+            del self._quiet[place]
+
     def _judge(self, one: Process) -> State:
         if not self._connected:
             return State.UNKNOWN if one.state is not State.ENDED else State.ENDED
@@ -179,7 +202,8 @@ class Presence:
         silent = self.now_s - one.heard_s > FROZEN_S
         if not silent:
             return State.RUNNING
-        if self.now_s - self._settled_s < SETTLE_S:
+        stuck = one.place in self._quiet and not self._is_near(one)
+        if stuck or self.now_s - self._settled_s < SETTLE_S:
             return one.state if one.state is not State.RUNNING else State.UNKNOWN
         return State.FROZEN if one.token else State.GONE
 
@@ -187,7 +211,7 @@ class Presence:
         for_s = self.now_s - one.since_s
         if one.state is State.ENDED:
             return for_s > ENDED_S
-        if one.state is not State.GONE:
+        if one.state is not State.GONE and (one.state is not State.UNKNOWN or one.token):
             return False
         replaced = any(
             other.place == one.place and other.role == one.role and other.state is State.RUNNING
@@ -200,7 +224,8 @@ class Presence:
     @property
     def sees(self) -> bool:
         """Can it be told now who is there?"""
-        return self._connected and self.now_s - self._settled_s >= SETTLE_S
+        own_quiet = self.here in self._quiet
+        return self._connected and not own_quiet and self.now_s - self._settled_s >= SETTLE_S
 
     def all(self) -> list[Process]:
         """By place and role."""
@@ -232,8 +257,8 @@ class Presence:
         whole place.
         """
         there = [one for one in self.all() if one.place == place and one.state is not State.ENDED]
-        silent = all(one.state in (State.FROZEN, State.GONE) for one in there)
-        return bool(there) and silent and self.here not in ("", place)
+        silent = all(self.now_s - one.heard_s > OUT_S for one in there)
+        return bool(there) and silent and self._connected and self.here not in ("", place)
 
     def gateway_of(self, device: str) -> Process | None:
         """Whose gateway publishes a board: the one that claimed it, else the one that names it."""

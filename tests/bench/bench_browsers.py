@@ -5,6 +5,9 @@
 The whole demo runs; browsers are WebSocket clients of the front door, signed in by its link, that
 read everything as viser's page does. Bytes are told apart by the kind of message. CPU is a share of
 one core: of the dashboard without a browser, with one, with all of them.
+
+The delay of an update is from when an attitude is published on the bus, as a subscriber beside the
+browsers hears it, to when a browser has it: taken at TIMED of the browsers while all look.
 """
 
 import json
@@ -14,10 +17,12 @@ import tempfile
 import threading
 import time
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 import httpx
 import msgspec
+import numpy as np
 import psutil
 import viser
 import websockets.sync.client
@@ -30,9 +35,14 @@ from support.stack import RunningDemo
 
 from dashboard.web.users import add_user, issue_link_token
 from gyrofree.config import load
+from messages.bus.session import BusSettings, open_client, subscribe
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import RATE
 
 SETTLE_S = 35.0  # until the default window of 30 s is full
 OPENING_S = 4.0  # a browser that has just come is sent the whole scene
+TIMED = 5  # browsers whose delays are taken
+REMEMBERED = 20_000  # attitudes
 PER_USER = 10  # scenes that one user may have open, and some to spare
 POSES = {"SetOrientationMessage", "SetPositionMessage", "SceneNodeUpdateMessage"}
 
@@ -40,7 +50,10 @@ POSES = {"SetOrientationMessage", "SetPositionMessage", "SceneNodeUpdateMessage"
 class Browser:
     """One reader of the scene; `bytes` by kind of message while `counting`."""
 
-    def __init__(self, demo: RunningDemo, users: Path, name: str) -> None:
+    def __init__(
+        self, demo: RunningDemo, users: Path, name: str, heard: "Heard | None" = None
+    ) -> None:
+        self._heard, self.delays_s = heard, list[float]()
         self.bytes: Counter[str] = Counter()
         self.frames, self.counting = 0, False
         with httpx.Client(base_url=demo.url, headers={"origin": demo.url}) as client:
@@ -66,8 +79,17 @@ class Browser:
                 if self.counting:
                     self.frames += 1
                     self._count(frame)
+                elif self._heard is not None and self._heard.timing:
+                    self._time(frame, time.monotonic())
         except (websockets.ConnectionClosed, OSError):
             return
+
+    def _time(self, frame: bytes, now: float) -> None:
+        for one in _told(frame)["messages"]:
+            if one["type"] == "SetOrientationMessage" and one["name"].endswith("/body"):
+                at = self._heard.at.get(_key(one["wxyz"]))
+                if at is not None:
+                    self.delays_s.append(now - at)
 
     def _count(self, frame: bytes) -> None:
         packed = int.from_bytes(frame[8:16], "little")
@@ -86,6 +108,37 @@ class Browser:
         """Go."""
         self._socket.close()
         self._thread.join(5.0)
+
+
+class Heard:
+    """Attitudes as they are published, and when; `timing` while delays are taken."""
+
+    def __init__(self, bus: BusSettings) -> None:
+        self.at: dict[tuple[int, ...], float] = {}
+        self.timing = False
+        self._session = open_client(bus, timeout_s=20.0)
+        self._subscription = subscribe(self._session, RATE, bus.prefix, self._on_rate)
+
+    def _on_rate(self, _: str, message: pb.RateBatch) -> None:
+        if len(message.q_nb) < 4:
+            return
+        self.at.setdefault(_key(message.q_nb[-4:]), time.monotonic())
+        if len(self.at) > REMEMBERED:
+            self.at.pop(next(iter(self.at)))
+
+    def close(self) -> None:
+        """Hear nothing more."""
+        self._subscription.undeclare()
+        self._session.close()
+
+
+def _key(q: Sequence[float]) -> tuple[int, ...]:
+    return tuple(round(float(value) * 1e6) for value in q)
+
+
+def _told(frame: bytes) -> dict:
+    packed = int.from_bytes(frame[8:16], "little")
+    return msgspec.msgpack.decode(zstandard.decompress(frame[16 : 16 + packed]))
 
 
 def _kind(message: dict) -> str:
@@ -130,11 +183,17 @@ def main(browsers: int = 20, seconds: float = 20.0) -> None:
         shares = {
             kind: round(size / span / 1e3, 1) for kind, size in looking[0].bytes.most_common()
         }
+        heard = Heard(load(demo.config).bus)
         while len(looking) < browsers:
             name = f"bench-{len(looking) // PER_USER * PER_USER}"
-            looking.append(Browser(demo, users, name))
-        time.sleep(OPENING_S)
+            timed = heard if browsers - len(looking) <= TIMED else None
+            looking.append(Browser(demo, users, name, timed))
+        time.sleep(OPENING_S + browsers / 10)
+        heard.timing = True
         many = cpu(process, seconds)
+        heard.timing = False
+        heard.close()
+        delays = np.array([delay for browser in looking for delay in browser.delays_s])
         for browser in looking:
             browser.close()
     row = {
@@ -147,6 +206,12 @@ def main(browsers: int = 20, seconds: float = 20.0) -> None:
             "first_more": round(first - alone, 1),
             f"{browsers}": round(many, 1),
         },
+        "delay_ms": {
+            "updates": len(delays),
+            **{f"p{p}": round(1e3 * float(np.percentile(delays, p)), 1) for p in (50, 95, 99)},
+        }
+        if len(delays)
+        else None,
     }
     print(json.dumps(row))
 

@@ -16,7 +16,7 @@ from dashboard.alarms.settings import AlarmSettings, HealthSettings
 from dashboard.data.alarms import alarms, bench_alarms
 from dashboard.data.lateness import behind, clock, lateness
 from dashboard.data.store import Store
-from messages.bus.presence import LOOK_S, SETTLE_S
+from messages.bus.presence import AGAIN_S, LOOK_S, SETTLE_S
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 from messages.contract.topics import claim_key
@@ -77,12 +77,20 @@ def everybody(bench: Bench, **office: object) -> None:
         bench.token("office", role)
 
 
-def test_a_frozen_service_and_one_that_is_gone_are_alarms_on_the_page_and_in_the_service(bench):
+def settle(bench: Bench, **office: object) -> None:
+    """Everybody has been there for a while."""
     everybody(bench)
     bench.passes(SETTLE_S)
-    everybody(bench)
+    for _ in range(2 * int(AGAIN_S) + 1):
+        everybody(bench, **office)
+        bench.passes(0.5)
+    everybody(bench, **office)
+
+
+def test_a_frozen_service_and_one_that_is_gone_are_alarms_on_the_page_and_in_the_service(bench):
+    settle(bench)
     assert not bench.found() and not bench_alarms(bench.store)
-    for _ in range(4):  # the gateway says nothing any more
+    for _ in range(7):  # the gateway says nothing any more
         bench.passes(0.5)
         for place, role in (("lab", "router"), ("office", "dashboard"), ("office", "router")):
             bench.beats(place, role)
@@ -122,9 +130,7 @@ def test_two_gateways_of_one_board_are_an_alarm_of_that_board(bench):
 
 
 def test_a_clock_that_is_surely_off_or_cannot_be_compared_is_an_alarm(bench):
-    everybody(bench, clock_s=2.3)
-    bench.passes(SETTLE_S)
-    everybody(bench, clock_s=2.3)
+    settle(bench, clock_s=2.3)
     assert "+2.3 s" in bench.found()["clock-office"].text
     everybody(bench, clock_s=0.51)  # within its bound it may be less than the limit
     assert "clock-office" not in bench.found()
@@ -145,10 +151,7 @@ def test_a_clock_that_is_surely_off_or_cannot_be_compared_is_an_alarm(bench):
 def test_a_certificate_near_its_end_that_a_process_shows(bench, left_s, life_s, is_alarm):
     ends = int((time.time() + left_s) * 1e9)
     fields = {"certificate_ends_utc_ns": ends, "certificate_life_s": life_s}
-    everybody(bench)
-    bench.beats("lab", "gateway", **fields)
-    bench.passes(SETTLE_S)
-    everybody(bench)
+    settle(bench)
     bench.beats("lab", "gateway", **fields)
     found = bench.found(Certificates(None))
     assert ("certificate-lab-gateway" in found) == is_alarm
@@ -216,9 +219,7 @@ def test_no_digit_is_said_that_is_not_known(age, bound):
 
 
 def test_the_page_and_rest_say_who_is_there(bench, tmp_path):
-    everybody(bench)
-    bench.passes(SETTLE_S)
-    everybody(bench, viewers=[pb.Beat.Viewers(role="viewer", count=2)])
+    settle(bench, viewers=[pb.Beat.Viewers(role="viewer", count=2)])
     bench.sample()
     link = pb.LinkStatus(connected=True)
     link.header.device = "cube"

@@ -1,5 +1,7 @@
 """/metrics of the dashboard: by an API token, and what all services say is in it."""
 
+import math
+
 import httpx
 import pytest
 from support.front_door import open_door
@@ -27,6 +29,10 @@ def test_a_viewers_token_reads_the_figures_of_all_services(tmp_path):
     said = status_of(pb.EstimatorStatus, estimator="ekf", samples=5, refused={"range": 3})
     store.put(ESTIMATOR, "cube", "ekf", said)
     store.put(STATUS, "recorder", "", status_of(pb.RecorderStatus, "recorder", recording=True))
+    beat = pb.Beat(role="gateway", clock_ahead_s=math.nan, certificate_ends_utc_ns=5_000_000_000)
+    store.presence.beat("lab", "gateway-aa", beat)
+    store.presence.beat("lab", "gateway-aa", beat)
+    store.presence.look(1.0)
     with open_door(tmp_path, scene=False, store=store) as door:
         door.front.ended["asked for nothing"] += 2
         assert httpx.get(f"{door.url}/metrics").status_code == 401
@@ -51,4 +57,8 @@ def test_a_viewers_token_reads_the_figures_of_all_services(tmp_path):
     assert found["gyrofree_dashboard_connections_ended_total", "asked for nothing"] == 2.0
     assert found["gyrofree_disk_free_bytes", "dashboard.users"] > 0.0
     assert found["process_resident_memory_bytes",] > 0.0
+    service = "lab", "gateway-aa"
+    assert found["gyrofree_service_running", *service] == 1.0
+    assert found["gyrofree_service_certificate_end_timestamp_seconds", *service] == 5.0
+    assert ("gyrofree_service_clock_ahead_seconds", *service) not in found  # not measured
     assert not any("old-replay" in key for key in found)

@@ -254,29 +254,31 @@ def run_away(folder: Path) -> None:
 KILLED = """
 import os, signal, sys
 from gyrofree.commands.main import app
-real = os.rename
-def killed(folder, after):
-    count = 0
-    def rename(*paths):
+def killed(folder, word, after):
+    count, real = 0, getattr(os, word)
+    def call(*given):
         nonlocal count
         count += 1
         if count > after:
             os.kill(os.getpid(), signal.SIGKILL)
-        real(*paths)
-    os.rename = rename
+        real(*given)
+    setattr(os, word, call)
     os.chdir(folder)
     app(["restore", sys.argv[1], "--overwrite"])
 for each in sys.argv[2:]:
     child = os.fork()
     if not child:
-        killed(each, int(each.rpartition("-")[2]))
+        _, word, after = each.rsplit("-", 2)
+        killed(each, word, int(after))
     print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 """
 
 
 def test_killed_in_the_middle_the_old_state_is_whole(made, tmp_path):
     _, file = made
-    folders = [tmp_path / f"after-{count}" for count in (0, 1, 4, 9)]
+    # while it lays ready, which changes rights once a file, and while it moves
+    words = ("fchmod-5", "rename-0", "rename-4", "rename-9")
+    folders = [tmp_path / f"after-{word}" for word in words]
     for folder in folders:
         folder.mkdir()
         fill(folder)
@@ -311,7 +313,7 @@ def test_a_restore_that_is_under_way_is_not_disturbed(tmp_path):
 
     os.rename, kept = rename, os.rename
     try:
-        swap.swap(tmp_path, [swap.Move(str(target), str(draft))])
+        swap.swap(tmp_path, [swap.Move(str(target), str(draft))], lambda: None)
     finally:
         os.rename = kept
     assert seen and target.read_text() == "new" and not config.exists()

@@ -176,6 +176,29 @@ def test_a_watcher_that_was_frozen_itself_blames_nobody():
     assert presence.all()[0].state is State.FROZEN
 
 
+def test_when_nobody_is_heard_it_is_the_router_and_nobody_else_is_blamed():
+    """The router was stopped: its connections stand, and nothing passes."""
+    presence, roles = Presence("lab"), ("router", "gateway", "recorder", "estimator")
+    presence.look(0.0)
+
+    def all_beat() -> None:
+        for role in roles:
+            presence.token(f"t/lab/alive/{role}-1", True)
+            presence.beat("lab", f"{role}-1", beat(role=role))
+        presence.look(presence._looked)
+
+    all_beat()
+    looked(presence, 4.0)
+    states = {one.role: one.state for one in presence.all()}
+    assert states.pop("router") is State.FROZEN and set(states.values()) == {State.UNKNOWN}
+    assert not presence.sees
+    presence.beat("lab", "gateway-1", beat(role="gateway"))  # the first that is heard again
+    looked(presence, 0.5)
+    assert not [one.role for one in presence.all() if one.state in (State.FROZEN, State.GONE)][1:]
+    all_beat()
+    assert {one.state for one in presence.all()} == {State.RUNNING}
+
+
 def test_a_place_of_which_nothing_is_heard_is_out_of_reach_and_our_own_never():
     presence = Presence("lab")
     presence.look(0.0)

@@ -20,6 +20,7 @@ from starlette.websockets import WebSocketDisconnect
 from dashboard.settings import DashboardSettings
 from dashboard.web.auth import Gate, Role
 from dashboard.web.command.seats import Seats
+from dashboard.web.frame.flow import Flow
 from dashboard.web.frame.scene_messages import (
     DROPPED_QUIETLY,
     OPERATOR_MAY,
@@ -135,6 +136,7 @@ class Relay:
         self._refused: set[str] = set()  # names said already
         self._who = "nobody"
         self._told = ""  # role and name that the scene knows of
+        self._flow = Flow()
 
     async def run(self, port: int) -> None:
         """Until either side ends."""
@@ -159,9 +161,16 @@ class Relay:
             log.error("scene at 127.0.0.1:%d does not answer: %s", port, error)
             await self._socket.close(1013, "the scene does not answer; try again")
             return
+        flows: dict[str, list[Flow]] = self._socket.app.state.flows
         async with scene:
             await self._socket.accept(protocol)
-            await self._join(scene)
+            flows.setdefault(self._seat, []).append(self._flow)
+            try:
+                await self._join(scene)
+            finally:
+                flows[self._seat].remove(self._flow)
+                if not flows[self._seat]:
+                    del flows[self._seat]
 
     async def _join(self, scene: websockets.ClientConnection) -> None:
         tasks = [
@@ -198,6 +207,7 @@ class Relay:
                     await self._socket.send_bytes(
                         message if isinstance(message, bytes) else message.encode()
                     )
+                self._flow.add(len(message))
             except TimeoutError:
                 log.warning(
                     "browser of %s took nothing for %g s: dropped",

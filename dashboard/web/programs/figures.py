@@ -6,6 +6,7 @@ import prometheus_client
 from prometheus_client.core import CollectorRegistry, Metric
 from prometheus_client.exposition import choose_encoder
 
+from dashboard.data.places import places
 from dashboard.data.store import Store
 from dashboard.web.front import Front
 from messages.contract import topics as tp
@@ -33,7 +34,32 @@ DROPPED = (
 )
 STREAMS = ("gyrofree_dashboard_streams", "gauge", "streams of values that are open", ())
 DEVICES = ("gyrofree_dashboard_devices", "gauge", "devices that the dashboard has heard", ())
-OWN = (ENDED, REFUSED, DROPPED, STREAMS, DEVICES)
+OF_SERVICE = ("place", "service")
+RUNNING = (
+    "gyrofree_service_running",
+    "gauge",
+    "1 for a process that runs, 0 for one that is frozen, gone or not known",
+    OF_SERVICE,
+)
+SILENT = (
+    "gyrofree_service_silent_seconds",
+    "gauge",
+    "since its last sign of life, of which there are two a second",
+    OF_SERVICE,
+)
+CLOCK = (
+    "gyrofree_service_clock_ahead_seconds",
+    "gauge",
+    "its clock minus home's, where that was measured",
+    OF_SERVICE,
+)
+CERTIFICATE = (
+    "gyrofree_service_certificate_end_timestamp_seconds",
+    "gauge",
+    "when its certificate ends, since 1970",
+    OF_SERVICE,
+)
+OWN = (ENDED, REFUSED, DROPPED, STREAMS, DEVICES, RUNNING, SILENT, CLOCK, CERTIFICATE)
 
 
 class Page:
@@ -54,6 +80,22 @@ class Page:
         yield family_of(*REFUSED, refused)
         yield family_of(*DROPPED, {(): float(store.dropped)})
         yield family_of(*DEVICES, {(): float(len(store.names()))})
+        yield from _presence(store)
+
+
+def _presence(store: Store) -> Iterator[Metric]:
+    """Of every process, as the page of places has it; what is not known is absent."""
+    services = {
+        (place["name"], one["name"]): one
+        for place in places(store.presence)
+        for one in place["services"]
+    }
+    fields = ((SILENT, "silent_s"), (CLOCK, "clock_ahead_s"), (CERTIFICATE, "certificate_ends_s"))
+    running = {key: float(one["state"] == "running") for key, one in services.items()}
+    yield family_of(*RUNNING, running)
+    for figure, field in fields:
+        known = {key: one[field] for key, one in services.items() if one[field] is not None}
+        yield family_of(*figure, known)
 
 
 def text(front: Front, streams: int, accept: str) -> tuple[bytes, str]:

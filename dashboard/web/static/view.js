@@ -41,7 +41,7 @@ export const lines = (derived) => derived.map((one) => one.text).join(";");
 const stated = (now) => ({
   w: now.workspace, p: now.page, device: now.device, window: now.window,
   size: now.size, layers: now.layers.join("."), follow: now.follow ? "1" : "0", dark: now.dark ? "1" : "0", pause: now.paused ? "1" : "0",
-  zoom: zoomed(now.zoom), derived: lines(now.derived),
+  zoom: zoomed(now.zoom), derived: lines(now.derived), quality: now.quality ?? "full",
 });
 
 // `moment`: with what is of this moment only, which a link has and what is kept for the person has not.

@@ -59,6 +59,7 @@ NAMED = (  # single files that the settings name, restored to where they were
 LEFT_OUT = {
     "gateway.journal": "raw bytes of the last days: what was recorded is in the sessions",
     "estimator.journal": "what it needs after a crash of this machine, and no other",
+    "bus.zenohd": "a program, which is installed",
     "dashboard.map": "a copy of somebody else's file",
     "dashboard.sessions_root": "recorder.root, as the page sees it",
 }

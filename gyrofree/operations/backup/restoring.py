@@ -18,7 +18,7 @@ from gyrofree.operations.backup.parts import (
     named_files,
     parts_of,
 )
-from gyrofree.operations.backup.swap import Move, remove, swap, sync
+from gyrofree.operations.backup.swap import Move, swap, sync
 from inertial.toml_file import parsed
 from sessions.recording.manifest import NUMBER
 
@@ -138,18 +138,18 @@ def restore(
         )
     archive.verify((entry for unit in units for entry in unit.files.values()), progress)
     mark = secrets.token_hex(4)
-    moves: list[Move] = []
+    moves = [_move(unit.target, mark, draft=True) for unit in wanted]
+    moves += [_move(path, mark, draft=False) for path in superfluous]
     made: list[Path] = []
+
+    def lay_ready() -> None:
+        for unit, move in zip(wanted, moves, strict=False):
+            made.extend(_folders(unit))
+            _lay_ready(archive, unit, Path(move.draft), progress)
+
     try:
-        for unit in wanted:
-            made += _folders(unit)
-            moves.append(_move(unit.target, mark, draft=True))
-            _lay_ready(archive, unit, Path(moves[-1].draft), progress)
-        moves += [_move(path, mark, draft=False) for path in superfluous]
-        swap(config.absolute().parent, moves)
+        swap(config.absolute().parent, moves, lay_ready)
     except BaseException:
-        for move in moves:
-            remove(Path(move.draft)) if move.draft else None
         for folder in reversed(made):
             folder.rmdir()
         raise

@@ -1,15 +1,16 @@
 """Many files and folders take their places together, or none does: also when the process is killed
 in the middle.
 
-What is new lies ready beside its place. A plan of all moves is on the disk before the first of
-them, held by a lock while its process lives. A plan that nobody holds is of a process that was
-killed: whoever comes next moves everything back.
+What is new is laid ready beside its place. A plan of all moves is on the disk before that, held by
+a lock while its process lives. A plan that nobody holds is of a process that was killed: whoever
+comes next moves everything back.
 """
 
 import fcntl
 import json
 import os
 import shutil
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -27,9 +28,10 @@ class Move:
     aside: str = ""  # where what was there waits; "": nothing was there
 
 
-def swap(folder: Path, moves: list[Move]) -> None:
-    """Carry out all moves, or none; folder: that the plan is kept in. Raises BackupError, OSError;
-    after either everything is as it was.
+def swap(folder: Path, moves: list[Move], lay_ready: Callable[[], None]) -> None:
+    """Carry out all moves, or none; folder: that the plan is kept in. lay_ready writes the drafts;
+    what it raises is passed on. Raises BackupError, OSError; after any of these everything is as
+    it was.
     """
     plan = folder / PLAN
     try:
@@ -43,6 +45,7 @@ def swap(folder: Path, moves: list[Move]) -> None:
         os.fsync(stream.fileno())
         sync(folder)
         try:
+            lay_ready()
             for move in moves:
                 _go(move)
         except BaseException:
