@@ -14,6 +14,7 @@ from pathlib import Path
 import zenoh
 
 from messages.bus.session import BusSettings, LateSession
+from messages.bus.settings import FAR_LEASE_MS
 from messages.previews.frames import lane_key
 from sites.place import SiteError, load_place
 
@@ -62,5 +63,7 @@ class Lanes:
             self._stop.wait(LOOK_S)
 
     def _lane(self, address: str, key: str) -> LateSession:
-        bus = self._bus.model_copy(update={"router": address}).acting_as(self._bus.role)
-        return LateSession(bus, lambda session: self._declare(session, key), warn=False)
+        bus = self._bus.model_copy(update={"router": address, "lease_ms": FAR_LEASE_MS}).acting_as(
+            self._bus.role
+        )
+        return LateSession(bus, lambda session: self._declare(session, key), further=True)

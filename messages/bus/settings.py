@@ -62,6 +62,13 @@ class BusSettings(BaseModel):
         return self._role
 
 
+# Between places. TCP tries again after twice the time each time, so a connection that was cut for
+# long comes back long after the link did: it is given up after the lease, and each attempt at a new
+# one after so long. With 5 % loss and 200 ms a handshake takes 1 s, and hardly ever 4.
+FAR_LEASE_MS = 5_000
+FAR_ATTEMPT_MS = 4_000
+
+
 def configuration(settings: BusSettings, mode: str, mesh: Iterable[str] = ()) -> dict[str, Any]:
     """Zenoh's settings for a "client" or the "router", which keeps calling those of `mesh`, by
     their paths in its configuration. Raises IdentityError without a certificate.
@@ -89,11 +96,19 @@ def configuration(settings: BusSettings, mode: str, mesh: Iterable[str] = ()) ->
     if mode == "router":
         values["listen/endpoints"] = settings.listen
         values["connect/endpoints"] = list(mesh)
-        values["connect/timeout_ms"] = -1  # another site may come later
-        values["connect/exit_on_failure"] = False
+        values["connect/timeout_ms"] = FAR_ATTEMPT_MS
+        values["connect/exit_on_failure"] = False  # another site may come later
+        values["connect/retry"] = {
+            "period_init_ms": 200,
+            "period_max_ms": 500,
+            "period_increase_factor": 1.5,
+        }
+        if settings.tls is not None:
+            values["transport/link/tx/lease"] = min(settings.lease_ms, FAR_LEASE_MS)
         return values
     values["connect/endpoints"] = [settings.router]
-    values["connect/timeout_ms"] = 1000
+    near = any(host in settings.router for host in ("/127.0.0.1:", "/localhost:", "/[::1]:"))
+    values["connect/timeout_ms"] = 1000 if near else FAR_ATTEMPT_MS
     values["listen/endpoints"] = []
     # Look for a router that went away every second: what was missed shall be on the screen within
     # five.

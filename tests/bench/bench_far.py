@@ -103,6 +103,7 @@ def cut(site: FarSite, watcher: Watcher, seconds: float) -> dict[str, float]:
     site.link.mend()
     mended = time.time()
     back = until(lambda: watcher.newest > mended, PATIENCE_S, "the picture after a cut")
+    print(f"after {seconds:g} s: {back:.1f} s", file=sys.stderr)
     pause = 2.5 * max(1.0, (mended - begin) / COARSE)
 
     def covered() -> bool:
@@ -110,8 +111,11 @@ def cut(site: FarSite, watcher: Watcher, seconds: float) -> dict[str, float]:
         edges = np.concatenate([[begin], rows, [mended]])
         return bool(np.diff(np.sort(edges)).max() <= pause)
 
-    until(covered, PATIENCE_S, "the overview of a cut")
-    overview = time.time() - mended
+    try:
+        until(covered, PATIENCE_S, "the overview of a cut")
+        overview = time.time() - mended
+    except TimeoutError:
+        overview = float("nan")
     time.sleep(15.0)  # a lease that ends late must not count for the next cut
     name = f"after_{seconds:g}_s_cut"
     return {f"{name}_picture_s": back, f"{name}_overview_s": overview}
