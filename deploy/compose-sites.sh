@@ -13,6 +13,14 @@ equal() { # a recording of the lab, at the office
     timeout 60 podman exec "$(of office office)" gyrofree site copies --config /data/site/gyrofree.toml | grep -q " equal "
 }
 
+clear_sites() {
+    local place
+    for place in lab office; do
+        timeout 90 podman-compose --project-name "gyrofree-$place" --file "deploy/compose.$place.yml" down --volumes \
+            --timeout 5 >/dev/null 2>&1 || true
+    done
+}
+
 end_sites() {
     local code=$?
     trap - EXIT
@@ -24,7 +32,7 @@ end_sites() {
         tail -20 "$STATE/join.log" 2>/dev/null || true
     fi
     rm -f deploy/secrets/invitation.txt
-    for place in lab office; do timeout 90 $place down --volumes --timeout 5 >/dev/null 2>&1 || true; done
+    clear_sites
     exit $code
 }
 
@@ -32,7 +40,8 @@ prove_sites() {
     trap end_sites EXIT
     ip link set lo up
     ip address replace "$ADDRESS/32" dev lo
-    local begun=$SECONDS joining
+    clear_sites # of a run that was cut off
+    local begun=$SECONDS
     lab up --detach --no-build >"$STATE/lab.log" 2>&1 || { cat "$STATE/lab.log"; die "podman-compose up of the lab"; }
     eventually 180 "the lab's page answers" at 18081
     mkdir -p deploy/secrets
@@ -40,7 +49,7 @@ prove_sites() {
         --config /data/site/gyrofree.toml 2>/dev/null | tail -1 >deploy/secrets/invitation.txt
     chown 10001 deploy/secrets/invitation.txt
     chmod 0400 deploy/secrets/invitation.txt
-    timeout 180 env GYROFREE_PORT=18082 podman-compose --project-name gyrofree-office --file deploy/compose.office.yml \
+    timeout 180 env GYROFREE_PORT=18082 podman-compose --project-name gyrofree-office --file deploy/compose.office.yml --profile by-hand \
         run --rm --service-ports join >"$STATE/join.log" 2>&1 || { cat "$STATE/join.log"; die "the office does not join"; }
     say "ok: the office joined by an invitation that is a secret's file"
     office up --detach --no-build >"$STATE/office.log" 2>&1 || { cat "$STATE/office.log"; die "podman-compose up of the office"; }

@@ -33,3 +33,10 @@ GRAVITY_FORMULA = 0.00193185265241
 
 GRAVITY_RATIO = 0.00344978650684
 """Constant m of normal gravity above the ellipsoid, omega^2 a^2 b / GM (WGS-84)."""
+
+
+def from_mg(mg: float) -> float:
+    """m/s^2 of so many mg. Everybody who scales counts asks here: another order of the factors
+    gives other last bits, and one log has to be one log by whichever way it comes.
+    """
+    return mg * 1e-3 * GRAVITY

@@ -27,6 +27,7 @@ OFTEN = 0.96  # quantile of the steps that are usual: bursts of up to 25 samples
 LONG = 16  # samples that a stretch has at least, on the average
 COARSE = 3.0  # units of the stamps' last digit; a shorter period cannot be seen in single steps
 BETTER = 0.6  # of the even reading's residual: the gappy one must be this good to be believed
+PICO = 12  # digits of a period, s: what stands behind is what sums of stamps were rounded by
 DIGITS = 10.0 ** np.arange(-3, -10, -1)  # s, last digits that clocks have; 10 ms is a period
 MOST = 0.75  # share of a stretch that may be missing; more is a burst, not a loss
 ENOUGH = 8  # steps; fewer tell nothing of a pattern
@@ -179,7 +180,8 @@ def sample_timing(t_s: Array) -> Timing:
         Hole(int(k) + 1, float(t[k]), float(step[k]), int(jump[k]) - 1)
         for k in np.nonzero(jump > 1)[0]
     )
-    return Timing(period, index, _jitter(t, index, starts, period), resolution, holes)
+    jitter = _jitter(t, index, starts, period)
+    return Timing(round(period, PICO), index, jitter, resolution, holes)
 
 
 def _digit(t: Array) -> float:

@@ -20,11 +20,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.constants import GRAVITY
+from inertial.constants import from_mg
 from inertial.layouts.layout import PRODUCTS, Layout
 from inertial.timing import Timing
 from logs.cube_tacho import beside
-from logs.quantities import UNITS, column_of, in_range, timing_of
+from logs.quantities import UNITS, column_of, in_range, timing_of, to_si
 from logs.sheet import LogError, Sheet, Table, open_sheet
 
 Array = NDArray[np.float64]
@@ -97,12 +97,12 @@ def read_log(
     t_name, t_unit = column_of(sheet, "t") or ("t_s", 1.0)
     axes = [f"{name}_{unit}" for name in names]
     table = sheet.read([t_name, *axes, *_optional(sheet)])
-    table.columns["t"] = table[t_name] * t_unit
+    table.columns["t"] = to_si(table[t_name], t_unit)
     timing = timing_of(sheet, table)
     for name in (TACHO, *TRUE_RATE):
         if name in table:
             in_range(sheet, table, name, table[name], name)
-    lsb = (LSB_MG if lsb_mg is None else lsb_mg) * 1e-3 * GRAVITY if unit == "counts" else 0.0
+    lsb = from_mg(LSB_MG if lsb_mg is None else lsb_mg) if unit == "counts" else 0.0
     if unit == "counts" and not lsb > 0.0:
         raise LogError(f"{path}: {lsb_mg} mg per count, want more than 0")
     f_axis = np.empty((len(table), len(axes)))

@@ -61,6 +61,14 @@ def column_of(sheet: Sheet, quantity: str) -> tuple[str, float] | None:
     return (quantity, 1.0) if quantity in sheet.header else None
 
 
+def to_si(numbers: Array, unit: float) -> Array:
+    """Numbers of this unit in SI. 1247 ms have the same bits as 1.247 s: a division by 1000 is
+    rounded once, a product with 0.001, which is no number of the machine, twice.
+    """
+    parts = round(1.0 / unit)
+    return numbers / parts if parts * unit == 1.0 else numbers * unit
+
+
 def read_si(
     sheet: Sheet,
     wanted: Sequence[str],
@@ -80,7 +88,7 @@ def read_si(
     names = [name for name, _ in there.values()]
     free = [there[q][0] for q in may_miss if q in there]
     table = sheet.read(names, free)
-    columns = {q: table[name] * unit for q, (name, unit) in there.items()}
+    columns = {q: to_si(table[name], unit) for q, (name, unit) in there.items()}
     for q, (name, _) in there.items():
         in_range(sheet, table, name, columns[q], q)
     return Table(columns, table.lines, table.cut_off)

@@ -19,7 +19,7 @@ from collections import deque
 from typing import NamedTuple
 
 WINDOW = 8  # questions, as in RFC 5905
-OLD_NS = 60_000_000_000  # after which an answer says nothing about now
+OLD_NS = 300_000_000_000  # after which an answer says nothing about now
 ROUNDED_NS = 2.0
 DRIFT = 1e-3  # of two clocks against one another: each is slewed by at most 500 ppm
 

@@ -114,8 +114,16 @@ class Registrar:
         known = _standing(authority, entry.place, here.home)
         return _pack(Answer(certificates=certificates, known=known, place=place))
 
-    def renew(self, question: bytes) -> bytes:
-        """A certificate for longer, for who holds one that still stands."""
+    def renew_own(self, question: bytes) -> bytes:
+        """The same for a place that has the authority's key in its folder: also of one that ended,
+        as after months in which the lab was switched off.
+        """
+        return self.renew(question, load_place(self._folder).home)
+
+    def renew(self, question: bytes, ended_of: str = "") -> bytes:
+        """A certificate for longer, for who holds one that still stands; ended_of: a place whose
+        may have ended.
+        """
         asked = _read(RenewRequest, question)
         authority = Authority(self._folder)
         try:
@@ -130,7 +138,10 @@ class Registrar:
             raise SiteError("the old certificate is not of this site, or not the asker's") from None
         serial, now = f"{old.serial_number:x}", dt.datetime.now(dt.UTC)
         entry = next((each for each in authority.register() if each.serial == serial), None)
-        if entry is None or not entry.stands(now):
+        stands = entry is not None and (
+            entry.stands(now) or (entry.place == ended_of and entry.revoked is None)
+        )
+        if not stands:
             raise SiteError("the old certificate has ended or was revoked: join the site again")
         hosts = tuple(
             str(name.value)

@@ -54,6 +54,8 @@ def run(
     """
     settings = settings or SiteSettings()
     place = load_place(folder)
+    if place.at_home:  # before the bus, which lets nobody in whose certificate has ended
+        look(folder, place, _asker(folder, place, None))
     with open_client(bus, stop) as session, Beating(session, bus):
         log.info("place %s of site %s%s", place.place, place.site, ", its home" * place.at_home)
         keeping = threading.Thread(
@@ -152,10 +154,10 @@ def _read(path: Path) -> x509.Certificate:
         raise SiteError(f"{path}: cannot be read: {error}") from None
 
 
-def _asker(folder: Path, place: Place, session: zenoh.Session) -> Callable[[bytes], bytes]:
+def _asker(folder: Path, place: Place, session: zenoh.Session | None) -> Callable[[bytes], bytes]:
     """Who renews: home itself, others ask over the bus."""
     if place.at_home:
-        return Registrar(folder).renew
+        return Registrar(folder).renew_own
 
     def ask(question: bytes) -> bytes:
         return asked(session, renew_key(place.site), question)

@@ -154,7 +154,8 @@ def _recorder(store: Store, now: float | None) -> Iterator[Alarm]:
         yield Alarm("recorder", "recorder silent", silent, "")
     elif text:
         full = "no space" in text.lower() or "full" in text.lower()
-        yield Alarm("recorder", "disk full" if full else "recording failed", text, "")
+        slow = "disk slow" if "the disk is slow" in text else "recording failed"
+        yield Alarm("recorder", "disk full" if full else slow, text, "")
 
 
 def drives(m: pb.ProcedureStatus) -> bool:

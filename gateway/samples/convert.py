@@ -8,12 +8,10 @@ from firmware_protocol.codec import FLAG_SIMULATED
 from firmware_protocol.frames import Hello, Imu6, Status, field_names
 from gateway.gnss.fix import Fix, usual_sigma
 from gateway.gnss.sky import Sky
-from inertial.constants import GEOID_SIGMA, GRAVITY
+from inertial.constants import GEOID_SIGMA, from_mg
 from messages.contract import gyrofree_pb2 as pb
 
-ADXL345_SCALE = (
-    3.9e-3 * GRAVITY
-)  # m/s^2 per count, full resolution, data sheet rev. G; before HELLO has come
+ADXL345_SCALE = from_mg(3.9)  # m/s^2 per count, full resolution, data sheet rev. G; before HELLO
 READS_IN_TURN = {0, 3}  # board ids of the LPC1768 cube, real and emulated
 READ_S = 17e-6  # one sensor: five SPI frames of 16 bits at 4.8 MHz, and the chip select
 LETTERS = "XGSECJRI"  # of pb.Sky.Constellation, as in RINEX
@@ -43,7 +41,7 @@ def axis_scales(hello: Hello | None, sensors: int = 4) -> list[float]:
     """
     if hello is None:
         return [ADXL345_SCALE] * (3 * sensors)
-    scales = [s.scale_ng * 1e-9 * GRAVITY or ADXL345_SCALE for s in hello.sensors]
+    scales = [from_mg(s.scale_ng / 1e6) or ADXL345_SCALE for s in hello.sensors]
     return [scale for scale in scales[:sensors] for _ in range(3)]
 
 

@@ -27,6 +27,9 @@ HANDOVER_S = 6.0
 LOOK_S = 0.2
 GOOD_LIFE_S = 1.0  # a child that is killed sooner is not started again at once
 KILLED = {signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS}
+ANEW = (
+    signal.SIGUSR2
+)  # to the guardian: begin the service anew, as after a change of its certificate
 WORD_BYTES = 4096  # of one message to the guardian: a sign and the port's name
 KEEP, DROP = b"+", b"-"
 
@@ -77,15 +80,17 @@ def guard(serve: Callable[[Keeper], None]) -> None:
     kept: dict[str, int] = {}
 
     def forward(number: int, _: object) -> None:
+        # killed it goes on with its ports open, where an orderly end would close them
+        meant = {signal.SIGUSR1: signal.SIGUSR1, ANEW: signal.SIGKILL}
         if child[0]:
-            os.kill(child[0], number if number == signal.SIGUSR1 else signal.SIGTERM)
+            os.kill(child[0], meant.get(number, signal.SIGTERM))
 
     # A signal that comes just before poll() sleeps does not wake it, and its handler would wait for
     # the child's end.
     awake, wake = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
     while True:
         born = time.monotonic()
-        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1):
+        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1, ANEW):
             signal.signal(number, forward)
         signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
         mine, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)

@@ -18,6 +18,7 @@ from rich.console import Console
 from rich.text import Text
 
 from gyrofree.operations.log_form import FORMAT, SUPERVISED, said
+from gyrofree.running.guardian import ANEW
 from gyrofree.running.process import EXIT_CONFIG, EXIT_TAKEN, command
 from messages.text import printed
 
@@ -26,6 +27,7 @@ PAUSE_LONGEST = 5.0  # s
 GOOD_LIFE = 20.0  # s
 LONGEST_WAIT = 30.0  # s, for a child that waits for another
 PATIENCE = 8.0  # s between SIGTERM and SIGKILL; Docker gives ten to all of us
+GUARDED = "gateway"  # has a guardian, which begins it anew by itself
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 COLOURS = ("cyan", "green", "magenta", "blue", "yellow", "bright_cyan", "bright_green")
 LEVELS = {"WARNING": "yellow", "ERROR": "bold red", "CRITICAL": "bold red", "DEBUG": "dim"}
@@ -129,6 +131,14 @@ class Supervisor:
         for child in self.children:
             if child.name in names and child.process and child.process.poll() is None:
                 child.process.terminate()
+
+    def begin_anew(self, *names: str) -> None:
+        """The same for services that go on where they were when they are killed, and would end
+        their work in order: a recorder its recording, a gateway its open ports.
+        """
+        for child in self.children:
+            if child.name in names and child.process and child.process.poll() is None:
+                child.process.send_signal(ANEW if child.name == GUARDED else signal.SIGKILL)
 
     def stop(self) -> bool:
         """SIGTERM in reverse order, SIGKILL after PATIENCE; True when all ended by themselves."""

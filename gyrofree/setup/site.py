@@ -17,6 +17,7 @@ from sites.service import own_certificates
 SERVICE = "site"  # the child that lets others join, and renews
 WATCHING = ("router", "dashboard")  # all that a place without boards runs
 SERVICE_OF = {"recorder": "record", "authority": SERVICE}  # by role, where it is called otherwise
+GO_ON = ("gateway", "estimator", "record")  # where they were, when they are killed
 BOOKS = (PLACE, KNOWN, REGISTER)  # files that say who may come
 SOON = dt.timedelta(days=14)  # an end that is said
 
@@ -106,7 +107,8 @@ class Renewed:
         if known:
             why = "new certificates, or another who may come"
             self._supervisor.say(f"{why}: {', '.join(known)} start anew")
-            self._supervisor.restart(*known)
+            self._supervisor.restart(*(name for name in known if name not in GO_ON))
+            self._supervisor.begin_anew(*(name for name in known if name in GO_ON))
 
     def _stamps(self) -> dict[str, int]:
         """By role, or by name of a book, when it was written."""

@@ -17,7 +17,7 @@ import zenoh
 from google.protobuf.message import DecodeError
 
 from messages.bus import tls
-from messages.bus.session import BusSettings
+from messages.bus.session import BusSettings, connected
 from messages.clock import elapsed_ns
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import check
@@ -25,8 +25,9 @@ from messages.contract.topics import BEAT, alive_key, clock_key
 from messages.offset import Exchange, Offset
 
 BEAT_S = 0.5
+GONE_S = 2.0  # without a router, before that is said
 ASK_FIRST, ASK_S, ASK_FIRST_S = 8, 4.0, 1.0  # questions to the clock: so many each s, then fewer
-ANSWER_S = 2.0
+ANSWER_S = 10.0  # a slow answer has a wide bound, and is better than none
 HERE = "here"  # the place of an installation that belongs to no site
 
 log = logging.getLogger(__name__)
@@ -71,7 +72,7 @@ class Beating:
             priority=zenoh.Priority.INTERACTIVE_HIGH,  # a queue of its own: not behind the samples
         )
         self._token = session.liveliness().declare_token(alive_key(bus.prefix, place, name))
-        self._stop = threading.Event()
+        self._line, self._stop = _Line(bus), threading.Event()
         self._thread = threading.Thread(target=self._run, name="beating", daemon=True)
         self._thread.start()
 
@@ -98,6 +99,7 @@ class Beating:
                 if time.monotonic() >= asking:
                     self._ask()
                     asking += ASK_FIRST_S if self._asked < ASK_FIRST else ASK_S
+                self._line.look(connected(self._session))
             except zenoh.ZError as error:  # a session that is closed under us
                 log.debug("no beat: %s", error)
             due = max(due + BEAT_S, time.monotonic())
@@ -151,6 +153,32 @@ class Beating:
             priority=zenoh.Priority.INTERACTIVE_HIGH,
             express=True,
         )
+
+
+class _Line:
+    """Says once that the router is gone, with the reason where it is ours, and that it is back."""
+
+    def __init__(self, bus: BusSettings) -> None:
+        self._bus, self._since, self._said = bus, 0.0, False
+
+    def look(self, there: bool) -> None:
+        """A few times a second."""
+        now = time.monotonic()
+        if there:
+            if self._said:
+                log.info("the router %s is back", self._bus.router)
+            self._since, self._said = 0.0, False
+        elif not self._since:
+            self._since = now
+        elif not self._said and now - self._since > GONE_S:
+            self._said = True
+            wrong = tls.trouble(self._bus.tls, self._bus.role) if self._bus.tls else ""
+            why = f" ({wrong})" if wrong else ""
+            log.warning(
+                "the router %s is gone: what is said is kept until it is back%s",
+                self._bus.router,
+                why,
+            )
 
 
 def tell_time(session: zenoh.Session, prefix: str) -> "zenoh.Queryable[None]":

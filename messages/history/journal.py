@@ -63,9 +63,9 @@ class Journal:
         self.unkept_bytes = self.cut_bytes = 0
         self.durable_seq = 0
         self.last_seq = 0
-        self.max_sync_s = 0.0
         self._write_message = ""
         self._sync_message = ""
+        self._slow_message = ""
         self.place = (0, 0)  # of the last record: first sequence of its segment, offset in it
         self._lock = threading.Lock()
         # descriptor of the locked file; None: the folder could not be used yet
@@ -91,7 +91,8 @@ class Journal:
     @property
     def message(self) -> str:
         """What is wrong with the disk, with the remedy; "" when nothing is."""
-        return "; ".join(filter(None, (self._write_message, self._sync_message)))
+        wrong = self._write_message, self._sync_message, self._slow_message
+        return "; ".join(filter(None, wrong))
 
     def append(self, channel: int, data: bytes, monotonic_ns: int, utc_ns: int) -> int:
         """Append one read; its sequence, or 0 when the disk refused it."""
@@ -295,16 +296,14 @@ class Journal:
             finally:
                 os.close(fd)
         self._say_synced(last, failure)
-        self.max_sync_s = max(self.max_sync_s, time.monotonic() - start)
+        self._slow_message = on_disk.slow(self.folder, time.monotonic() - start)
         if full:
             self._retain()
 
     def _say_synced(self, last: int, failure: OSError | None) -> None:
         if failure is not None:
-            message = (
-                f"journal {self.folder}: fdatasync: {failure.strerror}; data are NOT SAFE; check"
-                " the disk"
-            )
+            why = f"fdatasync: {failure.strerror}; data are NOT SAFE; check the disk"
+            message = f"journal {self.folder}: {why}"
             if message != self._sync_message:
                 log.error("%s", message)
             self._sync_message = message

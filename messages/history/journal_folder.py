@@ -14,6 +14,7 @@ from messages.history.journal_file import SEGMENT_HEAD, SEGMENT_MAGIC
 
 log = logging.getLogger(__name__)
 
+SLOW_S = 1.5  # for fdatasync; a busy disk takes half a second
 RUN = "run"  # file that keeps the greatest run of a folder
 FAR_NS = 100 * 365 * 86400 * 10**9  # a run further ahead of any clock is damage
 LOOK_BYTES = 1 << 18  # of a segment's end, to find its last record
@@ -54,6 +55,13 @@ def lock_folder(folder: Path) -> int:
             error.strerror,
         )
     return lock
+
+
+def slow(what: Path, seconds: float) -> str:
+    """What to say of a disk that took so long to keep what was written; "" where that is usual."""
+    if seconds < SLOW_S:
+        return ""
+    return f"{what}: the disk is slow, it took {seconds:.1f} s: a power cut may cost as much"
 
 
 def end_of(name: Path, n: int = LOOK_BYTES) -> bytes:

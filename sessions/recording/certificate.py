@@ -11,7 +11,18 @@ from pydantic import BaseModel, ConfigDict
 
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.door import OTHERS
-from messages.contract.topics import BOARD, LINK, NAV, RATE, Address, TopicError, parse
+from messages.contract.topics import (
+    ACCEL,
+    ADC,
+    BOARD,
+    IMU,
+    LINK,
+    NAV,
+    RATE,
+    Address,
+    TopicError,
+    parse,
+)
 from sessions.recording.manifest import KeyCount
 from sessions.recording.samples import decode
 
@@ -28,6 +39,7 @@ WIRE = (
     "reboots",
 )
 
+SAMPLED = (ACCEL, IMU, ADC)  # topics with samples at even steps
 HARMLESS = {"repeated", "stale", "claim"}  # refused, and yet nothing is missing
 
 
@@ -67,10 +79,10 @@ def certify(
     was refused of each.
     """
     found: dict[str, DeviceCertificate] = {}
+    sampled = {a.device for a in map(_address, keys) if a is not None and a.topic in SAMPLED}
     for key, count in sorted(keys.items()):
-        try:
-            address = parse(key)
-        except TopicError:
+        address = _address(key)
+        if address is None:
             continue
         device = found.setdefault(
             address.device, DeviceCertificate(wire=wire.get(address.device, {}))
@@ -86,7 +98,10 @@ def certify(
             damaged=count.unreadable,
         )
         device.missing_samples += count.missing_samples
-        if address.topic.source == LINK.source:
+        # words on the line come when they come: where there are samples, they tell
+        if address.topic in SAMPLED or (
+            address.topic.source == LINK.source and address.device not in sampled
+        ):
             device.dark_s = max(device.dark_s, count.dark_s)
     for name, counts in (refused or {}).items():
         if name != OTHERS:
@@ -97,6 +112,13 @@ def certify(
         missing = device.missing_samples or device.wire.get("lost_samples")
         device.complete = not (bad or lacks or missing or device.dark_s)
     return found
+
+
+def _address(key: str) -> Address | None:
+    try:
+        return parse(key)
+    except TopicError:
+        return None
 
 
 class Witness:

@@ -20,6 +20,7 @@ from pathlib import Path
 from inertial import core
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import Address, TopicError, parse
+from messages.history.journal_folder import slow
 from sessions.recording.certificate import Witness, certify
 from sessions.recording.keys import KeyState
 from sessions.recording.manifest import (
@@ -214,10 +215,11 @@ class SessionStore:
             )  # what was handed over is made safe at once: a cut may cost a second
             self._news.clear()
             pushed = self._pushed
+            began = time.monotonic()
             try:
                 os.fdatasync(self._fd)
                 self.durable_messages = pushed
-                self._sync_error = ""
+                self._sync_error = slow(self.folder, time.monotonic() - began)
                 if len(self._keys) != keys or time.monotonic() - told > MANIFEST_EVERY_S:
                     keys, told = len(self._keys), time.monotonic()
                     write_manifest(self.folder, self._snapshot())

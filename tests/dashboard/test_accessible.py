@@ -206,6 +206,9 @@ def test_no_width_clips_the_bars_or_the_summary(chromium, door, size):
 
 def test_the_plain_pages_have_no_serious_finding(chromium, door):
     plotted = "() => document.body.dataset.plotted === 'done'"
+    for place, role in (("lab", "gateway"), ("lab", "recorder"), ("office", "dashboard")):
+        beat = pb.Beat(role=role, session=role, devices=["cube"] * (role == "gateway"))
+        door.front.store.presence.beat(place, f"{role}-1", beat)
     paths = {
         "/sessions": "main",
         f"/sessions/{SESSION}": plotted,
@@ -213,6 +216,7 @@ def test_the_plain_pages_have_no_serious_finding(chromium, door):
         "/trend": "main",
         "/users": "main",
         "/words": "main",
+        "/places": "#places section",
         "/api/docs": "main",
         "/there/is/none": "main",
     }

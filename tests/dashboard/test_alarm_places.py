@@ -226,6 +226,7 @@ def test_the_page_and_rest_say_who_is_there(bench, tmp_path):
     bench.store.put(tp.LINK, "cube", "", link)
     with open_door(tmp_path, scene=False, store=bench.store) as door, door.client("vera") as viewer:
         assert "Places" in viewer.get("/places").text
+        assert door.front.lookers.by_role() == {"viewer": 1}
         now = viewer.get("/api/places").json()
         assert now["sees"] and [one["name"] for one in now["places"]] == ["office", "lab"]
         office, lab = now["places"]

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from faults.of_disks import DISKS
 from faults.of_processes import PROCESSES
+from faults.of_sites import SITES
 from faults.of_the_bus import BUS
 from faults.of_the_line import LINE
 from faults.scenario import Scenario
@@ -13,6 +14,7 @@ SCENARIOS: dict[str, tuple[Scenario, ...]] = {
     "Processes": PROCESSES,
     "Disks and the clock": DISKS,
     "The bus": BUS,
+    "Certificates": SITES,
 }
 
 

@@ -65,6 +65,11 @@ DISKS = (
         "slow disk",
         "each `fsync` takes 2 s longer, for 6 s",
         slow,
+        said=(
+            Alarmed("link-said"),
+            Alarmed("recorder"),
+            Status("`message` of the recorder", "states", lambda state: "slow" in state.message),
+        ),
     ),
     Scenario(
         "clock set back by an hour",

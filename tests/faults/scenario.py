@@ -114,6 +114,7 @@ class Scenario:
     quick: bool = False  # is run by `make test`, too
     needs: Callable[[Bench], str] = lambda bench: ""  # why it cannot be done here
     well: Callable[[Bench], bool] = lambda bench: True  # beyond what every bench must be
+    site: str = ""  # its name, where it takes a bench with certificates
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import parse
 from sessions.recording.certificate import certify
 from sessions.recording.keys import KeyState
+from sessions.recording.manifest import KeyCount
 
 KEY = "p/cube/accel"
 
@@ -97,3 +98,14 @@ def test_an_imported_log_with_a_hole_is_not_complete(tmp_path, hole):
     (certificate,) = json.loads(path.read_text())["certificate"].values()
     assert certificate["missing_samples"] == (100 if hole else 0)
     assert certificate["complete"] == (not hole)
+
+
+def test_a_word_on_the_line_that_comes_late_is_no_time_without_a_reader():
+    keys = {
+        "t/cube/accel": KeyCount(messages=100),
+        "t/cube/link": KeyCount(messages=3, dark_s=0.8),
+        "t/receiver/link": KeyCount(messages=3, dark_s=0.8),
+    }
+    said = certify(keys, {})
+    assert said["cube"].complete and said["cube"].dark_s == 0.0
+    assert not said["receiver"].complete  # without samples its words are all that tells

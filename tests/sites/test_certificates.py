@@ -21,7 +21,7 @@ from sites.invitation import HEAD, Invitation, invite, read_invitation
 from sites.joining import make_site
 from sites.place import SiteError, load_place
 from sites.removal import remove
-from sites.service import look
+from sites.service import look, own_certificates
 
 WEEK = dt.timedelta(days=7)
 
@@ -153,7 +153,7 @@ def test_what_is_old_is_renewed_and_what_is_young_stays(home: Path) -> None:
     (home / "gateway.pem").write_bytes(pem(short))
     (home / "gateway.key").write_bytes(key)
     young = (home / "recorder.pem").read_bytes()
-    assert not look(home, place, Registrar(home).renew)  # ended: it has to be issued anew
+    assert not look(home, place, Registrar(home).renew)  # over the bus: it could not ask
     assert (home / "recorder.pem").read_bytes() == young
     long = authority.issue(request, "gateway", "lab", life=dt.timedelta(seconds=100))
     (home / "gateway.pem").write_bytes(pem(long))
@@ -161,6 +161,20 @@ def test_what_is_old_is_renewed_and_what_is_young_stays(home: Path) -> None:
     renewed = x509.load_pem_x509_certificate((home / "gateway.pem").read_bytes())
     assert renewed.not_valid_after_utc - dt.datetime.now(dt.UTC) > dt.timedelta(days=60)
     assert (home / "recorder.pem").read_bytes() == young
+
+
+def test_home_renews_what_ended_while_it_was_off_and_nothing_that_was_revoked(home: Path) -> None:
+    place, authority = load_place(home), Authority(home)
+    key, text = new_requests(("gateway",))["gateway"]
+    request, life = x509.load_pem_x509_csr(text.encode()), dt.timedelta(seconds=-500)
+    (home / "gateway.pem").write_bytes(pem(authority.issue(request, "gateway", "lab", life=life)))
+    (home / "gateway.key").write_bytes(key)
+    assert not look(home, place, Registrar(home).renew)  # as who is elsewhere might ask
+    assert look(home, place, Registrar(home).renew_own)
+    assert own_certificates(home)["gateway"] > dt.datetime.now(dt.UTC)
+    authority.revoke("gateway.lab")
+    with pytest.raises(SiteError, match="was revoked"):
+        Registrar(home).renew_own(renewal(home, "gateway")[1])
 
 
 @pytest.mark.parametrize(("role", "place"), [("king", "lab"), ("gateway", "Lab/../x")])

@@ -94,7 +94,7 @@ def certs_renew(
             raise SiteError(f"no certificate of {role!r} here; there are {', '.join(there)}")
         chosen = [role] if role else list(there)
         for each in chosen:
-            renew(folder, each, Registrar(folder).renew)
+            renew(folder, each, Registrar(folder).renew_own)
     except (SiteError, OSError, ValueError) as error:
         raise fail(error, EXIT_FAILED) from None
     say(json.dumps({"renewed": chosen}) if as_json else f"renewed: {', '.join(chosen)}")

@@ -21,6 +21,7 @@ from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import BEAT
 
 ROUTER_S = 5.0
+PATIENCE_S = 5.0
 LISTEN_S = 2.0  # by then a process that runs has spoken, and one that is frozen has not
 
 
@@ -39,6 +40,8 @@ def site_status(
     try:
         with _watching(settings.bus) as (session, presence):
             changes = _listen(session, presence, LISTEN_S)
+            if not presence.processes:  # a busy router takes its time
+                changes += _listen(session, presence, PATIENCE_S)
             found = places(presence)
             _show(found, as_json)
             if follow:
