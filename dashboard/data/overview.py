@@ -18,6 +18,7 @@ LANES = 16  # at most
 ASK_S = 4.0  # for one answer
 AGAIN = 12  # times; after a cut lanes may be slower to come back than the routers' own link
 PAUSE_S = 0.5
+CLOSE_S = 2.0
 COARSE = 60  # moments of the first answer
 FINE_S = 60.0  # of the past in each of those that follow, the newest first
 FINE_EVERY_S = 1.0
@@ -56,7 +57,7 @@ class Overviews:
         """Ask no more."""
         self._stop.set()
         self._put(-1, "", 0, 0, 0.0)
-        self._thread.join(ASK_S + 1.0)
+        self._thread.join(CLOSE_S)
 
     def _put(self, rank: int, device: str, begin: int, end: int, every_s: float) -> None:
         self._count += 1  # of one rank the first asked for

@@ -6,8 +6,8 @@ Real processes: `gyrofree up` at the lab with a simulated board, router and `sit
 office, and the page's own feed (tests/support/far_watch.py); two network namespaces and an emulated
 link between them. Both places have this machine's clock, so ages are true.
 
-Usage: python tests/bench/bench_far.py [--json] [--congestion cubic|bbr] [--cuts 5,30,120]
-       [--rate 1e6] [--delay 0.1] [--loss 0.05] [--seconds 60] [--copy 9000000]
+Usage: python tests/bench/bench_far.py [--json] [--congestion cubic|bbr] [--syn-retries 2]
+       [--cuts 5,30,120] [--rate 1e6] [--delay 0.1] [--loss 0.05] [--seconds 60] [--copy 9000000]
 """
 
 import argparse
@@ -37,7 +37,11 @@ def main() -> None:
     line = Line(arguments.rate, arguments.delay, arguments.loss)
     with tempfile.TemporaryDirectory() as folder:
         with far_site(
-            Path(folder), line, services=SERVICES, congestion=arguments.congestion
+            Path(folder),
+            line,
+            services=SERVICES,
+            congestion=arguments.congestion,
+            syn_retries=arguments.syn_retries,
         ) as site:
             watcher = Watcher(site)
             found = {"first_picture_s": until(lambda: watcher.lines, PATIENCE_S, "a picture")}
@@ -65,6 +69,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument(
         "--cuts", default="5,30,120", type=lambda s: [float(x) for x in s.split(",")]
     )
+    parser.add_argument("--syn-retries", type=int, default=2)
     parser.add_argument("--rate", type=float, default=1e6)
     parser.add_argument("--delay", type=float, default=0.1)
     parser.add_argument("--loss", type=float, default=0.05)

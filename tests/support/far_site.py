@@ -80,9 +80,11 @@ def far_site(
     office: str = "",
     services: tuple[tuple[str, ...], ...] = (("up",),),
     congestion: str = "cubic",
+    syn_retries: int = 0,
 ) -> Iterator[FarSite]:
     """Made and joined as docs/sites.md says, with `gyrofree up` at the lab and `services` at the
     office. congestion: how TCP takes losses; CUBIC is what most machines have.
+    syn_retries: of TCP's first packet; 0: as the machine has it.
 
     settings, office: further lines of the gyrofree.toml of the lab and of the office. Raises
     NoNamespaces.
@@ -93,6 +95,8 @@ def far_site(
         made.office.mkdir(parents=True)
         for place in (link.a, link.b):
             place.congestion(congestion)
+            if syn_retries:
+                place.sysctl("net.ipv4.tcp_syn_retries", str(syn_retries))
         try:
             _join(made)
             _append(made.lab, BOARD + settings)
