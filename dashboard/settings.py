@@ -94,7 +94,7 @@ class DashboardSettings(BaseModel):
         shown=True,
     )
     preview_hz: int = setting(
-        50, "samples of a preview at most: 50, 20, 10, 5, 2 or 1", unit="1/s", ge=1, le=50
+        50, "samples of a preview at most: 50, 20, 10, 5, 2 or 1", unit="Hz", ge=1, le=50
     )
     devices: int = setting(64, "shown; a silent one makes room for another", ge=1, le=1000)
     history_bytes: int = setting(

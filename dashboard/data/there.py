@@ -33,6 +33,8 @@ def service_faults(store: Store) -> Iterator[Alarm]:
             continue
         if one.place in said or one.role in PERSONS or one.state not in WRONG or key in told:
             continue
+        if not (one.beats and one.held):  # a token or beats alone are nobody's
+            continue
         told.add(key)
         title = f"{one.role} at {one.place} {one.state.value}"
         text = _wrong(one, silent_s)

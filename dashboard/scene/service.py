@@ -24,7 +24,8 @@ log = logging.getLogger(__name__)
 __all__ = ["OWN_INPUTS", "SceneError", "SceneHandle", "start"]
 
 POSE_S = 1 / 20  # period of poses ...
-POSES_PER_S = 200  # ... of as many browsers as can have it; more of them share these
+POSES_PER_S = 200  # ... of as many browsers as can have it; more of them share these ...
+SELDOMEST_S = 1 / 10  # ... but none waits longer for a pose, however many there are
 PANEL_S = 0.4  # period of charts and tables
 
 
@@ -132,7 +133,7 @@ class SceneHandle:
                         if number not in complained:
                             log.exception("browser %d: update failed", number)
                         complained.add(number)
-            each_s = period_s if tick is not View.tick_scene else len(views) / POSES_PER_S
+            each_s = period_s if panels else min(len(views) / POSES_PER_S, SELDOMEST_S)
             wanted_s = max(period_s, each_s) - (time.monotonic() - began)
             self._stop.wait(max(wanted_s, period_s / 4))
 

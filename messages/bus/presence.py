@@ -46,6 +46,7 @@ class Process:
     name: str  # among those of its place
     beat: pb.Beat = field(default_factory=pb.Beat)
     token: bool = False
+    held: bool = False  # a token, at some time: without one, beats are anybody's
     beats: int = 0  # that were heard
     heard_s: float = 0.0  # when the last one was, by the watch
     state: State = State.RUNNING
@@ -141,7 +142,7 @@ class Presence:
             if one is not None:
                 if there and not one.token:
                     one.heard_s = self.now_s  # the first beat is given its time
-                one.token = there
+                one.token, one.held = there, one.held or there
 
     def _process(self, place: str, name: str) -> Process | None:
         known = self.processes.get((place, name))
@@ -217,7 +218,7 @@ class Presence:
             other.place == one.place and other.role == one.role and other.state is State.RUNNING
             for other in self.processes.values()
         )
-        return replaced or for_s > GONE_S or not one.beats
+        return replaced or for_s > GONE_S or not (one.beats and one.held)
 
     # --- what is asked
 

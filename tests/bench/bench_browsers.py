@@ -11,6 +11,7 @@ browsers hears it, to when a browser has it: taken at TIMED of the browsers whil
 """
 
 import json
+import math
 import secrets
 import sys
 import tempfile
@@ -88,7 +89,7 @@ class Browser:
         for one in _told(frame)["messages"]:
             if one["type"] == "SetOrientationMessage" and one["name"].endswith("/body"):
                 at = self._heard.at.get(_key(one["wxyz"]))
-                if at is not None:
+                if at is not None and math.isfinite(at):
                     self.delays_s.append(now - at)
 
     def _count(self, frame: bytes) -> None:
@@ -114,7 +115,7 @@ class Heard:
     """Attitudes as they are published, and when; `timing` while delays are taken."""
 
     def __init__(self, bus: BusSettings) -> None:
-        self.at: dict[tuple[int, ...], float] = {}
+        self.at: dict[tuple[int, ...], float] = {}  # NaN: several times
         self.timing = False
         self._session = open_client(bus, timeout_s=20.0)
         self._subscription = subscribe(self._session, RATE, bus.prefix, self._on_rate)
@@ -122,7 +123,8 @@ class Heard:
     def _on_rate(self, _: str, message: pb.RateBatch) -> None:
         if len(message.q_nb) < 4:
             return
-        self.at.setdefault(_key(message.q_nb[-4:]), time.monotonic())
+        key = _key(message.q_nb[-4:])  # one that comes again says nothing of a delay
+        self.at[key] = math.nan if key in self.at else time.monotonic()
         if len(self.at) > REMEMBERED:
             self.at.pop(next(iter(self.at)))
 

@@ -203,6 +203,8 @@ def test_a_place_of_which_nothing_is_heard_is_out_of_reach_and_our_own_never():
     presence = Presence("lab")
     presence.look(0.0)
     for place in ("lab", "office"):
+        for name in ("dashboard-1", "router-1"):
+            presence.token(f"t/{place}/alive/{name}", True)
         presence.beat(place, "dashboard-1", beat(place, role="dashboard"))
         presence.beat(place, "router-1", beat(place, role="router"))
     looked(presence, SETTLE_S)
@@ -210,6 +212,14 @@ def test_a_place_of_which_nothing_is_heard_is_out_of_reach_and_our_own_never():
     presence.beat("office", "router-1", beat("office", role="router"))
     presence.look(presence._looked + LOOK_S)
     assert not presence.out_of_reach("office")
+
+
+def test_beats_without_a_token_are_forgotten_when_they_end():
+    presence = Presence("lab")
+    presence.look(0.0)
+    presence.beat("lab", "gateway-1", beat(role="gateway"))
+    looked(presence, 2.0)
+    assert not presence.all()
 
 
 def test_two_gateways_that_want_one_board_are_named():
