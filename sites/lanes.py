@@ -8,15 +8,18 @@ client of the other place's router here, once for each lane; who asks takes the 
 
 import logging
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
 import zenoh
 
 from messages.bus.session import BusSettings, LateSession
+from messages.bus.settings import FAR_LEASE_MS
 from messages.previews.frames import lane_key
 from sites.place import SiteError, load_place
 
+HANG_UP_S = 2.0
 LOOK_S = 5.0  # between two looks at who belongs to the site
 
 log = logging.getLogger(__name__)
@@ -38,9 +41,7 @@ class Lanes:
         """Hang up."""
         self._stop.set()
         self._thread.join(LOOK_S)
-        for sessions in self._open.values():
-            for one in sessions:
-                one.close()
+        hang_up([one for sessions in self._open.values() for one in sessions])
 
     def _run(self) -> None:
         while not self._stop.is_set():
@@ -57,10 +58,21 @@ class Lanes:
                     for number in range(self._count)
                 ]
             for address in self._open.keys() - wanted:
-                for one in self._open.pop(address):
-                    one.close()
+                hang_up(self._open.pop(address))
             self._stop.wait(LOOK_S)
 
     def _lane(self, address: str, key: str) -> LateSession:
-        bus = self._bus.model_copy(update={"router": address}).acting_as(self._bus.role)
-        return LateSession(bus, lambda session: self._declare(session, key), warn=False)
+        bus = self._bus.model_copy(update={"router": address, "lease_ms": FAR_LEASE_MS}).acting_as(
+            self._bus.role
+        )
+        return LateSession(bus, lambda session: self._declare(session, key), further=True)
+
+
+def hang_up(lanes: list[LateSession]) -> None:
+    """All at once, and no longer than HANG_UP_S: a word of parting may be long on a bad link."""
+    closing = [threading.Thread(target=one.close, daemon=True) for one in lanes]
+    for one in closing:
+        one.start()
+    end = time.monotonic() + HANG_UP_S
+    for one in closing:
+        one.join(max(0.0, end - time.monotonic()))

@@ -15,8 +15,10 @@ from messages.contract.checks import Refusal
 from messages.previews.frames import MOST_BYTES, lane_overview_key, overview_key, unpacked
 
 LANES = 16  # at most
-ASK_S = 8.0  # for one answer
-AGAIN = 3  # times
+ASK_S = 4.0  # for one answer
+AGAIN = 12  # times; after a cut lanes may be slower to come back than the routers' own link
+PAUSE_S = 0.5
+CLOSE_S = 2.0
 COARSE = 60  # moments of the first answer
 FINE_S = 60.0  # of the past in each of those that follow, the newest first
 FINE_EVERY_S = 1.0
@@ -55,7 +57,7 @@ class Overviews:
         """Ask no more."""
         self._stop.set()
         self._put(-1, "", 0, 0, 0.0)
-        self._thread.join(ASK_S + 1.0)
+        self._thread.join(CLOSE_S)
 
     def _put(self, rank: int, device: str, begin: int, end: int, every_s: float) -> None:
         self._count += 1  # of one rank the first asked for
@@ -65,13 +67,15 @@ class Overviews:
         while not self._stop.is_set():
             _, _, device, begin, end, every_s = self._wanted.get()
             query = pb.HistoryQuery(from_utc_ns=begin, until_utc_ns=end, every_s=every_s)
-            for _ in range(AGAIN):
-                if self._stop.is_set() or self._asked(device, query):
+            for attempt in range(AGAIN):
+                if self._stop.is_set() or self._asked(device, query, attempt % 2 == 1):
                     break
-                self._stop.wait(1.0)
+                self._stop.wait(PAUSE_S)
+            else:
+                log.warning("%s: home does not answer what was missed", device)
 
-    def _asked(self, device: str, query: pb.HistoryQuery) -> bool:
-        for reply in self._querier(device).get(payload=query.SerializeToString()):
+    def _asked(self, device: str, query: pb.HistoryQuery, main: bool) -> bool:
+        for reply in self._querier(device, main).get(payload=query.SerializeToString()):
             if self._stop.is_set():
                 return True
             if reply.ok is None:
@@ -85,7 +89,7 @@ class Overviews:
             return True
         return False
 
-    def _querier(self, device: str) -> zenoh.Querier:
+    def _querier(self, device: str, only_main: bool) -> zenoh.Querier:
         """On a lane that is there, else on the routers' own link."""
         if device not in self._queriers:
             keys = [lane_overview_key(self._prefix, number, device) for number in range(LANES)]
@@ -96,4 +100,4 @@ class Overviews:
         *lanes, main = self._queriers[device]
         there = [one for one in lanes if one.matching_status.matching]
         self._count += 1
-        return there[self._count % len(there)] if there else main
+        return there[self._count % len(there)] if there and not only_main else main

@@ -56,18 +56,20 @@ def open_client(
     settings: BusSettings,
     stop: threading.Event | None = None,
     timeout_s: float | None = None,
-    warn: bool = True,
+    further: bool = False,
 ) -> zenoh.Session:
-    """A connected client session; waits for the router, for ever by default. warn: say so.
+    """A connected client session; waits for the router, for ever by default. further: one beside
+    the process's own; nothing goes along with it, and that it waits is not said.
 
     Raises BusUnavailable after timeout_s or when `stop` is set first.
     """
     stop = stop or threading.Event()
     end = None if timeout_s is None else time.monotonic() + timeout_s
-    start, said = time.monotonic(), not warn
+    start, said = time.monotonic(), further
     while True:
         try:
-            return attending.opened(zenoh.open(_config(settings, "client")), settings)
+            session = zenoh.open(_config(settings, "client"))
+            return session if further else attending.opened(session, settings)
         except zenoh.ZError:
             if stop.is_set() or (end is not None and time.monotonic() > end):
                 raise BusUnavailable(
@@ -102,12 +104,12 @@ class LateSession:
         self,
         settings: BusSettings,
         opened: Callable[[zenoh.Session], object],
-        warn: bool = True,
+        further: bool = False,
     ) -> None:
         """`opened` gets the session, on a thread of its own; what it returns is kept as long as
-        this is. warn: say that the router does not answer.
+        this is. further: see open_client.
         """
-        self._settings, self._opened, self._warn = settings, opened, warn
+        self._settings, self._opened, self._further = settings, opened, further
         self._session: zenoh.Session | None = None
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._open, name="late session", daemon=True)
@@ -115,7 +117,7 @@ class LateSession:
 
     def _open(self) -> None:
         try:
-            self._session = open_client(self._settings, self._closing, warn=self._warn)
+            self._session = open_client(self._settings, self._closing, further=self._further)
         except BusUnavailable:
             return
         self._kept = self._opened(self._session)

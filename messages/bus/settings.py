@@ -62,6 +62,12 @@ class BusSettings(BaseModel):
         return self._role
 
 
+# Between places. TCP tries again after twice the time each time, so a connection that was cut for
+# long would come back long after the link did: it is given up after the lease, and a new one made.
+FAR_LEASE_MS = 5_000
+FAR_ATTEMPT_MS = 4_000  # of a client; with 5 % loss and 200 ms a handshake takes 1 s, hardly ever 4
+
+
 def configuration(settings: BusSettings, mode: str, mesh: Iterable[str] = ()) -> dict[str, Any]:
     """Zenoh's settings for a "client" or the "router", which keeps calling those of `mesh`, by
     their paths in its configuration. Raises IdentityError without a certificate.
@@ -89,11 +95,21 @@ def configuration(settings: BusSettings, mode: str, mesh: Iterable[str] = ()) ->
     if mode == "router":
         values["listen/endpoints"] = settings.listen
         values["connect/endpoints"] = list(mesh)
-        values["connect/timeout_ms"] = -1  # another site may come later
+        values[
+            "connect/timeout_ms"
+        ] = -1  # another site may come later; else it is given up for good
         values["connect/exit_on_failure"] = False
+        values["connect/retry"] = {
+            "period_init_ms": 200,
+            "period_max_ms": 500,
+            "period_increase_factor": 1.5,
+        }
+        if settings.tls is not None:
+            values["transport/link/tx/lease"] = min(settings.lease_ms, FAR_LEASE_MS)
         return values
     values["connect/endpoints"] = [settings.router]
-    values["connect/timeout_ms"] = 1000
+    near = any(host in settings.router for host in ("/127.0.0.1:", "/localhost:", "/[::1]:"))
+    values["connect/timeout_ms"] = 1000 if near else FAR_ATTEMPT_MS
     values["listen/endpoints"] = []
     # Look for a router that went away every second: what was missed shall be on the screen within
     # five.

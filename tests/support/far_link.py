@@ -111,6 +111,11 @@ class Place:
         """How TCP takes losses on its way to the other end: "cubic" is what most machines have."""
         self.run(["ip", "route", "replace", self._peer, "dev", DEVICE, "congctl", name])
 
+    def sysctl(self, name: str, value: str) -> None:
+        """Set a setting of this network, "net.ipv4.tcp_syn_retries"."""
+        path = "/proc/sys/" + name.replace(".", "/")
+        self.run(["sh", "-c", f"echo {value} > {path}"])
+
     def close(self) -> None:
         """End the network; what still runs here has the loopback alone."""
         os.close(self.tun)

@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -72,8 +73,18 @@ class FarSite:
 
 
 @contextlib.contextmanager
-def far_site(folder: Path, line: Line, settings: str = "", office: str = "") -> Iterator[FarSite]:
-    """Made and joined as docs/sites.md says, with `gyrofree up` at both ends.
+def far_site(
+    folder: Path,
+    line: Line,
+    settings: str = "",
+    office: str = "",
+    services: tuple[tuple[str, ...], ...] = (("up",),),
+    congestion: str = "cubic",
+    syn_retries: int = 0,
+) -> Iterator[FarSite]:
+    """Made and joined as docs/sites.md says, with `gyrofree up` at the lab and `services` at the
+    office. congestion: how TCP takes losses; CUBIC is what most machines have.
+    syn_retries: of TCP's first packet; 0: as the machine has it.
 
     settings, office: further lines of the gyrofree.toml of the lab and of the office. Raises
     NoNamespaces.
@@ -83,7 +94,9 @@ def far_site(folder: Path, line: Line, settings: str = "", office: str = "") -> 
         made.lab.mkdir(parents=True)
         made.office.mkdir(parents=True)
         for place in (link.a, link.b):
-            place.congestion("cubic")  # what most machines have
+            place.congestion(congestion)
+            if syn_retries:
+                place.sysctl("net.ipv4.tcp_syn_retries", str(syn_retries))
         try:
             _join(made)
             _append(made.lab, BOARD + settings)
@@ -91,7 +104,8 @@ def far_site(folder: Path, line: Line, settings: str = "", office: str = "") -> 
             link.line = line
             made.begin(link.a, made.lab, "simulate", "--link", "board", "--profile", "wobble")
             made.begin(link.a, made.lab, "up")
-            made.begin(link.b, made.office, "up")
+            for words in services:
+                made.begin(link.b, made.office, *words)
             yield made
         finally:
             made.close()
@@ -115,19 +129,35 @@ def _join(made: FarSite) -> None:
         made.processes.remove(process)
 
 
-def observer(site: FarSite, words: list[str]) -> Iterator[dict]:
-    """What a program at the office prints, one JSON object a line."""
-    process = site.link.b.popen(
-        [sys.executable, "-P", "-u", "-c", *words],
-        cwd=site.office,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    site.processes.append(process)
-    for text in process.stdout:
-        yield json.loads(text)
+class Watcher:
+    """What an office's page has of the board (far_watch.py), as it comes."""
+
+    def __init__(self, site: FarSite, live: str = "auto") -> None:
+        path = os.pathsep.join((str(ROOT), str(ROOT / "tests")))
+        self._process = site.link.b.popen(
+            [sys.executable, "-P", "-m", "support.far_watch", SITE, DEVICE, live],
+            cwd=site.office,
+            env=os.environ | {"PYTHONPATH": path},
+            stdout=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        site.processes.append(self._process)
+        self.lines: list[dict] = []  # without their rows
+        self.rows: list[float] = []  # UTC of the newest that was told in full, s
+        threading.Thread(target=self._read, daemon=True).start()
+
+    @property
+    def newest(self) -> float:
+        """UTC of the newest sample, s."""
+        return self.lines[-1]["newest"] if self.lines else 0.0
+
+    def _read(self) -> None:
+        for text in self._process.stdout:
+            line = json.loads(text)
+            rows = line.pop("rows")
+            self.rows = rows if len(rows) > 1 else self.rows
+            self.lines.append(line)
 
 
 def until(condition: Callable[[], bool], seconds: float, what: str) -> float:
