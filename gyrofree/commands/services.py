@@ -28,6 +28,7 @@ def router(config: Config = None, verbose: Verbose = False) -> None:
     def body(stop: threading.Event) -> None:
         from gyrofree.running.supervisor import die_with_parent
         from gyrofree.setup.site import router_rules
+        from messages.bus import timeouts
         from messages.bus.beating import Beating, tell_time
         from messages.bus.session import open_router
         from messages.bus.zenohd import Zenohd
@@ -47,6 +48,8 @@ def router(config: Config = None, verbose: Verbose = False) -> None:
                 telling.undeclare()
 
         if bus.zenohd is None:
+            if bus.tls is not None:
+                timeouts.watch(stop)
             with open_router(bus, rules, mesh) as session:
                 serve(session, stop.wait)
             return
