@@ -14,6 +14,7 @@ from pathlib import Path
 
 import zenoh
 
+from messages.bus import timeouts
 from messages.bus.session import BusSettings, LateSession
 from messages.bus.settings import FAR_LEASE_MS
 from messages.previews.frames import lane_key
@@ -34,6 +35,7 @@ class Lanes:
         self._folder, self._bus, self._count, self._declare = folder, bus, count, declare
         self._open: dict[str, list[LateSession]] = {}  # by address
         self._stop = threading.Event()
+        timeouts.watch(self._stop)
         self._thread = threading.Thread(target=self._run, name="lanes", daemon=True)
         self._thread.start()
 

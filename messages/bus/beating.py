@@ -73,6 +73,7 @@ class Beating:
         )
         self._token = session.liveliness().declare_token(alive_key(bus.prefix, place, name))
         self._line, self._stop = _Line(bus), threading.Event()
+        self._is_router = bus.role == "router"  # it misses none, and knows others as routers only
         self._thread = threading.Thread(target=self._run, name="beating", daemon=True)
         self._thread.start()
 
@@ -99,7 +100,7 @@ class Beating:
                 if time.monotonic() >= asking:
                     self._ask()
                     asking += ASK_FIRST_S if self._asked < ASK_FIRST else ASK_S
-                self._line.look(connected(self._session))
+                self._line.look(self._is_router or connected(self._session))
             except zenoh.ZError as error:  # a session that is closed under us
                 log.debug("no beat: %s", error)
             due = max(due + BEAT_S, time.monotonic())

@@ -4,6 +4,7 @@ another 30. Zenoh has no setting for that, so it is made on the sockets of the p
 """
 
 import contextlib
+import ipaddress
 import os
 import socket
 import threading
@@ -32,6 +33,11 @@ def look() -> None:
             if not os.readlink(entry).startswith("socket:"):
                 continue
             with socket.socket(fileno=os.dup(int(entry.name))) as one:
-                if one.family in (socket.AF_INET, socket.AF_INET6):
-                    if not one.getsockname()[0].startswith(("127.", "::1")):
-                        one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, GIVEN_UP_MS)
+                if one.family in (socket.AF_INET, socket.AF_INET6) and not _here(one):
+                    one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, GIVEN_UP_MS)
+
+
+def _here(one: socket.socket) -> bool:
+    """Within this machine, where a process may be stopped for longer and nothing is lost."""
+    address = one.getsockname()[0].removeprefix("::ffff:")
+    return ipaddress.ip_address(address.partition("%")[0]).is_loopback

@@ -153,9 +153,9 @@ def test_only_an_admin_makes_one_and_a_program_gets_in_nowhere_by_it(door):
         (
             {"sight": (0, 1, 2)},
             ["5.7", "±11.5", "–"],
-            ["± 0.6", "± 0.6 sign not known", "not known"],
+            ["± 0.6 (1σ)", "± 0.6 (1σ) sign not known", "not known"],
         ),
-        ({"sigma": 0.5}, ["6", "−11", "172"], ["± 29"] * 3),
+        ({"sigma": 0.5}, ["6", "−11", "172"], ["± 29 (1σ)"] * 3),
     ],
 )
 def test_no_digit_is_shown_that_is_not_known(tmp_path, more, values, notes):

@@ -115,11 +115,15 @@ def _rate(axis: str, value: float | None, sigma: float | None, sight: str) -> To
     if value is None or sight == "blind":
         return _row(f"ω {axis}", None, "°/s", "not known")
     half = None if sigma is None else sigma * DEG
-    said = "" if half is None else f"± {_fixed(half, half)}"
+    said = _within(half)
     if sight == "ambiguous":
         row = _row(f"ω {axis}", abs(value) * DEG, "°/s", f"{said} sign not known".strip(), half)
         return row | {"value": f"±{row['value']}"}
     return _row(f"ω {axis}", value * DEG, "°/s", said, half)
+
+
+def _within(half: float | None) -> str:
+    return "" if half is None else f"± {_fixed(half, half)} (1σ)"
 
 
 def _row(name: str, value: float | None, unit: str, note: str, half: float | None = None) -> Told:
@@ -139,7 +143,7 @@ def _tilt(said: Told | None) -> list[Told]:
     roll, pitch = roll_pitch(said["q_nb"])
     sigma = said["inclination_sigma_rad"]
     half = None if sigma is None else sigma * DEG
-    note = "" if half is None else f"± {_fixed(half, half)}"
+    note = _within(half)
     return [
         _row("roll", roll * DEG, "°", note, half),
         _row("pitch", pitch * DEG, "°", note, half),

@@ -1,0 +1,30 @@
+"""Connections to other machines are given up in time, and nothing else is touched."""
+
+import contextlib
+import os
+import socket
+
+from messages.bus.timeouts import GIVEN_UP_MS, look
+
+
+def given_up_ms(one: socket.socket) -> int:
+    return one.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT)
+
+
+def test_sockets_of_this_machine_and_what_is_no_tcp_stay_as_they_are():
+    with contextlib.ExitStack() as stack:
+        far = stack.enter_context(socket.socket())  # not bound yet, as one that still connects
+        six = stack.enter_context(socket.socket(socket.AF_INET6))
+        here = stack.enter_context(socket.create_server(("127.0.0.1", 0)))
+        client = stack.enter_context(socket.create_connection(here.getsockname()))
+        mapped = stack.enter_context(socket.socket(socket.AF_INET6))
+        mapped.bind(("::ffff:127.0.0.1", 0))
+        for kind in (socket.SOCK_STREAM, socket.SOCK_DGRAM):
+            stack.enter_context(socket.socket(socket.AF_UNIX, kind))
+        stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+        files = len(os.listdir("/proc/self/fd"))
+        for _ in range(3):
+            look()
+        assert [given_up_ms(one) for one in (far, six)] == [GIVEN_UP_MS, GIVEN_UP_MS]
+        assert [given_up_ms(one) for one in (here, client, mapped)] == [0, 0, 0]
+        assert len(os.listdir("/proc/self/fd")) == files
