@@ -2,6 +2,7 @@
 #             SOURCE=tilt or arm other simulated boards, BOARD=emulated the firmware image in the emulator)
 # make test   everything it needs, then all tests
 # make cases  inputs that once failed, from $GYROFREE_CASES or ../shared/cases
+# make zenohd Zenoh's own router (cargo builds it), held against our rules
 # make firmware  the board's image and map into build/firmware, with its size
 # make faults every fault, done to real processes, and the tables of docs/faults.md
 # make fuzz   libFuzzer on the board's decoder and commands (SECONDS=60); make fuzz-web hostile requests to the page
@@ -21,7 +22,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 INSTALL := $(PIP) install --quiet --no-deps --require-hashes
 DRIVE := $(if $(DATA),--data "$(DATA)")
 
-.PHONY: demo test cases setup wheel dev system-packages bench docs site pictures messages lint firmware fuzz fuzz-web compose-test faults clean
+.PHONY: demo test cases setup wheel dev system-packages bench docs site pictures messages lint firmware fuzz fuzz-web compose-test faults zenohd clean
 
 # BOARD=emulated: the table is sensed by the firmware image in the emulator
 demo: setup $(if $(filter emulated,$(BOARD)),.make/board firmware)
@@ -84,14 +85,21 @@ system-packages:
 
 # The browser draws in software and wants the machine for itself, so it comes after the others.
 test: setup dev system-packages site
-	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "not browser and not faults"
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "not browser and not faults and not cases and not zenohd"
 	$(BIN)/python -m pytest -m browser
 
 # Every fault done to real processes; it writes the tables of docs/faults.md.
 faults: setup dev system-packages
 	$(BIN)/python tests/faults/run.py
 
-# The inputs that once failed, from $GYROFREE_CASES or ../shared/cases; `make test` runs them too.
+# Zenoh's own router, built by cargo (5 minutes), and what is held against it.
+build/zenohd/bin/zenohd:
+	cargo install zenohd --version 1.10.2 --locked --root build/zenohd
+
+zenohd: setup dev build/zenohd/bin/zenohd
+	ZENOHD=$(CURDIR)/build/zenohd/bin/zenohd $(BIN)/python -m pytest -q tests/sites/test_zenohd.py
+
+# The inputs that once failed, from $GYROFREE_CASES or ../shared/cases.
 cases: setup dev
 	$(BIN)/python -m pytest -q -rs tests/system/test_cases.py
 

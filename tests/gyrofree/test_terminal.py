@@ -12,7 +12,7 @@ from rich.table import Table
 from support.hostile import HOSTILE
 
 from gyrofree.commands.options import Terminal, say
-from gyrofree.running.process import OneLine
+from gyrofree.operations.log_form import OneLine
 from sessions.library.annotations import FILE, Annotations, SessionNote
 from sessions.recording.manifest import Manifest, write_manifest
 

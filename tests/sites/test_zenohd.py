@@ -99,6 +99,7 @@ def test_the_command_writes_it_with_and_without_a_site(home: Path, tmp_path: Pat
     assert runner.invoke(app, words).exit_code == 2
 
 
+@pytest.mark.zenohd
 def test_the_real_program_holds_the_whole_table_of_rights(home: Path, program: Path) -> None:
     assert difference(program) == ""
     place, bus = load_place(home), settings(home, program)
@@ -131,6 +132,7 @@ def test_the_real_program_holds_the_whole_table_of_rights(home: Path, program: P
     assert not wrong and len(heard) > 15
 
 
+@pytest.mark.zenohd
 def test_its_administration_is_shut(home: Path, program: Path) -> None:
     for bus, access, role in (
         (settings(home, program), rules(home), "dashboard"),

@@ -1,5 +1,6 @@
 """Inputs that once failed, from a folder outside of the project: $GYROFREE_CASES, else shared/cases
-beside the checkout. `make cases` runs them alone.
+beside the checkout. `make cases` runs them; `make test` does not, as its result must not depend on
+what lies beside the checkout.
 """
 
 import pytest
@@ -7,6 +8,7 @@ from support import cases
 from support.case_expectations import hold
 
 NAMES = cases.names()
+pytestmark = pytest.mark.cases
 
 
 @pytest.mark.skipif(
