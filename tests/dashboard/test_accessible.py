@@ -194,10 +194,15 @@ def test_no_page_of_the_scene_has_a_serious_finding_or_clipped_text(chromium, do
 def test_no_width_clips_the_bars_or_the_summary(chromium, door, size):
     with visit(chromium, door, size=size) as (page, _):
         scene_of(page).wait_for_selector(".gf-tile")
-        page.wait_for_timeout(1000)  # for the panels to fit
+        clipped = [True]
+        for _ in range(20):  # for the panels to fit
+            page.wait_for_timeout(300)
+            clipped = page.evaluate(CLIPPED) + scene_of(page).evaluate(CLIPPED)
+            if not clipped:
+                break
+        assert not clipped
         assert page.evaluate("document.documentElement.scrollWidth") <= SIZES[size][0]
         assert page.evaluate("document.documentElement.scrollHeight") <= SIZES[size][1]
-        assert not page.evaluate(CLIPPED) and not scene_of(page).evaluate(CLIPPED)
         for part in ("#pause", "#window", "#note", "#mark", "#record"):
             box = page.locator(part).bounding_box()
             assert 0 <= box["x"] and box["x"] + box["width"] <= SIZES[size][0], part
@@ -221,7 +226,6 @@ def test_the_plain_pages_have_no_serious_finding(chromium, door):
         "/account": "main",
         "/audit": "main",
         "/orders": "main",
-        "/wall": "main",
         "/api/docs": "main",
         "/there/is/none": "main",
     }

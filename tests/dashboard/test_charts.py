@@ -154,7 +154,7 @@ def test_axes_follow_the_theme(visit):
       return Math.min(...Array.from({length: d.length / 4}, (_, k) => d[4 * k + 3] > 200
         ? d[4 * k] + d[4 * k + 1] + d[4 * k + 2] : 765)); }"""
     in_dark = page.evaluate(darkest)
-    page.locator("details.menu summary").click()
+    page.get_by_label("Menu of otto").click()
     page.locator("[data-theme-toggle]").click()
     assert page.evaluate(darkest) < in_dark - 100
 

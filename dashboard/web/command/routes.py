@@ -79,10 +79,11 @@ def _desk(request: Request, who: Asker) -> Desk:
     return desk
 
 
-def state_out(desk: Desk, seat: pb.Seat, role: Role) -> CommandOut:
-    """How it is for one sign-in."""
-    status, operator = desk.status, role >= Role.operator
-    why = desk.barred() if operator else "orders take the role operator; you look as viewer"
+def state_out(desk: Desk | None, seat: pb.Seat, role: Role) -> CommandOut:
+    """How it is for one sign-in; without a bus nobody keeps the command."""
+    status, operator = None if desk is None else desk.status, role >= Role.operator
+    barred = "" if desk is None else desk.barred()
+    why = barred if operator else "orders take the role operator; you look as viewer"
     now = status or pb.CommandStatus()
     return CommandOut(
         kept=status is not None,
@@ -130,8 +131,8 @@ def outcome_of(outcome: int) -> str:
 
 @routes.get("/api/command", summary="Who has the command, and whether you may order")
 def command(request: Request, who: SignedIn) -> CommandOut:
-    desk, seat = _desk(request, who), seat_of(request, who)
-    if who.role >= Role.operator:
+    desk, seat = desk_of(request, who), seat_of(request, who)
+    if desk is not None and who.role >= Role.operator:
         desk.seen()
     return state_out(desk, seat, who.role)
 
