@@ -192,7 +192,8 @@ def test_no_page_of_the_scene_has_a_serious_finding_or_clipped_text(chromium, do
 
 @pytest.mark.parametrize("size", SIZES)
 def test_no_width_clips_the_bars_or_the_summary(chromium, door, size):
-    with visit(chromium, door, size=size) as (page, _):
+    path = "/?w=navigate&p=map&device=car-01"  # its legend stands on what is left between panels
+    with visit(chromium, door, size=size, path=path) as (page, _):
         scene_of(page).wait_for_selector(".gf-tile")
         clipped = [True]
         for _ in range(20):  # for the panels to fit
