@@ -18,6 +18,7 @@ import zenoh
 from messages import text
 from messages.bus import orders
 from messages.bus import session as busmod
+from messages.bus.command.history import newest_of
 from messages.bus.command.said import words
 from messages.bus.command.watch import Watch, name_of
 from messages.contract import gyrofree_pb2 as pb
@@ -143,9 +144,8 @@ class Desk:
         try:
             reply = orders.give(self._session, self._prefix, orders.SEAT, ask)
         except orders.OrderError as error:
-            wanted = find.lower().split()
-            mine = [one for one in reversed(self._given) if _has(one, wanted)]
-            return mine[:most], f"those of this page since it began: {error}"
+            mine = newest_of(self._given, find, most)
+            return mine, f"those of this page since it began: {error}"
         lost = f"{reply.lost} orders could not be kept: is the disk full?" if reply.lost else ""
         return list(reply.history), lost
 
@@ -234,8 +234,3 @@ class Desk:
             if self._session is not None and not self._watching:
                 with contextlib.suppress(TopicError):
                     self._publishers.put(ORDER, COMMAND, given)
-
-
-def _has(one: pb.OrderGiven, wanted: list[str]) -> bool:
-    inside = " ".join((one.user, one.place, one.whom, one.device, one.what, one.text)).lower()
-    return all(word in inside for word in wanted)

@@ -65,3 +65,12 @@ def put_in_place(draft: Path, path: Path) -> None:
             draft.unlink()
         return
     os.replace(draft, path)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make new and renamed entries of a folder survive a power cut."""
+    fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(fd)
+    finally:
+        os.close(fd)

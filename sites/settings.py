@@ -2,6 +2,7 @@
 
 from pydantic import BaseModel, ConfigDict
 
+from messages.contract.topics import MOST_LANES
 from messages.setting import setting
 
 
@@ -15,5 +16,5 @@ class SiteSettings(BaseModel):
         "connections to each other place for recordings and overviews, beside the one that is"
         " live: over a link with losses one carries a fraction of it; 0: all goes over that one",
         ge=0,
-        le=16,
+        le=MOST_LANES,
     )

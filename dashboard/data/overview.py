@@ -12,9 +12,9 @@ import zenoh
 
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import Refusal
+from messages.contract.topics import MOST_LANES
 from messages.previews.frames import MOST_BYTES, lane_overview_key, overview_key, unpacked
 
-LANES = 16  # at most
 ASK_S = 4.0  # for one answer
 AGAIN = 12  # times; after a cut lanes may be slower to come back than the routers' own link
 PAUSE_S = 0.5
@@ -92,7 +92,7 @@ class Overviews:
     def _querier(self, device: str, only_main: bool) -> zenoh.Querier:
         """On a lane that is there, else on the routers' own link."""
         if device not in self._queriers:
-            keys = [lane_overview_key(self._prefix, number, device) for number in range(LANES)]
+            keys = [lane_overview_key(self._prefix, number, device) for number in range(MOST_LANES)]
             self._queriers[device] = [
                 self._session.declare_querier(key, timeout=ASK_S)
                 for key in (*keys, overview_key(self._prefix, device))

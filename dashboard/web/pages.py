@@ -5,7 +5,7 @@ import logging
 import re
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 from urllib.parse import parse_qs, urlencode
 
 import jinja2
@@ -175,14 +175,26 @@ def enter(request: Request, token: str, wanted: str = "/") -> RedirectResponse:
 
 def set_cookie(settings: DashboardSettings, answer: Response, token: str) -> None:
     """The cookie of a sign-in."""
+    give_cookie(settings, answer, settings.cookie, token, settings.session_hours * 3600)
+
+
+def give_cookie(
+    settings: DashboardSettings,
+    answer: Response,
+    name: str,
+    value: str,
+    life_s: float,
+    samesite: Literal["strict", "lax"] = "strict",
+) -> None:
+    """A cookie that no script reads and, over TLS, no plain connection carries."""
     answer.set_cookie(
-        settings.cookie,
-        token,
-        max_age=int(settings.session_hours * 3600),
+        name,
+        value,
+        max_age=int(life_s),
         path="/",
         secure=settings.secure,
         httponly=True,
-        samesite="strict",
+        samesite=samesite,
     )
 
 

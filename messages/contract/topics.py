@@ -258,6 +258,9 @@ def alive_key(prefix: str, place: str, process: str) -> str:
     return f"{check_name(prefix)}/{place}/alive/{process}"
 
 
+MOST_LANES = 16  # further connections between two places, beside the one that is live
+
+
 def clock_key(prefix: str) -> str:
     """Key of a queryable that tells the time of the site: nothing in, ClockReply out."""
     return f"{check_name(prefix)}/site/clock"

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from inertial.whole_file import sync_folder
 from sessions.procedure.library import ProcedureError, of_text
 from sessions.procedure.model import Plan
 
@@ -135,7 +136,7 @@ class Journal:
         journal = cls(folder / f"{start['run']}.jsonl", _run_of(start))
         try:
             journal._write(_line({"e": "start"} | start))
-            _sync_folder(folder)
+            sync_folder(folder)
         except OSError:
             journal.path.unlink(missing_ok=True)  # half a run would be taken for a damaged one
             raise
@@ -213,14 +214,6 @@ def _run_of(start: dict[str, Any]) -> Run:
     run = Run(id=start["run"], plan=plan, **fields)
     run.steps = [StepRecord() for _ in plan.steps]
     return run
-
-
-def _sync_folder(folder: Path) -> None:
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def unfinished(root: Path) -> dict[str, Journal | None]:

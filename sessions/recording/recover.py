@@ -11,6 +11,7 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from inertial.whole_file import sync_folder
 from messages.clock import Moment
 from messages.contract.topics import Address, parse
 from sessions.recording.certificate import Witness, certify
@@ -22,7 +23,6 @@ from sessions.recording.manifest import (
     Manifest,
     SessionError,
     read_manifest,
-    sync_folder,
     write_manifest,
 )
 from sessions.recording.mcap_append import McapLog

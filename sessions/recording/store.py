@@ -18,6 +18,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from inertial import core
+from inertial.whole_file import sync_folder
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import Address, TopicError, parse
 from messages.history.journal_folder import slow
@@ -27,7 +28,6 @@ from sessions.recording.manifest import (
     RECORDING,
     Manifest,
     next_number,
-    sync_folder,
     write_manifest,
 )
 from sessions.recording.mcap_append import McapLog

@@ -5,11 +5,10 @@ from collections.abc import Callable, Iterator, Sequence
 
 import zenoh
 
+from messages.contract.topics import MOST_LANES
 from messages.previews.frames import lane_key
 from sites.place import SiteError
 from sites.roles import SEGMENTS, segment_key
-
-MOST_LANES = 16
 
 Ask = Callable[[str], bytes]  # a question below segment_key; raises SiteError
 Asked = Callable[[str], bytes]  # the same, by its whole key

@@ -3,12 +3,8 @@
 import math
 
 import httpx
-import pytest
-from support.front_door import open_door
-
-pytest.importorskip("prometheus_client")
-
 from prometheus_client.parser import text_string_to_metric_families as parsed
+from support.front_door import open_door
 
 from dashboard.data.store import Store
 from dashboard.web.programs.tokens import issue_token

@@ -145,7 +145,6 @@ def test_a_running_service_is_asked_for_more_and_gives_its_figures(router):
     assert ask("router", "loud").returncode == 2 and ask("kettle", "info").returncode == 2
     os.kill(process.pid, signal.SIGUSR1)  # it is detailed: as configured again
     assert "info" in next_line(process, "log level")["message"]
-    pytest.importorskip("prometheus_client")
     with urllib.request.urlopen(f"http://127.0.0.1:{figures}/metrics", timeout=10) as answer:
         text = answer.read().decode()
     assert "process_resident_memory_bytes" in text

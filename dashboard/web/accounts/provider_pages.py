@@ -13,7 +13,7 @@ from fastapi.responses import RedirectResponse, Response
 from dashboard.web.accounts.provider import Attempt, Provider, ProviderError
 from dashboard.web.auth import Gate
 from dashboard.web.front import address_of
-from dashboard.web.pages import caller, own_path, render, set_cookie
+from dashboard.web.pages import caller, give_cookie, own_path, render, set_cookie
 
 ATTEMPTS = 1000  # at a time; the oldest gives way
 LIFE_S = 600.0
@@ -40,15 +40,7 @@ def router(gate: Gate) -> APIRouter:
         while len(attempts) > ATTEMPTS:
             attempts.pop(next(iter(attempts)))
         # lax: the way back begins at the provider's page, which is another site
-        answer.set_cookie(
-            cookie,
-            attempt.state,
-            max_age=int(LIFE_S),
-            path="/",
-            secure=gate.settings.secure,
-            httponly=True,
-            samesite="lax",
-        )
+        give_cookie(gate.settings, answer, cookie, attempt.state, LIFE_S, "lax")
         return answer
 
     @routes.get("/login/provider/back")

@@ -18,7 +18,7 @@ from fastapi.responses import JSONResponse, Response, StreamingResponse
 
 from dashboard.web.auth import Role, SignIn, WaitError
 from dashboard.web.front import Asker, Front, address_of, check_role, front_of
-from dashboard.web.pages import SignedIn, render, signed_form, version
+from dashboard.web.pages import SignedIn, give_cookie, render, signed_form, version
 from dashboard.web.programs.tokens import WALL, issue_token, revoke_token
 from dashboard.web.programs.users_page import users_with
 from dashboard.web.schemas import Line, Strict
@@ -95,15 +95,8 @@ def enter(request: Request, body: Token) -> JSONResponse:
     token, user = found
     front.gate.audit.done("wall display", user.name, address_of(request), token.name)
     answer = JSONResponse({"display": token.name})
-    answer.set_cookie(
-        cookie_of(front),
-        body.token,
-        max_age=max(1, int(token.ends - time.time())),
-        path="/",
-        secure=front.settings.secure,
-        httponly=True,
-        samesite="strict",
-    )
+    life_s = max(1.0, token.ends - time.time())
+    give_cookie(front.settings, answer, cookie_of(front), body.token, life_s)
     return answer
 
 

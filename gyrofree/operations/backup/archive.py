@@ -23,6 +23,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from gyrofree.operations.backup.collecting import BLOCK, Collection, Taken
 from gyrofree.operations.backup.parts import NAMES, BackupError
+from inertial.whole_file import sync_folder
 from messages.text import check as fault_in
 from messages.text import plain
 
@@ -112,7 +113,7 @@ def write(path: Path, collection: Collection, progress: Callable[[int], None]) -
             stream.flush()
             os.fsync(stream.fileno())
         os.replace(draft, path)
-        _sync(path.parent)
+        sync_folder(path.parent)
     finally:
         draft.unlink(missing_ok=True)
     return contents
@@ -274,11 +275,3 @@ def _sound(piece: str) -> bool:
         and len(piece.encode(errors="replace")) <= LONG
         and not fault_in(piece)
     )
-
-
-def _sync(folder: Path) -> None:
-    fd = os.open(folder or Path(), os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(fd)
-    finally:
-        os.close(fd)

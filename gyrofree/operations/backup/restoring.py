@@ -18,8 +18,9 @@ from gyrofree.operations.backup.parts import (
     named_files,
     parts_of,
 )
-from gyrofree.operations.backup.swap import Move, swap, sync
+from gyrofree.operations.backup.swap import Move, swap
 from inertial.toml_file import parsed
+from inertial.whole_file import sync_folder
 from sessions.recording.manifest import NUMBER
 
 Progress = Callable[[int], None]
@@ -229,7 +230,7 @@ def _lay_ready(archive: Archive, unit: Unit, draft: Path, progress: Progress) ->
         for folder in folders:
             folder.chmod(0o755)
     for folder in folders:
-        sync(folder)
+        sync_folder(folder)
 
 
 def _write(archive: Archive, entry: Entry, path: Path, private: bool, progress: Progress) -> None:

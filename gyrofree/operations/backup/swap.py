@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from gyrofree.operations.backup.parts import BackupError
+from inertial.whole_file import sync_folder
 
 PLAN = ".gyrofree-restore.json"  # beside the configuration
 
@@ -43,7 +44,7 @@ def swap(folder: Path, moves: list[Move], lay_ready: Callable[[], None]) -> None
         json.dump([asdict(move) for move in moves], stream)
         stream.flush()
         os.fsync(stream.fileno())
-        sync(folder)
+        sync_folder(folder)
         try:
             lay_ready()
             for move in moves:
@@ -53,7 +54,7 @@ def swap(folder: Path, moves: list[Move], lay_ready: Callable[[], None]) -> None
             plan.unlink()
             raise
         plan.unlink()  # from here on the new state is what stands
-        sync(folder)
+        sync_folder(folder)
     for move in moves:
         if move.aside:
             remove(Path(move.aside))
@@ -98,21 +99,12 @@ def remove(path: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def sync(folder: Path) -> None:
-    """Entries of a folder survive a power cut."""
-    fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(fd)
-    finally:
-        os.close(fd)
-
-
 def _go(move: Move) -> None:
     if move.aside:
         os.rename(move.target, move.aside)
     if move.draft:
         os.rename(move.draft, move.target)
-    sync(Path(move.target).parent)
+    sync_folder(Path(move.target).parent)
 
 
 def _back(moves: list[Move]) -> None:

@@ -7,7 +7,8 @@ import json
 import logging
 import os
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 
 from google.protobuf.json_format import MessageToDict, ParseDict, ParseError
@@ -46,9 +47,7 @@ class History:
 
     def find(self, text: str, most: int) -> list[pb.OrderGiven]:
         """The newest that contain every word of the text, newest first."""
-        words = text.lower().split()
-        found = (one for one in reversed(self._newest) if _has(one, words))
-        return [one for one, _ in zip(found, range(most), strict=False)]
+        return newest_of(self._newest, text, most)
 
     def _write(self, one: pb.OrderGiven) -> None:
         line = json.dumps(MessageToDict(one, preserving_proto_field_name=True)) + "\n"
@@ -63,6 +62,12 @@ class History:
             os.write(handle, line.encode())
         finally:
             os.close(handle)
+
+
+def newest_of(given: Sequence[pb.OrderGiven], text: str, most: int) -> list[pb.OrderGiven]:
+    """Those that contain every word of the text, newest first; `given` is oldest first."""
+    words = text.lower().split()
+    return list(islice((one for one in reversed(given) if _has(one, words)), most))
 
 
 def _has(one: pb.OrderGiven, words: list[str]) -> bool:
