@@ -28,6 +28,7 @@ from dashboard.web.tls.certificate import open_certificate
 from dashboard.web.users import UserStore, load_users
 from messages.bus.beating import Beating
 from messages.bus.session import BusSettings, open_client
+from messages.bus.turning import Loop
 from messages.contract import gyrofree_pb2 as pb
 from sessions.library.catalogue import Catalogue
 
@@ -110,10 +111,12 @@ def serve(front: Front, bound: socket.socket, stop: threading.Event) -> None:
 
     async def until_stopped() -> None:
         serving = asyncio.create_task(server.serve(sockets=[bound]))
-        while not stop.is_set() and not serving.done():
-            if front.certificate is not None:
-                front.certificate.look()
-            await asyncio.sleep(STOP_LOOK_S)
+        with Loop("web server") as loop:
+            while not stop.is_set() and not serving.done():
+                loop.turn()
+                if front.certificate is not None:
+                    front.certificate.look()
+                await asyncio.sleep(STOP_LOOK_S)
         server.should_exit = True
         await serving
 

@@ -164,7 +164,8 @@ class Watch:
         }
         for id, cause in found.causes.items():
             active = id in mine and mine[id].active
-            if active or self._has_lasted(device, id, self.settings.on_delay_s, now):
+            delay_s = 0.0 if id in found.lasted else self.settings.on_delay_s
+            if active or self._has_lasted(device, id, delay_s, now):
                 self.book.found(device, id, cause, now)
                 self._turning.pop((device, id), None)
         for id, point in mine.items():

@@ -1688,7 +1688,7 @@ class LogLevelCommand(_message.Message):
     def __init__(self, level: _Optional[str] = ..., seconds: _Optional[float] = ..., user: _Optional[str] = ...) -> None: ...
 
 class Beat(_message.Message):
-    __slots__ = ("header", "role", "session", "since_utc_ns", "devices", "viewers", "leaving", "certificate_ends_utc_ns", "certificate_life_s", "certificate", "clock_ahead_s", "clock_bound_s", "version")
+    __slots__ = ("header", "role", "session", "since_utc_ns", "devices", "viewers", "leaving", "certificate_ends_utc_ns", "certificate_life_s", "certificate", "clock_ahead_s", "clock_bound_s", "version", "loop", "turn_ago_s", "turn_most_s", "doing", "told_by")
     class Viewers(_message.Message):
         __slots__ = ("role", "count")
         ROLE_FIELD_NUMBER: _ClassVar[int]
@@ -1709,6 +1709,11 @@ class Beat(_message.Message):
     CLOCK_AHEAD_S_FIELD_NUMBER: _ClassVar[int]
     CLOCK_BOUND_S_FIELD_NUMBER: _ClassVar[int]
     VERSION_FIELD_NUMBER: _ClassVar[int]
+    LOOP_FIELD_NUMBER: _ClassVar[int]
+    TURN_AGO_S_FIELD_NUMBER: _ClassVar[int]
+    TURN_MOST_S_FIELD_NUMBER: _ClassVar[int]
+    DOING_FIELD_NUMBER: _ClassVar[int]
+    TOLD_BY_FIELD_NUMBER: _ClassVar[int]
     header: Header
     role: str
     session: str
@@ -1722,7 +1727,12 @@ class Beat(_message.Message):
     clock_ahead_s: float
     clock_bound_s: float
     version: str
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., role: _Optional[str] = ..., session: _Optional[str] = ..., since_utc_ns: _Optional[int] = ..., devices: _Optional[_Iterable[str]] = ..., viewers: _Optional[_Iterable[_Union[Beat.Viewers, _Mapping]]] = ..., leaving: _Optional[bool] = ..., certificate_ends_utc_ns: _Optional[int] = ..., certificate_life_s: _Optional[float] = ..., certificate: _Optional[str] = ..., clock_ahead_s: _Optional[float] = ..., clock_bound_s: _Optional[float] = ..., version: _Optional[str] = ...) -> None: ...
+    loop: str
+    turn_ago_s: float
+    turn_most_s: float
+    doing: str
+    told_by: str
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., role: _Optional[str] = ..., session: _Optional[str] = ..., since_utc_ns: _Optional[int] = ..., devices: _Optional[_Iterable[str]] = ..., viewers: _Optional[_Iterable[_Union[Beat.Viewers, _Mapping]]] = ..., leaving: _Optional[bool] = ..., certificate_ends_utc_ns: _Optional[int] = ..., certificate_life_s: _Optional[float] = ..., certificate: _Optional[str] = ..., clock_ahead_s: _Optional[float] = ..., clock_bound_s: _Optional[float] = ..., version: _Optional[str] = ..., loop: _Optional[str] = ..., turn_ago_s: _Optional[float] = ..., turn_most_s: _Optional[float] = ..., doing: _Optional[str] = ..., told_by: _Optional[str] = ...) -> None: ...
 
 class ClockReply(_message.Message):
     __slots__ = ("received_ns", "answered_ns", "wall_ns")

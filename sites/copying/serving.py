@@ -7,9 +7,12 @@ from pathlib import Path
 
 import zenoh
 
+from messages.bus.turning import Loop
 from sites.copying.shelf import Shelf, ShelfError
 from sites.roles import SEGMENTS, segment_key
 
+WAKE_S = 1.0  # while nothing is asked, that much is said so often
+ANSWER_S = 60.0  # that an answer may take
 MOST_WAITING = 256  # questions; more are refused, and asked again
 
 log = logging.getLogger(__name__)
@@ -42,16 +45,28 @@ class Serving:
             query.reply_err(b"too many questions wait: ask again")
 
     def _serve(self) -> None:
-        while (query := self._asked.get()) is not None:
-            key = str(query.key_expr)
-            try:
-                query.reply(key, self._answer(key.partition(SEGMENTS)[2].split("/")))
-            except (ShelfError, OSError) as error:
-                query.reply_err(str(error).encode())
-            except Exception:  # whatever a stranger asks, the service goes on
-                log.exception("a question about copies is refused: %s", key[:200])
-                query.reply_err(b"the question cannot be answered; home's log says why")
-            query.drop()
+        with Loop("serving copies") as loop:
+            while True:
+                loop.turn()
+                try:
+                    query = self._asked.get(timeout=WAKE_S)
+                except queue.Empty:
+                    continue
+                if query is None:
+                    return
+                with loop.during("an answer", ANSWER_S):
+                    self._reply(query)
+
+    def _reply(self, query: zenoh.Query) -> None:
+        key = str(query.key_expr)
+        try:
+            query.reply(key, self._answer(key.partition(SEGMENTS)[2].split("/")))
+        except (ShelfError, OSError) as error:
+            query.reply_err(str(error).encode())
+        except Exception:  # whatever a stranger asks, the service goes on
+            log.exception("a question about copies is refused: %s", key[:200])
+            query.reply_err(b"the question cannot be answered; home's log says why")
+        query.drop()
 
     def _answer(self, parts: list[str]) -> bytes:
         """`index`; `<session>`; or `<session>/<file>/<first>-<sha256>`."""
