@@ -20,9 +20,8 @@ from messages.bus.claimants import Claimants
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import GATEWAY, check_name
 
-FROZEN_S = 1.5  # without a beat, of which there are two a second, while others ...
-PACE = 3  # ... of its place beat so often; when they are as slow, ...
-SLOW_S = 3.0  # ... after so long
+FROZEN_S = 1.5  # without a beat, of which there are two a second, ...
+PACE = 3  # ... while others of its place beat so often
 SETTLE_S = 5.0  # after a router came back, for all others to find it too
 QUIET_S = 0.75  # without a beat of anybody of a place, of several: the way there is stuck
 AGAIN_S = 1.0  # after that, for the next beat of each
@@ -101,6 +100,7 @@ class Presence:
         self._settled_s = -SETTLE_S  # since when there is a router
         self._connected = True
         self._quiet: dict[str, float] = {}  # places of which nobody is heard; until when, by now
+        self._mine: Process | None = None  # as of the last look
         self._paces: dict[str, float] = {}  # places: since when half of those who live beat PACE
         self._lock = threading.RLock()
 
@@ -180,6 +180,7 @@ class Presence:
     def _measure(self) -> None:
         """How slowly those beat who live, by place: of a machine without time all are slow."""
         since: dict[str, list[float]] = {}
+        self._mine = self.mine
         for one in self.processes.values():
             alive = one.lives and self.now_s - one.heard_s <= FROZEN_S
             if alive and len(one.newest) == PACE:
@@ -187,10 +188,14 @@ class Presence:
         self._paces = {place: statistics.median(times) for place, times in since.items()}
 
     def _is_silent(self, one: Process) -> bool:
-        """Longer than a process that runs can be."""
-        silent_s, pace_s = self.now_s - one.heard_s, self._paces.get(one.place)
+        """Longer than a process that runs can be? Our own beats tell of our own time alone."""
+        if one is self._mine or self.now_s - one.heard_s <= FROZEN_S:
+            return False
+        pace_s = self._paces.get(one.place)
         one.alone = pace_s is None
-        return silent_s > SLOW_S or (silent_s > FROZEN_S and (one.alone or one.heard_s < pace_s))
+        if pace_s is None:
+            return self._mine is None or one.place != self._mine.place
+        return one.heard_s < pace_s
 
     def _is_untold(self, one: Process) -> bool:
         """Another process speaks for it, which says nothing itself."""
