@@ -1,4 +1,4 @@
-"""How long after its fault a service that is frozen or hangs is on the page of places, and an alarm.
+"""How long after its fault a service that is frozen or hangs is on the page of places and an alarm.
 
     python tests/bench/bench_presence.py [TIMES] [BUSY]
 
