@@ -210,7 +210,9 @@ class Presence:
         if not self._is_silent(one):
             return State.HUNG if one.stands else State.RUNNING
         stuck = one.place in self._quiet and not self._is_near(one)
-        if stuck or self._is_untold(one) or self.now_s - self._settled_s < SETTLE_S:
+        back = one.heard_s > self._settled_s  # after a router was gone each finds it in its time
+        settling = self.now_s - self._settled_s < SETTLE_S * (1 if back else 2)
+        if stuck or settling or self._is_untold(one):
             return State.UNKNOWN if one.lives else one.state
         return State.FROZEN if one.token else State.GONE
 

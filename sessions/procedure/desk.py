@@ -5,6 +5,7 @@ recorder.
 import logging
 import re
 import time
+from pathlib import Path
 
 import zenoh
 
@@ -119,6 +120,14 @@ def if_lost(table: RateTable | None) -> str:
     if table is None:
         return f"{goes_on}; steps that want a person wait. You turn the table by hand."
     return f"{goes_on}, and the table turns with it. In the lab: {table.if_lost}."
+
+
+def offer(message: pb.ProcedureStatus, folder: Path | None) -> None:
+    """Write into the message what may be started, and what is known of it."""
+    for one in library.offers(folder):
+        message.offered.append(one.name)
+        known = message.offers.add(name=one.name, title=one.title, steps=one.steps)
+        known.top_radps, known.seconds, known.fault = one.top, one.seconds, one.fault
 
 
 def late(conductor: Conductor, command: pb.ProcedureCommand) -> str:

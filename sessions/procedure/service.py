@@ -33,7 +33,7 @@ from messages.history.keeping import KeptPublishers
 from sessions.procedure import library, seen
 from sessions.procedure.around import Around
 from sessions.procedure.conductor import Conductor
-from sessions.procedure.desk import ProcedureDesk, if_lost, late
+from sessions.procedure.desk import ProcedureDesk, if_lost, late, offer
 from sessions.procedure.driven.description import TableError, described
 from sessions.procedure.driven.table import RateTable, TextTable
 from sessions.procedure.run import Journal, unfinished
@@ -274,7 +274,7 @@ class Service:
             message = status_of(self._ended[device])
         table = self._tables.get(device)
         message.table = table.name if table is not None else ""
-        message.offered[:] = library.names(self._settings.folder)
+        offer(message, self._settings.folder)
         self._publish(device, message)
 
     def _publish(self, device: str, message: pb.ProcedureStatus) -> None:
