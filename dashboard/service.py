@@ -11,6 +11,9 @@ from typing import Any
 
 import uvicorn
 
+from dashboard.alarms.own_place import OwnPlace, shown
+from dashboard.alarms.settings import AlarmSettings
+from dashboard.data.fault import Alarm
 from dashboard.data.feed import Feed
 from dashboard.data.store import Store
 from dashboard.desk import Desk
@@ -143,6 +146,20 @@ def audited(audit: Audit) -> Callable[[pb.OrderGiven], None]:
     return tell
 
 
+def _own_place(
+    store: Store, settings: DashboardSettings, bus: BusSettings, alarms: AlarmSettings | None
+) -> contextlib.AbstractContextManager[None]:
+    """Shows what is wrong with this place where nobody else of it says so."""
+    if alarms is None:
+        return contextlib.nullcontext()
+    own = OwnPlace(store.presence, alarms, settings.sessions_root, bus.tls)
+
+    def show(found: list[Alarm]) -> None:
+        store.own_faults = found
+
+    return shown(own, show)
+
+
 def run(
     settings: DashboardSettings,
     bus: BusSettings,
@@ -153,13 +170,15 @@ def run(
     watching: str = "",
     place: str = "",
     afar: bool = False,
+    alarms: AlarmSettings | None = None,
 ) -> None:
     """The dashboard until `stop` is set.
 
     `replay` starts replays for the sessions page (control.ProcessReplay); without it the page has
     no such button. `jobs` makes reports and exports in the background; `first_run` asks an
     administrator for the first board. `watching`: why nobody here may give orders. `place`: of a
-    site, this one. `afar`: the boards are at another place, over a link that may be slow. Raises
+    site, this one. `afar`: the boards are at another place, over a link that may be slow.
+    `alarms`: what is one, where no service of alarms runs at this place. Raises
     PortTaken when the port or viser's is in use, CertificateError, UsersError for a damaged users
     file, BusUnavailable when it is stopped before a router answers.
     """
@@ -209,7 +228,10 @@ def run(
             keeping.start()
             log.info("dashboard at %s", settings.url)
             try:
-                with Beating(session, bus, viewers=front.lookers.by_role):
+                with (
+                    Beating(session, bus, viewers=front.lookers.by_role),
+                    _own_place(store, settings, bus, alarms),
+                ):
                     serve(front, bound, stop)
             finally:
                 if replay is not None:

@@ -5,6 +5,7 @@ Renewed files are seen by `gyrofree up`, which starts the service concerned anew
 port stays open meanwhile, so no board notices.
 """
 
+import contextlib
 import datetime as dt
 import logging
 import threading
@@ -40,6 +41,8 @@ WAKE_S = 1.0  # while nothing is to be done, that much is said so often
 HASH_S = 60.0  # that reading and hashing a file may take between two segments
 ROUND_S = 2.0  # between two looks at what home has recorded
 
+Beside = Callable[[zenoh.Session], contextlib.AbstractContextManager[None]]
+
 log = logging.getLogger(__name__)
 
 
@@ -53,9 +56,11 @@ def run(
     bus: BusSettings,
     stop: threading.Event,
     settings: SiteSettings | None = None,
+    beside: Beside = lambda _: contextlib.nullcontext(),
 ) -> None:
     """Until `stop`; raises SiteError where the folder has no place. sessions: the folder of the
-    recordings, which home shows and others fill.
+    recordings, which home shows and others fill. beside: what else runs at a place that is not
+    home, with the session.
     """
     settings = settings or SiteSettings()
     place = load_place(folder)
@@ -85,7 +90,8 @@ def run(
             for one in declared:
                 one.undeclare()
         else:
-            copy(Copies(sessions, folder), place.site, session, stop)
+            with beside(session):
+                copy(Copies(sessions, folder), place.site, session, stop)
         keeping.join(ASK_S + 1.0)
 
 

@@ -177,6 +177,7 @@ def dashboard(
                 watching,
                 place_of(settings),
                 is_afar(settings),
+                settings.alarms if is_afar(settings) else None,
             )
         except (CertificateError, UsersError) as error:
             raise ConfigError(str(error)) from None

@@ -14,6 +14,7 @@ from support.front_door import open_door
 from dashboard.alarms.book import Book
 from dashboard.alarms.health import of_bench, of_device
 from dashboard.alarms.machine import Now
+from dashboard.alarms.own_place import OwnPlace
 from dashboard.alarms.places import Certificates
 from dashboard.alarms.settings import AlarmSettings, HealthSettings
 from dashboard.alarms.watch import Watch
@@ -328,6 +329,34 @@ def test_no_digit_is_said_that_is_not_known(age, bound):
         assert 10.0**-digits >= 0.4 * bound or bound > 1.0
         assert abs(number - age) <= 0.5 * 10.0**-digits + 1e-9
     assert "-" not in clock(-age, bound)
+
+
+# --- a place without a service of alarms
+
+
+def test_an_office_finds_its_own_disk_clock_certificates_and_a_place_out_of_reach(bench, tmp_path):
+    settings = AlarmSettings(state=tmp_path / "alarms.json", disk_free_bytes=1 << 60)
+    own = OwnPlace(bench.store.presence, settings, tmp_path, None)
+    for _ in range(3):  # the lab's gateway is frozen, too, which is told there
+        everybody(bench)
+        bench.passes(SETTLE_S)
+    ends = int((time.time() + DAY_S) * 1e9)
+    office = {"certificate_ends_utc_ns": ends, "certificate_life_s": 90 * DAY_S, "clock_s": 2.3}
+
+    def look() -> set[str]:
+        for _ in range(8):
+            for role in ("dashboard", "router"):
+                bench.beats("office", role, **office)
+            bench.passes(0.5)
+            own.look(Now(bench.s, int(bench.s * 1e9)))
+        return {one.id for one in own.faults()}
+
+    everybody(bench)
+    found = {"disk", "clock-office", "certificate-office-dashboard", "certificate-office-router"}
+    assert look() == found | {"place-lab"}
+    assert {one.level for one in own.faults()} >= {"critical", "warning", "watch"}
+    bench.store.own_faults = own.faults()
+    assert {one.id for one in bench_alarms(bench.store)} == found | {"place-lab"}
 
 
 # --- REST and the page
