@@ -13,8 +13,9 @@ import pytest
 from playwright.sync_api import expect
 from support.browser import visit as opened
 from support.feeder import UTC0_NS, Feeder
-from support.front_door import open_door, wait_for
+from support.front_door import open_door
 from support.table_session import SESSION, table_recording, table_root
+from support.waiting import until
 
 from dashboard.data.store import Store
 from dashboard.desk import Desk
@@ -358,12 +359,12 @@ def test_a_zoom_stays_while_data_come_in_until_one_follows_again(chromium, door)
             ends = abs(low - (a - utc0)) < near and abs(high - (b - utc0)) < near
             return ends and (low, high) == (x[0], x[-1])
 
-        wait_for(is_zoomed, "the stretch")
+        until(is_zoomed, "the stretch")
         before, newest = scene.evaluate(CHARTS), device.t_newest
-        wait_for(lambda: device.t_newest > newest + 2.0, "new data")
+        until(lambda: device.t_newest > newest + 2.0, "new data")
         page.wait_for_timeout(1500)  # three more updates of the charts
         assert scene.evaluate(CHARTS) == before
         page.locator("#zoomed button").click()
         expect(page.locator("#zoomed")).to_be_hidden()
-        wait_for(lambda: scene.evaluate(CHARTS)[0][1] > newest + 1.0, "the newest data")
+        until(lambda: scene.evaluate(CHARTS)[0][1] > newest + 1.0, "the newest data")
         assert not said

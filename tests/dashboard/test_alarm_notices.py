@@ -7,8 +7,8 @@ import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
-from support.front_door import wait_for
 from support.mail_server import mail_server
+from support.waiting import until
 
 from dashboard.alarms import notices
 from dashboard.alarms.notices import DeliveryError, Notice, Sender
@@ -85,12 +85,12 @@ def test_a_notice_waits_for_its_server_over_a_restart(hook, tmp_path, monkeypatc
     hook.status = 503
     sender = Sender(way, path)
     sender.offer(NOTICE)
-    wait_for(lambda: len(hook.got) >= 2, "a second attempt")
+    until(lambda: len(hook.got) >= 2, "a second attempt")
     assert sender.waiting == 1 and "503" in sender.fault
     sender.close()
     hook.status, before = 200, len(hook.got)
     again = Sender(way, path)
-    wait_for(lambda: again.sent == 1 and again.waiting == 0, "it was delivered")
+    until(lambda: again.sent == 1 and again.waiting == 0, "it was delivered")
     assert len(hook.got) == before + 1 and not again.fault
     again.close()
     last = Sender(way, path)
