@@ -8,7 +8,7 @@ Value = TypeVar("Value")
 
 
 def until(
-    condition: Callable[[], Value], what: str | Callable[[], str] = "", seconds: float = 60.0
+    condition: Callable[[], Value], what: str | Callable[[], str] = "", seconds: float = 120.0
 ) -> Value:
     """The first true value of condition(); a busy machine is given time.
 
