@@ -90,7 +90,7 @@ def copy(copies: Copies, site: str, session: zenoh.Session, stop: threading.Even
     said = ""
     while not stop.wait(ROUND_S):
         try:
-            copies.round(roads(), stop.is_set)
+            copies.round(roads, stop.is_set)
             said = ""
         except (SiteError, OSError) as error:
             if str(error) != said:
