@@ -25,7 +25,9 @@ from sites.place import SiteError, write
 PART = ".part"
 BOOK = "copies.json"
 LAST = "session.json"
+INDEX = "index"  # asks for the sessions that there are
 LARGEST = 64 << 20  # bytes of a list
+UNREADABLE = "home's list of segments cannot be read: is it of another version?"
 
 log = logging.getLogger(__name__)
 
@@ -44,7 +46,7 @@ class Copies:
         """Copy what is new or has changed, on all ways at once; how many sessions became equal.
         Raises SiteError when home does not answer, OSError when nothing can be written here.
         """
-        there, count = _index(self._ask("index", ways)), 0
+        there, count = _index(self._ask(INDEX, ways)), 0
         for session in sorted(there, reverse=True):
             if stop():
                 break
@@ -65,8 +67,8 @@ class Copies:
             return self._heard.asked(what, ways()[0])
         except SiteError:
             raise
-        except ValueError as error:
-            raise SiteError(str(error)) from None
+        except ValueError:
+            raise SiteError(UNREADABLE) from None
 
     def _session(self, session: str, ways: Ways, stop: Callable[[], bool]) -> dict | None:
         """By file home's hash and the one here; None while it has not come to its end."""
@@ -181,9 +183,7 @@ def _listing(answer: bytes) -> Listing:
             raise ValueError
         listing = Listing.model_validate_json(answer)
     except (ValidationError, ValueError):
-        raise SiteError(
-            "home's list of segments cannot be read: is it of another version?"
-        ) from None
+        raise SiteError(UNREADABLE) from None
     for name, listed in listing.files.items():
         if not FILE.fullmatch(name) or len(listed.segments) != -(-listed.size // SEGMENT):
             raise SiteError(f"home's list of segments has {name[:60]!r}, which cannot be")
