@@ -18,7 +18,7 @@ from messages.bus.beating import Beating, tell_time
 from messages.bus.session import BusSettings, open_client
 from messages.bus.tls import TRUSTED
 from sites.authority import DAYS
-from sites.copying.fetching import Copies
+from sites.copying.fetching import INDEX, Copies
 from sites.copying.roads import Roads
 from sites.copying.serving import Serving
 from sites.enrolment import Registrar, keep, renewal
@@ -32,7 +32,8 @@ LOOK_S = 3600.0  # between two looks at the certificates
 AGAIN_S = 60.0  # after a renewal that did not succeed
 LEFT = dt.timedelta(days=DAYS / 3)  # of a certificate's life; less is renewed
 ASK_S = 10.0
-SEGMENT_S = 60.0  # for a segment over a slow link
+INDEX_S = 15.0  # for what there is: short, and asked again
+SEGMENT_S = 60.0  # for a part or a list of segments over a slow link
 ROUND_S = 2.0  # between two looks at what home has recorded
 
 log = logging.getLogger(__name__)
@@ -86,11 +87,15 @@ def run(
 
 def copy(copies: Copies, site: str, session: zenoh.Session, stop: threading.Event) -> None:
     """Bring home's recordings here, round after round, until `stop`."""
-    roads = Roads(session, site, lambda key: asked(session, key, b"", SEGMENT_S))
+
+    def ask(key: str) -> bytes:
+        return asked(session, key, b"", INDEX_S if f"{SEGMENTS}{INDEX}/" in key else SEGMENT_S)
+
+    roads = Roads(session, site, ask)
     said = ""
     while not stop.wait(ROUND_S):
         try:
-            copies.round(roads(), stop.is_set)
+            copies.round(roads, stop.is_set)
             said = ""
         except (SiteError, OSError) as error:
             if str(error) != said:
