@@ -12,6 +12,9 @@ from typing import Any
 
 import uvicorn
 
+from dashboard.alarms.own_place import OwnPlace, shown
+from dashboard.alarms.settings import AlarmSettings
+from dashboard.data.fault import Alarm
 from dashboard.data.feed import Feed
 from dashboard.data.store import Store
 from dashboard.desk import Desk
@@ -29,6 +32,7 @@ from dashboard.web.tls.certificate import open_certificate
 from dashboard.web.users import UserStore, load_users
 from messages.bus.beating import Beating
 from messages.bus.session import BusSettings, open_client
+from messages.bus.turning import Loop
 from messages.contract import gyrofree_pb2 as pb
 from sessions.library.catalogue import Catalogue
 
@@ -114,10 +118,12 @@ def serve(front: Front, bound: socket.socket, stop: threading.Event) -> None:
 
     async def until_stopped() -> None:
         serving = asyncio.create_task(server.serve(sockets=[bound]))
-        while not stop.is_set() and not serving.done():
-            if front.certificate is not None:
-                front.certificate.look()
-            await asyncio.sleep(STOP_LOOK_S)
+        with Loop("web server") as loop:
+            while not stop.is_set() and not serving.done():
+                loop.turn()
+                if front.certificate is not None:
+                    front.certificate.look()
+                await asyncio.sleep(STOP_LOOK_S)
         server.should_exit = True
         await serving
 
@@ -144,6 +150,20 @@ def audited(audit: Audit) -> Callable[[pb.OrderGiven], None]:
     return tell
 
 
+def _own_place(
+    store: Store, settings: DashboardSettings, bus: BusSettings, alarms: AlarmSettings | None
+) -> contextlib.AbstractContextManager[None]:
+    """Shows what is wrong with this place where nobody else of it says so."""
+    if alarms is None:
+        return contextlib.nullcontext()
+    own = OwnPlace(store.presence, alarms, settings.sessions_root, bus.tls)
+
+    def show(found: list[Alarm]) -> None:
+        store.own_faults = found
+
+    return shown(own, show)
+
+
 def run(
     settings: DashboardSettings,
     bus: BusSettings,
@@ -154,13 +174,15 @@ def run(
     watching: str = "",
     place: str = "",
     afar: bool = False,
+    alarms: AlarmSettings | None = None,
 ) -> None:
     """The dashboard until `stop` is set.
 
     `replay` starts replays for the sessions page (control.ProcessReplay); without it the page has
     no such button. `jobs` makes reports and exports in the background; `first_run` asks an
     administrator for the first board. `watching`: why nobody here may give orders. `place`: of a
-    site, this one. `afar`: the boards are at another place, over a link that may be slow. Raises
+    site, this one. `afar`: the boards are at another place, over a link that may be slow.
+    `alarms`: what is one, where no service of alarms runs at this place. Raises
     PortTaken when the port or viser's is in use, CertificateError, UsersError for a damaged users
     file, BusUnavailable when it is stopped before a router answers.
     """
@@ -211,7 +233,10 @@ def run(
             keeping.start()
             log.info("dashboard at %s", settings.url)
             try:
-                with Beating(session, bus, viewers=front.lookers.by_role):
+                with (
+                    Beating(session, bus, viewers=front.lookers.by_role),
+                    _own_place(store, settings, bus, alarms),
+                ):
                     serve(front, bound, stop)
             finally:
                 if replay is not None:

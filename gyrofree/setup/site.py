@@ -13,7 +13,7 @@ from sites.access import rules_of
 from sites.authority import REGISTER
 from sites.enrolment import KNOWN, known_here
 from sites.place import PLACE, Place, SiteError, load_place, write
-from sites.service import own_certificates
+from sites.service import Beside, own_certificates
 
 SERVICE = "site"  # the child that lets others join, and renews
 WATCHING = ("router", "dashboard")  # all that a place without boards runs
@@ -77,6 +77,15 @@ def place_of(settings: Settings) -> str:
 def is_afar(settings: Settings) -> bool:
     """Are the boards at another place of the site? Raises ConfigError."""
     return settings.bus.tls is not None and not _place(settings.bus.tls).at_home
+
+
+def own_alarms(settings: Settings) -> Beside:
+    """What tells people of the alarms of a place that is not home; home has a service for it."""
+    from dashboard.alarms.own_place import told  # here: `up` needs none of it
+
+    bus, place = settings.bus.acting_as("authority"), place_of(settings)
+    recordings = Path(settings.recorder.root)
+    return lambda session: told(session, bus, place, settings.alarms, recordings)
 
 
 def router_rules(settings: Settings) -> tuple[dict[str, Any] | None, tuple[str, ...]]:

@@ -249,12 +249,13 @@ def site_serve(config: Config = None, verbose: Verbose = False) -> None:
     folder = _folder(settings)
 
     def body(stop: threading.Event) -> None:
+        from gyrofree.setup.site import own_alarms
         from sites import service
 
         try:
-            sessions = Path(settings.recorder.root)
+            sessions, beside = Path(settings.recorder.root), own_alarms(settings)
             bus = settings.bus.acting_as("authority")
-            service.run(folder, sessions, bus, stop, settings.site)
+            service.run(folder, sessions, bus, stop, settings.site, beside)
         except SiteError as error:
             raise ConfigError(str(error)) from None
 
