@@ -149,8 +149,8 @@ listen({
 }, byId("scene"));
 moveByArrows(rooms);
 moveByArrows(pages);
-// The scene's panels fit the page: of a phone, a tablet, a desk.
-const sizeOf = () => (innerWidth < 600 ? "s" : innerWidth < 1200 ? "m" : "l");
+// The scene's panels fit the page: of a phone, a tablet held upright, one held across, a desk.
+const sizeOf = () => (innerWidth < 600 ? "s" : innerWidth < 1000 ? "n" : innerWidth < 1200 ? "m" : "l");
 const fit = () => choose({ size: sizeOf() });
 addEventListener("resize", () => sizeOf() !== size && fit(size = sizeOf()));
 let size = sizeOf();
