@@ -240,10 +240,15 @@ def test_geodetic_differences_agree_with_the_length_of_a_degree():
 
 
 @pytest.mark.parametrize("view", [camera.CUBE, camera.VEHICLE])
-@pytest.mark.parametrize("aspect, height", [(1.6, 0.5), (0.75, 0.5), (0.46, camera.PHONE_CENTRE)])
-def test_camera_shows_the_centre_where_it_is_not_covered_and_the_whole_width(view, aspect, height):
+@pytest.mark.parametrize(
+    "aspect, sheet, height",
+    [(1.6, False, 0.5), (0.45, False, 0.5), (0.46, True, camera.PHONE_CENTRE)],
+)
+def test_camera_shows_the_centre_where_it_is_not_covered_and_the_whole_width(
+    view, aspect, sheet, height
+):
     fov = np.radians(75.0)
-    position, look_at = camera.aim(view, fov, aspect)
+    position, look_at = camera.aim(view, fov, aspect, sheet)
     ahead = (look_at - position) / np.linalg.norm(look_at - position)
     right = np.cross(ahead, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
