@@ -137,6 +137,7 @@ byId("remark").addEventListener("submit", (event) => {
 byId("mark").addEventListener("click", () => remark(true));
 if (!mayOperate) {
   for (const part of byId("remark").elements) Object.assign(part, { disabled: true, title: BARRED });
+  if (innerWidth < 720) note.placeholder = BARRED; // a phone shows no title
 }
 
 const toggleTheme = () => document.querySelector("[data-theme-toggle]").click();

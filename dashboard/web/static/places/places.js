@@ -46,7 +46,7 @@ function service(one) {
   const silent = one.state === "frozen" || one.state === "gone" ? `, ${Math.floor(one.silent_s)} s` : "";
   const boards = [one.devices.join(", ")];
   if (one.waits.length) boards.push(node("span", `waits: another gateway has ${one.waits.join(", ")}`, "dim"));
-  return [node("strong", one.role), state(one.state, silent), when(one.since_s), boards, one.clock, one.certificate_ends_s ? when(one.certificate_ends_s).slice(0, 10) : ""];
+  return [node("strong", one.role), state(one.state, silent), when(one.since_s), boards, one.state === "running" || one.clock_bound_s === null ? one.clock : node("span", `was ${one.clock}`, "dim"), one.certificate_ends_s ? when(one.certificate_ends_s).slice(0, 10) : ""];
 }
 
 function section(place) {
