@@ -52,7 +52,9 @@ function service(one) {
 function section(place) {
   const made = node("section"), title = node("h2", place.name);
   if (place.own) title.append(node("span", "this place", "tag"));
-  title.append(state(place.state), node("span", place.people_said, "dim"));
+  const off = place.services.filter((one) => one.state === place.state).length;
+  const part = ["frozen", "gone"].includes(place.state) && off < place.services.length; // a place is more than one of its services
+  title.append(part ? node("span", `${off} of ${place.services.length} services ${place.state}`, `alive ${KINDS[place.state]}`) : state(place.state), node("span", place.people_said, "dim"));
   const heads = ["Service", "State", "Since (UTC)", "Boards", "Clock against the site's", "Certificate until"];
   made.append(title, table(heads, place.services.map(service), "No service is there."));
   return made;
