@@ -38,14 +38,6 @@ from messages.contract import topics as tp
 
 PAIR = Table(1.0, (Column("up", "m"), Column("both", "m", 2))).dtype()
 
-# Chromium without a GPU: WebGL is drawn in software.
-FLAGS = [
-    "--no-sandbox",
-    "--disable-background-networking",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]
-
 
 class Direct:
     """Stands where the feeder wants publishers and puts straight into a store."""
@@ -524,51 +516,46 @@ def test_the_scene_opens_no_public_tunnel(store, nobody):
 
 
 @pytest.mark.browser
-def test_browser_shows_the_cube_as_the_truth_has_it(store, nobody):
-    from playwright import sync_api  # here: only this test needs it
-
+def test_browser_shows_the_cube_as_the_truth_has_it(store, nobody, chromium):
     feeder = Feeder(Direct(store))
     for k in range(700):
         feeder.cube(k * 0.01)
     handle = start(SimpleNamespace(viser_port=0), store, nobody)
     try:
-        with sync_api.sync_playwright() as playwright:
-            browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=FLAGS)
-            page = browser.new_page(viewport={"width": 800, "height": 500})
-            errors = []
-            page.on(
-                "console",
-                lambda message: errors.append(message.text) if message.type == "error" else None,
-            )
-            page.goto(f"http://127.0.0.1:{handle.port}/")
-            script = """names => names.map(name => {
-                const node = window.__viserMutable?.nodeRefFromName[name];
-                return node ? node.quaternion.toArray() : null; })"""
-            names = [
-                "/world/truth",
-                "/world/estimate/products-ekf/body",
-                "/world/estimate/least-squares/body",
-            ]
-            device = store.device("cube-01")
-            wanted = [device.get("truth").message.q_nb]
-            wanted += [
-                device.get("rate", name).message.q_nb for name in ("products-ekf", "least-squares")
-            ]
+        page = chromium.new_page(viewport={"width": 800, "height": 500})
+        errors = []
+        page.on(
+            "console",
+            lambda message: errors.append(message.text) if message.type == "error" else None,
+        )
+        page.goto(f"http://127.0.0.1:{handle.port}/")
+        script = """names => names.map(name => {
+            const node = window.__viserMutable?.nodeRefFromName[name];
+            return node ? node.quaternion.toArray() : null; })"""
+        names = [
+            "/world/truth",
+            "/world/estimate/products-ekf/body",
+            "/world/estimate/least-squares/body",
+        ]
+        device = store.device("cube-01")
+        wanted = [device.get("truth").message.q_nb]
+        wanted += [
+            device.get("rate", name).message.q_nb for name in ("products-ekf", "least-squares")
+        ]
 
-            def near() -> bool:
-                found = page.evaluate(script, names)
-                if None in found:
-                    return False
-                dots = [
-                    abs(np.dot([w, x, y, z], q))
-                    for (x, y, z, w), q in zip(found, wanted, strict=True)
-                ]
-                return min(dots) > 0.99999
+        def near() -> bool:
+            found = page.evaluate(script, names)
+            if None in found:
+                return False
+            dots = [
+                abs(np.dot([w, x, y, z], q)) for (x, y, z, w), q in zip(found, wanted, strict=True)
+            ]
+            return min(dots) > 0.99999
 
-            wait_for(near, 60.0)
-            assert page.get_by_text("SIMULATED").first.is_visible()
-            assert not errors, json.dumps(errors)
-            browser.close()
+        wait_for(near, 60.0)
+        assert page.get_by_text("SIMULATED").first.is_visible()
+        assert not errors, json.dumps(errors)
+        page.close()
     finally:
         handle.stop()
 
