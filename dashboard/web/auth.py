@@ -265,7 +265,7 @@ def _by_a_person(connection: HTTPConnection) -> bool:
     if connection.scope["type"] != "http":
         return False
     asks = connection.scope["method"] in ("GET", "HEAD")
-    return not (asks and connection.url.path.startswith(("/api/", "/map/", "/metrics")))
+    return not (asks and connection.url.path.startswith(("/api/", "/map/", "/metrics", "/wall/")))
 
 
 def _elapsed() -> Callable[[], float]:

@@ -69,7 +69,8 @@ class Door:
         )
         self.ahead = 0.0
         self.frozen = 0.0  # s since 1970; when set, time only moves by `ahead`
-        write_private(self.settings.users, _users())
+        if not self.settings.users.exists():  # else those of the server that was here before
+            write_private(self.settings.users, _users())
         self.viser = viser.ViserServer(host="127.0.0.1", port=0, verbose=False) if scene else None
         self.front = Front(
             settings=self.settings,
@@ -126,9 +127,9 @@ def trust_in(certificate: Path | None) -> ssl.SSLContext:
 
 
 @contextlib.contextmanager
-def open_door(folder: Path, **options: Any) -> Iterator[Door]:
-    """Serve until the block ends."""
-    with listen("127.0.0.1", 0) as bound:
+def open_door(folder: Path, at: int = 0, **options: Any) -> Iterator[Door]:
+    """Serve until the block ends. at: the port; 0: one that is free."""
+    with listen("127.0.0.1", at) as bound:
         door = Door(folder, bound.getsockname()[1], **options)
         stop = threading.Event()
         thread = threading.Thread(target=serve, args=(door.front, bound, stop))
