@@ -17,6 +17,7 @@ from cryptography import x509
 from messages.bus.beating import Beating, tell_time
 from messages.bus.session import BusSettings, open_client
 from messages.bus.tls import TRUSTED
+from sites.alone import alone
 from sites.authority import DAYS
 from sites.copying.fetching import Copies
 from sites.copying.roads import Roads
@@ -129,8 +130,9 @@ def look(folder: Path, place: Place, ask: Callable[[bytes], bytes]) -> bool:
 
 def renew(folder: Path, role: str, ask: Callable[[bytes], bytes]) -> None:
     """Have the certificate of a role made anew; raises SiteError, OSError, ValueError."""
-    key, question = renewal(folder, role)
-    keep(folder, ask(question), {role: key}, (folder / TRUSTED).read_bytes())
+    with alone(folder):
+        key, question = renewal(folder, role)
+        keep(folder, ask(question), {role: key}, (folder / TRUSTED).read_bytes())
 
 
 def own_certificates(folder: Path) -> dict[str, dt.datetime]:
