@@ -17,9 +17,9 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 from pydantic import BaseModel, ConfigDict
 
+from inertial.one_at_a_time import alone
 from messages.bus.tls import TRUSTED
 from messages.contract.names import NAME, Name
-from sites.alone import alone
 from sites.place import SiteError, load_list, save_list, write
 from sites.roles import ROLES
 

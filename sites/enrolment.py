@@ -20,8 +20,8 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from inertial.one_at_a_time import alone
 from messages.bus.tls import TRUSTED, key_of
-from sites.alone import alone
 from sites.authority import Authority, Issued, new_key, pem, private_pem, request_for
 from sites.invitation import hashed, load_book, save_book
 from sites.place import (

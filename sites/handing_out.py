@@ -3,8 +3,8 @@
 import datetime as dt
 from pathlib import Path
 
+from inertial.one_at_a_time import alone
 from messages.bus.tls import TRUSTED
-from sites.alone import alone
 from sites.authority import Authority, Issued, pem
 from sites.enrolment import load_request, new_requests
 from sites.place import SiteError, load_place, new_folder, write, write_identity

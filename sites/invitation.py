@@ -14,8 +14,8 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from inertial.one_at_a_time import alone
 from messages.contract.names import Name
-from sites.alone import alone
 from sites.authority import Authority, new_key, pem, private_pem, request_for
 from sites.place import Peer, Place, Seat, SiteError, load_list, load_place, save_list, save_place
 

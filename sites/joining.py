@@ -8,9 +8,9 @@ from pathlib import Path
 
 import zenoh
 
+from inertial.one_at_a_time import alone
 from messages.bus.session import BusSettings, open_router
 from messages.bus.tls import TRUSTED
-from sites.alone import alone
 from sites.authority import Authority, pem
 from sites.enrolment import JoinRequest, keep, load_request, new_requests
 from sites.invitation import Invitation

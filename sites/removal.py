@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from sites.alone import alone
+from inertial.one_at_a_time import alone
 from sites.authority import Authority
 from sites.invitation import load_book, save_book
 from sites.place import SiteError, load_place, save_place

@@ -14,10 +14,10 @@ from pathlib import Path
 import zenoh
 from cryptography import x509
 
+from inertial.one_at_a_time import alone
 from messages.bus.beating import Beating, tell_time
 from messages.bus.session import BusSettings, open_client
 from messages.bus.tls import TRUSTED
-from sites.alone import alone
 from sites.authority import DAYS
 from sites.copying.fetching import Copies
 from sites.copying.roads import Roads

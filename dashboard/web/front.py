@@ -120,7 +120,7 @@ def _by_token(request: Request) -> Asker:
     found = gate.tokens.find(secret.strip()) if scheme.lower() == "bearer" else None
     if found is None:
         try:
-            gate.backoff.attempt(address_of(request))
+            gate.backoff.attempt(address_of(request), "API token")
         except WaitError as wait:
             raise _wait(str(wait).replace("passwords", "tokens"), wait.seconds) from None
         gate.audit.refused("API token", "", address_of(request), request.url.path)

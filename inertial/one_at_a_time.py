@@ -1,9 +1,8 @@
-"""One after the other: the site's service, `gyrofree up` and commands change the same files.
-
-Each reads a book, adds to it and writes it as a whole; two at once would lose what one of them
-wrote, a revocation among it.
+"""One after the other: several processes read a file of a folder, change it and write it as a
+whole; two at once would lose what one of them wrote.
 """
 
+import errno
 import fcntl
 import os
 import threading
@@ -12,9 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from sites.place import SiteError
-
-PATIENCE_S = 30.0  # a renewal away from home asks over the bus, 10 s at most
+PATIENCE_S = 30.0
 LOOK_S = 0.02
 _held = threading.local()
 
@@ -22,8 +19,8 @@ _held = threading.local()
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
     """Nobody else is within this at the same folder, in no thread and no process; who is may enter
-    again. It goes with its process, however that ends. Raises SiteError when another does not
-    leave, OSError for a folder that is not there.
+    again. It goes with its process, however that ends. Raises TimeoutError when another does not
+    leave, other OSErrors for a folder that is not there.
     """
     mine: set[Path] = _held.__dict__.setdefault("folders", set())
     place = folder.resolve()
@@ -50,7 +47,6 @@ def _take(fd: int, folder: Path) -> None:
             return
         except BlockingIOError:
             if time.monotonic() > end:
-                raise SiteError(
-                    f"{folder}: another process changes it, and does not end: is one stopped?"
-                ) from None
+                why = f"{folder}: another process changes it, and does not end: is one stopped?"
+                raise TimeoutError(errno.ETIMEDOUT, why) from None
         time.sleep(LOOK_S)
