@@ -16,6 +16,7 @@ from pathlib import Path
 import zenoh
 from cryptography import x509
 
+from inertial.one_at_a_time import alone
 from messages.bus.beating import Beating, tell_time
 from messages.bus.session import BusSettings, open_client
 from messages.bus.tls import TRUSTED
@@ -156,8 +157,9 @@ def look(folder: Path, place: Place, ask: Callable[[bytes], bytes]) -> bool:
 
 def renew(folder: Path, role: str, ask: Callable[[bytes], bytes]) -> None:
     """Have the certificate of a role made anew; raises SiteError, OSError, ValueError."""
-    key, question = renewal(folder, role)
-    keep(folder, ask(question), {role: key}, (folder / TRUSTED).read_bytes())
+    with alone(folder):
+        key, question = renewal(folder, role)
+        keep(folder, ask(question), {role: key}, (folder / TRUSTED).read_bytes())
 
 
 def own_certificates(folder: Path) -> dict[str, dt.datetime]:
