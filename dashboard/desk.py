@@ -142,6 +142,8 @@ class Desk:
 
     def history(self, find: str = "", most: int = 200) -> tuple[list[pb.OrderGiven], str]:
         """Orders of all, the newest first; and why it is those of this page alone where it is."""
+        if self._watching:  # nor may it ask
+            return [], f"The site's orders are shown at its home, and not here: {self._watching}."
         ask = SEAT(action=SEAT.ACTION_LOOK, text=find[:200], most=most)
         try:
             reply = orders.give(self._session, self._prefix, orders.SEAT, ask)

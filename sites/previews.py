@@ -215,7 +215,7 @@ class Previews:
                     self._publishers[name, rate] = self._session.declare_publisher(
                         frame_key(self._site, name, rate),
                         congestion_control=zenoh.CongestionControl.DROP,
-                        priority=zenoh.Priority.INTERACTIVE_HIGH,
+                        priority=zenoh.Priority.INTERACTIVE_LOW,  # little waits: settings.py
                     )
         watched = {
             rate for (_, rate), one in self._publishers.items() if one.matching_status.matching

@@ -16,12 +16,13 @@ from pathlib import Path
 import zenoh
 from cryptography import x509
 
+from inertial.one_at_a_time import alone
 from messages.bus.beating import Beating, tell_time
 from messages.bus.session import BusSettings, open_client
 from messages.bus.tls import TRUSTED
 from messages.bus.turning import Loop
 from sites.authority import DAYS
-from sites.copying.fetching import Copies
+from sites.copying.fetching import INDEX, Copies
 from sites.copying.roads import Roads
 from sites.copying.serving import Serving
 from sites.enrolment import Registrar, keep, renewal
@@ -35,8 +36,9 @@ LOOK_S = 3600.0  # between two looks at the certificates
 AGAIN_S = 60.0  # after a renewal that did not succeed
 LEFT = dt.timedelta(days=DAYS / 3)  # of a certificate's life; less is renewed
 ASK_S = 10.0
+INDEX_S = 15.0  # for what there is: short, and asked again
 RENEW_S = 120.0  # that asking for a certificate of each role may take
-SEGMENT_S = 60.0  # for a segment over a slow link
+SEGMENT_S = 60.0  # for a part or a list of segments over a slow link
 WAKE_S = 1.0  # while nothing is to be done, that much is said so often
 HASH_S = 60.0  # that reading and hashing a file may take between two segments
 ROUND_S = 2.0  # between two looks at what home has recorded
@@ -97,7 +99,11 @@ def run(
 
 def copy(copies: Copies, site: str, session: zenoh.Session, stop: threading.Event) -> None:
     """Bring home's recordings here, round after round, until `stop`."""
-    roads = Roads(session, site, lambda key: asked(session, key, b"", SEGMENT_S))
+
+    def ask(key: str) -> bytes:
+        return asked(session, key, b"", INDEX_S if f"{SEGMENTS}{INDEX}/" in key else SEGMENT_S)
+
+    roads = Roads(session, site, ask)
     said = ""
     with Loop("copies", SEGMENT_S + HASH_S) as loop:
 
@@ -108,7 +114,7 @@ def copy(copies: Copies, site: str, session: zenoh.Session, stop: threading.Even
         while not stop.wait(ROUND_S):
             loop.turn()
             try:
-                copies.round(roads(), stopped)
+                copies.round(roads, stopped)
                 said = ""
             except (SiteError, OSError) as error:
                 if str(error) != said:
@@ -151,8 +157,9 @@ def look(folder: Path, place: Place, ask: Callable[[bytes], bytes]) -> bool:
 
 def renew(folder: Path, role: str, ask: Callable[[bytes], bytes]) -> None:
     """Have the certificate of a role made anew; raises SiteError, OSError, ValueError."""
-    key, question = renewal(folder, role)
-    keep(folder, ask(question), {role: key}, (folder / TRUSTED).read_bytes())
+    with alone(folder):
+        key, question = renewal(folder, role)
+        keep(folder, ask(question), {role: key}, (folder / TRUSTED).read_bytes())
 
 
 def own_certificates(folder: Path) -> dict[str, dt.datetime]:

@@ -98,8 +98,12 @@ def _known(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def people_said(people: dict[str, int]) -> str:
-    """ "1 operator and 2 viewers look"; that nobody does."""
+def people_said(people: dict[str, int], state: str = "") -> str:
+    """ "1 operator and 2 viewers look"; that nobody does. state: of the place; nobody knows who
+    looks at one that is out of reach.
+    """
+    if state == OUT_OF_REACH:
+        return "who looks is not known"
     if not people:
         return "nobody looks"
     parts = [f"{count} {role}{'s' * (count != 1)}" for role, count in sorted(people.items())]

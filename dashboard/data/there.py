@@ -67,6 +67,18 @@ def _wrong(one: Process, silent_s: float) -> str:
     )
 
 
+def gateway_out_of_reach(store: Store, device: str) -> bool:
+    """Is the place of a board out of reach? Call under the store's lock."""
+    gateway = store.presence.gateway_of(device)
+    return gateway is not None and store.presence.out_of_reach(gateway.place)
+
+
+def role_out_of_reach(store: Store, role: str) -> bool:
+    """Are all services of a role at places out of reach? Call under the store's lock."""
+    found = {one.place for one in store.presence.all() if one.role == role}
+    return bool(found) and all(store.presence.out_of_reach(place) for place in found)
+
+
 def twin_fault(store: Store, device: str) -> Iterator[Alarm]:
     """Of one board. Call under the store's lock."""
     who = store.presence.twins().get(device)

@@ -8,7 +8,7 @@ import socket
 import threading
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Protocol
 
 import viser
@@ -31,6 +31,12 @@ SELDOMEST_S = 1 / 10  # ... but none waits longer for a pose, however many there
 PANEL_S = 0.4  # period of charts and tables
 TURN_S = 0.5
 WAKE_S = 1.0  # while nobody looks, that much is said so often
+# Charts of many browsers are drawn by so many at a time, spread over so much of their period, lest
+# the poses of all wait behind the charts of all.
+TOGETHER = 5
+SPREAD = 0.6
+
+Seen = tuple[int, View]  # number of a browser, what it shows
 
 
 class SceneSettings(Protocol):
@@ -141,18 +147,34 @@ class SceneHandle:
                     views = list(self._views.items())
                 views = [(number, view) for number, view in views if view.pace.due(panels)]
                 begin()
-                with self._waking.once():
-                    for number, view in views:
-                        loop.turn()
-                        try:
-                            tick(view)
-                        except Exception:  # one browser's trouble must not stop the others'
-                            if number not in complained:
-                                log.exception("browser %d: update failed", number)
-                            complained.add(number)
+                for group, until_s in spread(views, SPREAD * period_s if panels else 0.0):
+                    with self._waking.once():
+                        for number, view in group:
+                            loop.turn()
+                            self._tick(tick, number, view, complained)
+                    self._stop.wait(max(0.0, began + until_s - time.monotonic()))
                 each_s = period_s if panels else min(len(views) / POSES_PER_S, SELDOMEST_S)
                 wanted_s = max(period_s, each_s) - (time.monotonic() - began)
                 self._stop.wait(max(wanted_s, period_s / 4))
+
+    @staticmethod
+    def _tick(tick: Callable[[View], None], number: int, view: View, complained: set[int]) -> None:
+        """One browser's trouble must not stop the others' picture."""
+        try:
+            tick(view)
+        except Exception:
+            if number not in complained:
+                log.exception("browser %d: update failed", number)
+            complained.add(number)
+
+
+def spread(views: list[Seen], over_s: float) -> Iterator[tuple[list[Seen], float]]:
+    """Groups of a round, each with the s since its beginning that the next one waits for; without a
+    time to spread over all are one group.
+    """
+    size = TOGETHER if over_s else max(1, len(views))
+    for first in range(0, len(views), size):
+        yield views[first : first + size], over_s * min(1.0, (first + size) / len(views))
 
 
 def start(

@@ -50,6 +50,7 @@ log = logging.getLogger(__name__)
 
 SESSIONS = 1024  # sign-ins at a time
 AGENT = 120  # characters kept of what a browser calls itself
+LINK = "one-time link"  # can be nobody's name
 PARALLEL = 2  # passwords verified at once: each takes 32 MiB and a core
 
 
@@ -106,27 +107,27 @@ class Gate:
 
     async def verified(self, name: str, password: str, address: str) -> User | None:
         """The user whose password this is; raises WaitError and UsersError."""
-        self.backoff.attempt(address)
+        self.backoff.attempt(address, name)
         async with self._verifying:
             user = await asyncio.to_thread(self.users.verify, name, password)
         if user is None:
             self.audit.refused("password", name, address, "wrong name or password")
             return None
-        self.backoff.forgive(address)
+        self.backoff.forgive(address, name)
         return user
 
     def redeem(self, token: str, address: str, agent: str = "") -> str | None:
         """A new session id for a one-time link, or None when it is used, expired or unknown; raises
         WaitError.
         """
-        self.backoff.attempt(address)
+        self.backoff.attempt(address, LINK)
         now = None if self._own else self._clock()
         name = redeem_link_token(self.settings.users, token, now)
         if name is None or self.users.get(name) is None:
             self.audit.refused("sign-in", "", address, "one-time link: used, expired or unknown")
             return None
-        self.backoff.forgive(address)
-        return self.begin(name, address, "one-time link", agent)
+        self.backoff.forgive(address, LINK)
+        return self.begin(name, address, LINK, agent)
 
     def session_of(self, connection: HTTPConnection) -> tuple[SignIn, User] | None:
         """Who sends this request or opens this WebSocket; None for nobody."""
@@ -265,7 +266,7 @@ def _by_a_person(connection: HTTPConnection) -> bool:
     if connection.scope["type"] != "http":
         return False
     asks = connection.scope["method"] in ("GET", "HEAD")
-    return not (asks and connection.url.path.startswith(("/api/", "/map/", "/metrics")))
+    return not (asks and connection.url.path.startswith(("/api/", "/map/", "/metrics", "/wall/")))
 
 
 def _elapsed() -> Callable[[], float]:

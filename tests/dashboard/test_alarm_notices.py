@@ -10,9 +10,9 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 from support.certificates import make_certificate
-from support.front_door import wait_for
 from support.mail_server import mail_server
 from support.stack import free_port
+from support.waiting import until
 
 from dashboard.alarms import notices
 from dashboard.alarms.notices import DeliveryError, Notice, Sender
@@ -92,12 +92,12 @@ def test_a_notice_waits_for_its_server_over_a_restart(hook, tmp_path, monkeypatc
     hook.status = 503
     sender = Sender(way, path)
     sender.offer(NOTICE)
-    wait_for(lambda: len(hook.got) >= 2, "a second attempt")
+    until(lambda: len(hook.got) >= 2, "a second attempt")
     assert sender.waiting == 1 and "503" in sender.fault
     sender.close()
     hook.status, before = 200, len(hook.got)
     again = Sender(way, path)
-    wait_for(lambda: again.sent == 1 and again.waiting == 0, "it was delivered")
+    until(lambda: again.sent == 1 and again.waiting == 0, "it was delivered")
     assert len(hook.got) == before + 1 and not again.fault
     again.close()
     last = Sender(way, path)
@@ -129,7 +129,7 @@ def test_an_office_tells_its_own_people_once_over_a_restart(hook, tmp_path):
     )
     with open_router(bus), open_client(bus) as session:
         with told(session, bus, "office", settings, tmp_path):
-            wait_for(lambda: hook.got, "the notice")
+            until(lambda: hook.got, "the notice")
         said = json.loads(hook.got[0][2])
         assert (said["id"], said["level"], said["site"]) == ("disk", "critical", "t")
         again = settings.model_copy(update={"disk_free_bytes": 1 << 61})

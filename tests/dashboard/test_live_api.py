@@ -10,7 +10,8 @@ from pathlib import Path
 
 import httpx
 import pytest
-from support.front_door import open_door, wait_for
+from support.front_door import open_door
+from support.waiting import until
 from typer.testing import CliRunner
 
 from dashboard.data.store import Store
@@ -274,7 +275,7 @@ def test_streams_are_limited_and_freed(door):
             with client.stream("GET", "/api/devices/cube/stream") as answer:
                 return answer.status_code == 200
 
-        wait_for(opens, "streams that ended make room")
+        until(opens, "streams that ended make room")
 
 
 def test_tokens_from_the_command_line(door, tmp_path):

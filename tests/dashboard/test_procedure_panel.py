@@ -5,7 +5,8 @@ import time
 
 import viser
 import zstandard
-from support.front_door import CAMERA, message, open_door, wait_for
+from support.front_door import CAMERA, message, open_door
+from support.waiting import until
 
 from dashboard.data.store import Store
 from dashboard.scene.panels import PAGES, Snapshot
@@ -110,7 +111,7 @@ class Browser:
         return next((uuid for uuid, one in known if one.props.get("label") == label), "")
 
     def press(self, label: str) -> None:
-        uuid = wait_for(lambda: self.has(label), f"a button {label}")
+        uuid = until(lambda: self.has(label), f"a button {label}")
         self._scene.send(message("GuiUpdateMessage", uuid=uuid, updates={"value": True}))
 
 
@@ -128,23 +129,23 @@ def test_a_test_that_moves_the_table_is_asked_for_once_more_in_the_browser(tmp_p
 
     with open_door(tmp_path) as door, door.client("otto") as client, door.scene(client) as scene:
         scene.send(message("ViewerCameraMessage", **CAMERA))
-        mine = wait_for(lambda: list(door.viser.get_clients().values()), "viser has a client")[-1]
+        mine = until(lambda: list(door.viser.get_clients().values()), "viser has a client")[-1]
         page, browser = ProcedurePanel(mine, mine.gui.add_folder("x")), Browser(scene)
         page.desk, page.user = Heard(), "otto"
         page.update(Snapshot(store, store.device("cube"), 0.0, 1.0, time.monotonic(), True))
         browser.press("Start test")
-        assert wait_for(lambda: browser.has(NO), "it asks") and not given
+        assert until(lambda: browser.has(NO), "it asks") and not given
         for said in ("published-30s", "Published &lt;test&gt;", "172 °/s", "stands by itself"):
             assert said in browser.text
         assert "begins to turn" in browser.text and "turntable" in browser.text
         browser.press(NO)
-        wait_for(lambda: not page._confirm.open, "it asks no more")
-        wait_for(lambda: not browser.has(NO), "and the window is gone")
+        until(lambda: not page._confirm.open, "it asks no more")
+        until(lambda: not browser.has(NO), "and the window is gone")
         assert not given
         page._unit.value = " SN-1 "
         browser.press("Start test")
         browser.press(YES)
-        wait_for(lambda: given, "the order")
+        until(lambda: given, "the order")
         assert given[0].action == pb.ProcedureCommand.ACTION_START and given[0].own_session
         assert (given[0].device, given[0].unit, given[0].user) == ("cube", "SN-1", "otto")
         assert given[0].procedure == "published-30s" and len(given) == 1

@@ -45,6 +45,7 @@ class Attempt:
     """One way to the provider and back, of one browser."""
 
     wanted: str  # page to go to
+    network: str = ""  # that it comes from
     state: str = field(default_factory=lambda: secrets.token_urlsafe(32))
     nonce: str = field(default_factory=lambda: secrets.token_urlsafe(32))
     verifier: str = field(default_factory=lambda: secrets.token_urlsafe(64))

@@ -73,7 +73,7 @@ def all_places(request: Request, who: SignedIn) -> PlacesOut:
         raise HTTPException(503, "this dashboard has no connection to the bus")
     with store.lock:
         found = [
-            PlaceOut(**one, people_said=people_said(one["people"]))
+            PlaceOut(**one, people_said=people_said(one["people"], one["state"]))
             for one in places(store.presence)
         ]
         return PlacesOut(sees=store.presence.sees, places=found, boards=_boards(store))

@@ -12,9 +12,8 @@ from pydantic import Field
 
 from dashboard.data.live import ESTIMATED, Live, live_aged
 from dashboard.data.store import Store
-from dashboard.web.front import Asker, asker, front_of
+from dashboard.web.front import Asker, asker, front_of, still_may
 from dashboard.web.schemas import AgedOut
-from dashboard.web.users import UsersError
 
 routes = APIRouter(prefix="/api/devices/{device}")
 
@@ -138,7 +137,7 @@ async def _events(
             now, rung = time.monotonic(), bell.rung
             if now - looked > RIGHTS_S or rung != seen:
                 looked, seen = now, rung
-                if not _still_may(request, who):
+                if not still_may(request, who):
                     yield 'event: end\ndata: {"why": "signed out, revoked or past its end"}\n\n'
                     return
             for topic in topics if now >= due else ():
@@ -157,17 +156,6 @@ async def _events(
         listeners[who.name] -= 1
         if not listeners[who.name]:
             del listeners[who.name]
-
-
-def _still_may(request: Request, who: Asker) -> bool:
-    gate = front_of(request).gate
-    try:
-        if who.token:
-            secret = request.headers["authorization"].partition(" ")[2].strip()
-            return gate.tokens.find(secret) is not None
-        return gate.session_of(request) is not None
-    except UsersError:
-        return False
 
 
 def _store(request: Request) -> Store:

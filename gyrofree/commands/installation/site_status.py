@@ -112,7 +112,7 @@ def _show(found: list[dict[str, Any]], as_json: bool) -> None:
     if not found:
         return say("nobody is there: does `gyrofree up` run?")
     for place in found:
-        say(f"{place['name']}: {place['state']}, {people_said(place['people'])}")
+        say(f"{place['name']}: {place['state']}, {people_said(place['people'], place['state'])}")
         table = Table("service", "state", "boards", "clock against the site's", box=None)
         for one in place["services"]:
             waits = ", ".join(one["waits"])

@@ -46,13 +46,15 @@ function service(one) {
   const more = one.state_said.slice(one.state.length);
   const boards = [one.devices.join(", ")];
   if (one.waits.length) boards.push(node("span", `waits: another gateway has ${one.waits.join(", ")}`, "dim"));
-  return [node("strong", one.role), state(one.state, more), when(one.since_s), boards, one.clock, one.certificate_ends_s ? when(one.certificate_ends_s).slice(0, 10) : ""];
+  return [node("strong", one.role), state(one.state, more), when(one.since_s), boards, one.state === "running" || one.clock_bound_s === null ? one.clock : node("span", `was ${one.clock}`, "dim"), one.certificate_ends_s ? when(one.certificate_ends_s).slice(0, 10) : ""];
 }
 
 function section(place) {
   const made = node("section"), title = node("h2", place.name);
   if (place.own) title.append(node("span", "this place", "tag"));
-  title.append(state(place.state), node("span", place.people_said, "dim"));
+  const off = place.services.filter((one) => one.state === place.state).length;
+  const part = ["frozen", "gone"].includes(place.state) && off < place.services.length; // a place is more than one of its services
+  title.append(part ? node("span", `${off} of ${place.services.length} services ${place.state}`, `alive ${KINDS[place.state]}`) : state(place.state), node("span", place.people_said, "dim"));
   const heads = ["Service", "State", "Since (UTC)", "Boards", "Clock against the site's", "Certificate until"];
   made.append(title, table(heads, place.services.map(service), "No service is there."));
   return made;
