@@ -12,6 +12,8 @@ import secrets
 import zlib
 from pathlib import Path
 
+from cryptography import x509
+from cryptography.exceptions import InvalidSignature
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from inertial.one_at_a_time import alone
@@ -70,7 +72,10 @@ def read_invitation(line: str) -> Invitation:
         packed = base64.urlsafe_b64decode(text[len(HEAD) :])
         plain = zlib.decompressobj().decompress(packed, LONGEST)
         invitation = Invitation.model_validate_json(plain)
-    except (ValueError, zlib.error, ValidationError):
+        trusted = x509.load_pem_x509_certificate(invitation.trusted.encode())
+        certificate = x509.load_pem_x509_certificate(invitation.certificate.encode())
+        certificate.verify_directly_issued_by(trusted)
+    except (ValueError, TypeError, zlib.error, ValidationError, InvalidSignature):
         raise SiteError(
             "the invitation is damaged: copy the whole line, or have another one printed"
         ) from None

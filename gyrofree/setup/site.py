@@ -5,13 +5,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from gyrofree.config import ConfigError, Settings
+from gyrofree.config import ConfigError, Settings, load
 from gyrofree.running.supervisor import Supervisor
 from gyrofree.running.watch import SERVICES
 from sites.access import rules_of
 from sites.authority import REGISTER
 from sites.enrolment import KNOWN, known_here
-from sites.place import PLACE, Place, SiteError, load_place
+from sites.place import PLACE, Place, SiteError, load_place, write
 from sites.service import own_certificates
 
 SERVICE = "site"  # the child that lets others join, and renews
@@ -81,6 +81,50 @@ def _place(folder: Path) -> Place:
         return load_place(folder)
     except SiteError as error:
         raise ConfigError(f"[bus] tls: {error}") from None
+
+
+def of_no_site(config: Path, folder: Path) -> None:
+    """An installation is of one site: it is not taken from one by the way. Raises ConfigError."""
+    tls = load(config).bus.tls if config.exists() else None
+    if tls is not None and tls.absolute() != folder.absolute():
+        raise ConfigError(
+            f"{config}: [bus] tls = {str(tls)!r}: this installation is of a site already; begin in"
+            " an empty folder, or take that line out"
+        )
+
+
+def unfinished(config: Path, folder: Path) -> Place | None:
+    """The place of a folder whose making was cut off before the configuration knew of it; raises
+    ConfigError, SiteError.
+    """
+    if not (folder / PLACE).exists() or (config.exists() and load(config).bus.tls is not None):
+        return None
+    return load_place(folder)
+
+
+def configure(config: Path, site: str, folder: Path, listen: str, port: int) -> None:
+    """Write the place into the configuration; everything else stays as it was. Where the router
+    listens to other machines the processes of this one have a door of their own, which no stranger
+    can crowd.
+    """
+    from gyrofree.setup.written import as_toml
+
+    near = f"tls/127.0.0.1:{port}"
+    open_to_others = not listen.startswith(("tls/127.", "tls/localhost:", "tls/[::1]:"))
+    if open_to_others:
+        near = f"tls/127.0.0.1:{port + 1 if port < 65535 else port - 1}"
+
+    settings = load(config) if config.exists() else Settings()
+    bus = settings.bus.model_copy(
+        update={
+            "prefix": site,
+            "router": near,
+            "listen": [near, listen] if open_to_others else [near],
+            "tls": folder,
+        }
+    )
+    text = as_toml(settings.model_copy(update={"bus": bus}), "Written by `gyrofree site`.")
+    write(config, text.encode(), 0o644)
 
 
 class Renewed:

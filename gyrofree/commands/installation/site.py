@@ -64,11 +64,15 @@ def site_init(
     config: File = DEFAULT_PATH,
 ) -> None:
     """Make a site whose home is here: its authority, certificates, and the configuration."""
+    from gyrofree.setup.site import configure, of_no_site, unfinished
     from sites.joining import make_site
 
     try:
-        place = make_site(folder, name, ("simulator",) if simulator else ())
-        _configure(config, place.site, folder, f"tls/127.0.0.1:{port}", port)
+        of_no_site(config, folder)
+        place = unfinished(config, folder)
+        if place is None or (place.site, place.at_home) != (name, True):
+            place = make_site(folder, name, ("simulator",) if simulator else ())
+        configure(config, place.site, folder, f"tls/127.0.0.1:{port}", port)
     except (SiteError, ConfigError, OSError) as error:
         raise fail(error, EXIT_CONFIG) from None
     if as_json:
@@ -122,6 +126,7 @@ def site_join(
     config: File = DEFAULT_PATH,
 ) -> None:
     """Join a site by an invitation: waits for its home to call, then writes the configuration."""
+    from gyrofree.setup.site import configure, of_no_site, unfinished
     from sites.invitation import read_invitation
     from sites.joining import join
 
@@ -130,11 +135,12 @@ def site_join(
         if not line.startswith("gyrofree-") and Path(line).is_file():
             line = Path(line).read_text(errors="replace")
         start_logging()
+        of_no_site(config, folder)
         endpoint, stop = _endpoint(listen), stop_on_signals()
-        place = join(
-            folder, read_invitation(line), endpoint, stop, lambda text: say(text, file=sys.stderr)
-        )
-        _configure(config, place.site, folder, endpoint, int(endpoint.rpartition(":")[2]))
+        invited, place = read_invitation(line), unfinished(config, folder)
+        if place is None or (place.site, place.place) != (invited.site, invited.place):
+            place = join(folder, invited, endpoint, stop, lambda text: say(text, file=sys.stderr))
+        configure(config, place.site, folder, endpoint, int(endpoint.rpartition(":")[2]))
     except (SiteError, ConfigError, OSError) as error:
         raise fail(error, EXIT_CONFIG) from None
     except zenoh.ZError as error:
@@ -278,25 +284,6 @@ def _endpoint(text: str) -> str:
     if not host or any(character in host for character in " /#?,\n") or not 0 < int(port) < 65536:
         raise typer.BadParameter(f"{text[:60]!r}: want HOST, or HOST:PORT")
     return f"tls/{host}:{port}"
-
-
-def _configure(config: Path, site: str, folder: Path, listen: str, port: int) -> None:
-    """Write the place into the configuration; everything else stays as it was."""
-    from gyrofree.config import load
-    from gyrofree.setup.written import as_toml
-    from sites.place import write
-
-    settings = load(config) if config.exists() else Settings()
-    bus = settings.bus.model_copy(
-        update={
-            "prefix": site,
-            "router": f"tls/127.0.0.1:{port}",
-            "listen": [listen],
-            "tls": folder,
-        }
-    )
-    text = as_toml(settings.model_copy(update={"bus": bus}), "Written by `gyrofree site`.")
-    write(config, text.encode(), 0o644)
 
 
 def _with_board(settings: Settings, name: str) -> Settings:
