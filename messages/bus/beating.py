@@ -16,7 +16,7 @@ from typing import Self
 import zenoh
 from google.protobuf.message import DecodeError
 
-from messages.bus import tls
+from messages.bus import deadline, tls
 from messages.bus.session import BusSettings, connected
 from messages.clock import elapsed_ns
 from messages.contract import gyrofree_pb2 as pb
@@ -115,6 +115,8 @@ class Beating:
         for role, count in sorted(self._viewers().items()):
             beat.viewers.add(role=role, count=count)
         beat.clock_ahead_s, beat.clock_bound_s = self.clock_ahead()
+        if (compared := self._offset.elapsed(elapsed_ns())) is not None:
+            deadline.heard(*compared)
         self._publisher.put(beat.SerializeToString())
 
     def clock_ahead(self) -> tuple[float, float]:
