@@ -79,10 +79,16 @@ def read_invitation(line: str) -> Invitation:
         raise SiteError(
             "the invitation is damaged: copy the whole line, or have another one printed"
         ) from None
-    if invitation.ends < dt.datetime.now(dt.UTC):
+    now = dt.datetime.now(dt.UTC)
+    if invitation.ends < now:
         raise SiteError(
-            f"the invitation ended {invitation.ends:%Y-%m-%d %H:%M UTC}: have another one printed"
-            " at the site's home"
+            f"the invitation ended {invitation.ends:%Y-%m-%d %H:%M UTC}, and this machine's clock"
+            f" says {now:%Y-%m-%d %H:%M UTC}: have another one printed at the site's home"
+        )
+    if now < certificate.not_valid_before_utc:  # no link to home would come about
+        raise SiteError(
+            f"the invitation begins {certificate.not_valid_before_utc:%Y-%m-%d %H:%M UTC}, and this"
+            f" machine's clock says {now:%Y-%m-%d %H:%M UTC}: set it right first"
         )
     return invitation
 
