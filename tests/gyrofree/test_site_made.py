@@ -11,9 +11,11 @@ from typer.testing import CliRunner
 from gyrofree.commands.main import app
 from gyrofree.config import load
 from sites.authority import Authority
+from sites.enrolment import is_whole
 from sites.invitation import invite
 from sites.joining import issue_here, make_site
 from sites.place import Place, save_place
+from sites.roles import SERVICES
 
 
 def run(*words: str):
@@ -60,3 +62,16 @@ def test_what_was_cut_off_before_the_configuration_is_ended(here: Path) -> None:
     assert made.exit_code == 0 and bus.tls == Path("office")
     # what comes from outside does not stand in one queue with its own processes
     assert bus.router == "tls/127.0.0.1:7448" and bus.listen == [bus.router, "tls/0.0.0.0:7447"]
+
+
+def test_a_certificate_that_is_damaged_or_gone_is_made_anew_at_home(here: Path) -> None:
+    assert run("init", "lab").exit_code == 0
+    folder = Path("var/site")
+    (folder / "estimator.pem").write_text("junk")
+    (folder / "gateway.key").write_bytes((folder / "router.key").read_bytes())
+    (folder / "recorder.pem").unlink()
+    shown = run("show")
+    assert shown.exit_code == 2 and "certs renew estimator" in shown.output
+    for words in (["estimator"], ["recorder"], []):
+        assert CliRunner().invoke(app, ["certs", "renew", *words]).exit_code == 0
+    assert all(is_whole(folder, role) for role in SERVICES)
