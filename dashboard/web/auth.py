@@ -12,7 +12,7 @@ import json
 import logging
 import secrets
 import threading
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import asdict, dataclass, field
 
 from starlette.requests import HTTPConnection
@@ -71,6 +71,10 @@ class SignIn:
     external: bool = False  # an identity provider vouched for him; no user of our file
 
 
+async def _no_farewell(_: str) -> str:
+    return ""
+
+
 class Gate:
     """All of sign-in behind four verbs: sign_in, redeem, session_of, sign_out."""
 
@@ -91,6 +95,8 @@ class Gate:
         self._lock = threading.Lock()
         self._sessions: dict[str, SignIn] = self._load()
         self._verifying = asyncio.Semaphore(PARALLEL)
+        # where an identity provider ends the sign-in of this key, too; empty: it does not
+        self.farewell: Callable[[str], Awaitable[str]] = _no_farewell
 
     async def sign_in(self, name: str, password: str, address: str, agent: str = "") -> str | None:
         """A new session id, or None for a wrong name or password; raises WaitError and
@@ -260,7 +266,7 @@ def _by_a_person(connection: HTTPConnection) -> bool:
     if connection.scope["type"] != "http":
         return False
     asks = connection.scope["method"] in ("GET", "HEAD")
-    return not (asks and connection.url.path.startswith(("/api/", "/map/", "/metrics")))
+    return not (asks and connection.url.path.startswith(("/api/", "/map/", "/metrics", "/wall/")))
 
 
 def _elapsed() -> Callable[[], float]:

@@ -7,7 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import httpx
 import pytest
-from support.front_door import PASSWORDS, Door, open_door, wait_for
+from support.front_door import PASSWORDS, Door, open_door
+from support.waiting import until
 
 from dashboard.web.accounts.audit import EACH, Audit
 from dashboard.web.accounts.provider import Attempt
@@ -96,7 +97,7 @@ def test_a_download_ends_with_the_sign_in(door: Door):
     script = 'mkdir -p "$2"; truncate -s 800M "$2/all.csv"'
     door.front.jobs = Jobs(["sh", "-c", script, "sh"])
     number = door.front.jobs.start("export", "a-session", [], "otto").number
-    wait_for(lambda: door.front.jobs.get(number).state == "done", "the files are there")
+    until(lambda: door.front.jobs.get(number).state == "done", "the files are there")
     with door.client("vera") as client, pytest.raises(httpx.RemoteProtocolError):
         with client.stream("GET", f"/api/jobs/{number}/download") as answer:
             assert answer.status_code == 200

@@ -18,6 +18,7 @@ from dashboard.web.pages import caller, give_cookie, own_path, render, set_cooki
 ATTEMPTS = 1000  # at a time; the oldest gives way
 ATTEMPTS_EACH = 50  # of one network: a flood of them pushes nobody else out
 LIFE_S = 600.0
+SIGN_INS = 1000  # of which the identity is kept, to end them at the provider, too
 
 
 def router(gate: Gate) -> APIRouter:
@@ -27,6 +28,13 @@ def router(gate: Gate) -> APIRouter:
         return routes
     provider, attempts = Provider(gate.settings), dict[str, Attempt]()
     cookie = gate.settings.cookie + "-attempt"
+    identities: dict[str, str] = {}  # by the key of a sign-in, for as long as this process runs
+
+    async def farewell(key: str) -> str:
+        token = identities.pop(key, "")
+        return await provider.farewell(token) if token else ""
+
+    gate.farewell = farewell
 
     @routes.get("/login/provider")
     async def go(
@@ -62,6 +70,9 @@ def router(gate: Gate) -> APIRouter:
         except ProviderError as fault:
             raise _no(gate, request, fault, 403) from None
         token = gate.begin(person.name, *_named(caller, request), role=person.role)
+        identities[_digest(token)] = person.token
+        while len(identities) > SIGN_INS:
+            identities.pop(next(iter(identities)))
         # a page, and not a redirect: what follows from a page of ours gets the strict cookie
         page = render(request, "entered.html", None, wanted=attempt.wanted)
         page.delete_cookie(cookie, path="/", secure=gate.settings.secure, httponly=True)

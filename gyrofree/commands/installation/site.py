@@ -64,7 +64,7 @@ def site_init(
     config: File = DEFAULT_PATH,
 ) -> None:
     """Make a site whose home is here: its authority, certificates, and the configuration."""
-    from gyrofree.setup.site import configure, of_no_site, unfinished
+    from gyrofree.setup.site import of_no_site, unfinished, write_place
     from sites.joining import make_site
 
     try:
@@ -72,7 +72,7 @@ def site_init(
         place = unfinished(config, folder)
         if place is None or (place.site, place.at_home) != (name, True):
             place = make_site(folder, name, ("simulator",) if simulator else ())
-        configure(config, place.site, folder, f"tls/127.0.0.1:{port}", port)
+        write_place(config, place.site, folder, f"tls/127.0.0.1:{port}", port)
     except (SiteError, ConfigError, OSError) as error:
         raise fail(error, EXIT_CONFIG) from None
     if as_json:
@@ -126,7 +126,7 @@ def site_join(
     config: File = DEFAULT_PATH,
 ) -> None:
     """Join a site by an invitation: waits for its home to call, then writes the configuration."""
-    from gyrofree.setup.site import configure, of_no_site, unfinished
+    from gyrofree.setup.site import of_no_site, unfinished, write_place
     from sites.invitation import read_invitation
     from sites.joining import join
 
@@ -140,7 +140,7 @@ def site_join(
         invited, place = read_invitation(line), unfinished(config, folder)
         if place is None or (place.site, place.place) != (invited.site, invited.place):
             place = join(folder, invited, endpoint, stop, lambda text: say(text, file=sys.stderr))
-        configure(config, place.site, folder, endpoint, int(endpoint.rpartition(":")[2]))
+        write_place(config, place.site, folder, endpoint, int(endpoint.rpartition(":")[2]))
     except (SiteError, ConfigError, OSError) as error:
         raise fail(error, EXIT_CONFIG) from None
     except zenoh.ZError as error:
@@ -253,12 +253,13 @@ def site_serve(config: Config = None, verbose: Verbose = False) -> None:
     folder = _folder(settings)
 
     def body(stop: threading.Event) -> None:
+        from gyrofree.setup.site import own_alarms
         from sites import service
 
         try:
-            sessions = Path(settings.recorder.root)
+            sessions, beside = Path(settings.recorder.root), own_alarms(settings)
             bus = settings.bus.acting_as("authority")
-            service.run(folder, sessions, bus, stop, settings.site)
+            service.run(folder, sessions, bus, stop, settings.site, beside)
         except SiteError as error:
             raise ConfigError(str(error)) from None
 
