@@ -150,7 +150,9 @@ def bench_alarms(store: Store, now: float | None = None) -> list[Alarm]:
 
 def bench_faults(store: Store, now: float | None = None) -> list[Alarm]:
     """As found here. Call under the store's lock."""
-    return [*_recorder(store, now), *service_faults(store)]
+    found = [*_recorder(store, now), *service_faults(store)]
+    known = {one.id for one in found}
+    return found + [one for one in store.own_faults if one.id not in known]
 
 
 def _recorder(store: Store, now: float | None) -> Iterator[Alarm]:

@@ -14,8 +14,9 @@ from playwright.sync_api import expect
 from support.browser import Rounds
 from support.browser import visit as opened
 from support.feeder import UTC0_NS, Feeder
-from support.front_door import open_door, wait_for
+from support.front_door import open_door
 from support.table_session import SESSION, table_recording, table_root
+from support.waiting import until
 
 from dashboard.data.store import Store
 from dashboard.desk import Desk
@@ -214,7 +215,7 @@ def test_no_width_clips_the_bars_or_the_summary(chromium, door, size):
         assert page.evaluate("document.documentElement.scrollWidth") <= SIZES[size][0]
         assert page.evaluate("document.documentElement.scrollHeight") <= SIZES[size][1]
         if size != "phone":  # there panels lie over the map
-            wait_for(lambda: page.locator("#map").bounding_box()["width"] > 360, "room for the map")
+            until(lambda: page.locator("#map").bounding_box()["width"] > 360, "room for the map")
         for part in ("#pause", "#window", "#note", "#mark", "#record"):
             box = page.locator(part).bounding_box()
             assert 0 <= box["x"] and box["x"] + box["width"] <= SIZES[size][0], part
@@ -380,12 +381,12 @@ def test_a_zoom_stays_while_data_come_in_until_one_follows_again(chromium, door)
             ends = abs(low - (a - utc0)) < near and abs(high - (b - utc0)) < near
             return ends and (low, high) == (x[0], x[-1])
 
-        wait_for(is_zoomed, "the stretch")
+        until(is_zoomed, "the stretch")
         before, newest = scene.evaluate(CHARTS), device.t_newest
-        wait_for(lambda: device.t_newest > newest + 2.0, "new data")
+        until(lambda: device.t_newest > newest + 2.0, "new data")
         page.wait_for_timeout(1500)  # three more updates of the charts
         assert scene.evaluate(CHARTS) == before
         page.locator("#zoomed button").click()
         expect(page.locator("#zoomed")).to_be_hidden()
-        wait_for(lambda: scene.evaluate(CHARTS)[0][1] > newest + 1.0, "the newest data")
+        until(lambda: scene.evaluate(CHARTS)[0][1] > newest + 1.0, "the newest data")
         assert not said

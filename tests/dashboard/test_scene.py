@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import viser
 from support.feeder import UTC0_NS, Feeder, cube_attitude
+from support.waiting import until
 
 from dashboard.data.feed import Feed
 from dashboard.data.pose import ned_from_geodetic
@@ -82,13 +83,6 @@ def bus(free_port) -> BusSettings:
 def nobody() -> Desk:
     """A desk without a router."""
     return Desk(None, "gyrofree")
-
-
-def wait_for(condition, seconds: float = 30.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "did not come about in time"
-        time.sleep(0.02)
 
 
 # --- ring and decimation
@@ -483,13 +477,11 @@ def test_feed_takes_messages_from_the_bus(bus, store):
             assert desk.connected
             feeder = Feeder(Publishers(session, bus.prefix))
             feeder.cube(0.0)
-            wait_for(
-                lambda: not feeder.cube(feeder._k * 0.01) and store.device("cube-01") is not None
-            )
+            until(lambda: not feeder.cube(feeder._k * 0.01) and store.device("cube-01") is not None)
             for topic, estimator in (("accel", ""), ("truth", ""), ("rate", "least-squares")):
-                wait_for(lambda key=(topic, estimator): key in store.device("cube-01").latest)
+                until(lambda key=(topic, estimator): key in store.device("cube-01").latest)
             feeder.recorder(1.0)
-            wait_for(lambda: store.recorder is not None)
+            until(lambda: store.recorder is not None)
             with pytest.raises(OrderError, match="gyrofree record"):
                 desk.recorder(pb.RecorderCommand(), timeout_s=0.5)
         finally:
@@ -576,7 +568,7 @@ def test_browser_shows_the_cube_as_the_truth_has_it(store, nobody, chromium):
             ]
             return min(dots) > 0.99999
 
-        wait_for(near, 60.0)
+        until(near, "the attitudes of the store")
         assert page.get_by_text("SIMULATED").first.is_visible()
         assert not errors, json.dumps(errors)
         page.close()

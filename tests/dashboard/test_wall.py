@@ -9,7 +9,8 @@ import time
 import httpx
 import pytest
 from playwright.sync_api import expect
-from support.front_door import open_door, wait_for
+from support.front_door import open_door
+from support.waiting import until
 
 from dashboard.data.store import Store
 from dashboard.web.wall import routes
@@ -222,7 +223,7 @@ def test_nothing_grows_on_a_wall_and_it_comes_back_by_itself(tmp_path, chromium,
 
         def driven(number):
             end = page.evaluate("window.count") + number
-            wait_for(lambda: page.evaluate("window.count") >= end, "updates", 60)
+            until(lambda: page.evaluate("window.count") >= end, "updates", 60)
             return measured()
 
         driven(500)

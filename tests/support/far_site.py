@@ -18,9 +18,11 @@ from support.far_link import FarLink, Line, Place, far_link
 
 GYROFREE = [sys.executable, "-P", "-m", "gyrofree"]
 ROOT = Path(__file__).resolve().parents[2]
+PATHS = os.pathsep.join((str(ROOT), str(ROOT / "tests")))
 SITE, DEVICE = "lab", "cube"
 START_S = 90.0  # for everything to run and the first picture to come; a busy machine takes its time
 STOP_S = 20.0
+PROFILE = ("--profile", "wobble")
 BOARD = f"""
 [[gateway.devices]]
 name = "{DEVICE}"
@@ -59,6 +61,14 @@ class FarSite:
         )
         return done.stdout
 
+    def order(self, *words: str) -> None:
+        """To the lab's recorder: "start", NAME or "stop" (far_order.py)."""
+        self.link.a.run(
+            [sys.executable, "-P", "-m", "support.far_order", SITE, *words],
+            cwd=self.lab,
+            env=os.environ | {"PYTHONPATH": PATHS},
+        )
+
     def close(self) -> None:
         """End all that was begun, the last first."""
         for process in reversed(self.processes):
@@ -81,13 +91,14 @@ def far_site(
     services: tuple[tuple[str, ...], ...] = (("up",),),
     congestion: str = "cubic",
     syn_retries: int = 0,
+    lab: tuple[str, ...] = ("up",),
+    board: tuple[str, ...] = (),
 ) -> Iterator[FarSite]:
-    """Made and joined as docs/sites.md says, with `gyrofree up` at the lab and `services` at the
-    office. congestion: how TCP takes losses; CUBIC is what most machines have.
-    syn_retries: of TCP's first packet; 0: as the machine has it.
+    """Made and joined as docs/sites.md says, with `lab` at the lab and `services` at the office.
 
-    settings, office: further lines of the gyrofree.toml of the lab and of the office. Raises
-    NoNamespaces.
+    congestion: how TCP takes losses; CUBIC is what most machines have. syn_retries: of TCP's first
+    packet; 0: as the machine has it. board: further words of `gyrofree simulate`. settings, office:
+    further lines of the gyrofree.toml of the lab and of the office. Raises NoNamespaces.
     """
     with far_link(Line()) as link:
         made = FarSite(link, folder / "lab", folder / "office", [])
@@ -102,8 +113,8 @@ def far_site(
             _append(made.lab, BOARD + settings)
             _append(made.office, office)
             link.line = line
-            made.begin(link.a, made.lab, "simulate", "--link", "board", "--profile", "wobble")
-            made.begin(link.a, made.lab, "up")
+            made.begin(link.a, made.lab, "simulate", "--link", "board", *PROFILE, *board)
+            made.begin(link.a, made.lab, *lab)
             for words in services:
                 made.begin(link.b, made.office, *words)
             yield made
@@ -133,11 +144,10 @@ class Watcher:
     """What an office's page has of the board (far_watch.py), as it comes."""
 
     def __init__(self, site: FarSite, live: str = "auto") -> None:
-        path = os.pathsep.join((str(ROOT), str(ROOT / "tests")))
         self._process = site.link.b.popen(
             [sys.executable, "-P", "-m", "support.far_watch", SITE, DEVICE, live],
             cwd=site.office,
-            env=os.environ | {"PYTHONPATH": path},
+            env=os.environ | {"PYTHONPATH": PATHS},
             stdout=subprocess.PIPE,
             text=True,
             start_new_session=True,

@@ -107,14 +107,14 @@ def enter(request: Request, body: Token) -> JSONResponse:
     """Keep the token as a cookie; HTTP 403 for one that is none."""
     front = front_of(request)
     try:
-        front.gate.backoff.attempt(address_of(request))
+        front.gate.backoff.attempt(address_of(request), "wall display")
     except WaitError as wait:
         raise HTTPException(429, str(wait), {"retry-after": str(round(wait.seconds) + 1)}) from None
     found = front.gate.tokens.find(body.token, WALL)
     if found is None:
         front.gate.audit.refused("wall display", "", address_of(request), "unknown or revoked")
         raise HTTPException(403, "this link is unknown, revoked or past its end")
-    front.gate.backoff.forgive(address_of(request))
+    front.gate.backoff.forgive(address_of(request), "wall display")
     token, user = found
     front.gate.audit.done("wall display", user.name, address_of(request), token.name)
     answer = JSONResponse({"display": token.name})
