@@ -20,7 +20,7 @@ from dashboard.alarms.settings import AlarmSettings, HealthSettings
 from dashboard.alarms.watch import Watch
 from dashboard.data.alarms import alarms, bench_alarms
 from dashboard.data.lateness import behind, clock, lateness
-from dashboard.data.places import places
+from dashboard.data.places import people_said, places
 from dashboard.data.store import Store
 from messages.bus.beating import BEAT_S
 from messages.bus.presence import AGAIN_S, LOOK_S, SETTLE_S
@@ -227,6 +227,31 @@ def test_a_place_of_which_nothing_is_heard_is_one_alarm_and_not_one_for_each_ser
         for role in ("dashboard", "router"):
             bench.beats("office", role)
     assert list(bench.found()) == ["place-lab"]
+
+
+def test_who_is_silent_at_a_place_out_of_reach_is_not_blamed_for_it(bench):
+    """The gateway, its estimators and the recorder are silent as the link is cut."""
+    everybody(bench)
+    bench.beats("lab", "recorder")
+    bench.sample()
+    store = bench.store
+    for topic, estimator in ((tp.LINK, ""), (tp.ESTIMATOR, "products-ekf")):
+        store.put(topic, "cube", estimator, topic.type(header=pb.Header(utc_ns=int(WALL_S * 1e9))))
+    recording = pb.RecorderStatus(recording=True)
+    store.put(tp.STATUS, "recorder", "", recording)
+    for latest in (*store.devices["cube"].latest.values(), store.recorder):
+        latest.arrived -= 30.0
+    silent = {"link", "estimator-products-ekf"}
+    assert {one.id for one in alarms(store, store.devices["cube"])} == silent
+    assert "recorder" in {one.id for one in bench_alarms(store)}
+    for _ in range(20):
+        bench.passes(0.5)
+        for role in ("dashboard", "router"):
+            bench.beats("office", role)
+    assert not alarms(store, store.devices["cube"])
+    assert [one.id for one in bench_alarms(store)] == ["place-lab"]
+    (lab,) = [one for one in places(store.presence) if one["name"] == "lab"]
+    assert people_said(lab["people"], lab["state"]) == "who looks is not known"
 
 
 def test_two_gateways_of_one_board_are_an_alarm_of_that_board(bench):
