@@ -1,9 +1,11 @@
-"""Connections of this process to other machines are given up when nothing is acknowledged for a
-while. TCP tries again after twice the time each time: after a cut of 30 s it would be silent for
-another 30. Zenoh has no setting for that, so it is made on the sockets of the process.
+"""Connections to other machines are given up when nothing is acknowledged for a while. TCP tries
+again after twice the time each time: after a cut of 30 s it would be silent for another 30. Zenoh
+has no setting for that, so it is made on the sockets of the process; on those of a child (Zenoh's
+own router) through a copy of each descriptor, which Linux gives a parent.
 """
 
 import contextlib
+import ctypes
 import ipaddress
 import os
 import socket
@@ -12,29 +14,46 @@ from pathlib import Path
 
 GIVEN_UP_MS = 4_000
 LOOK_S = 0.5
+PIDFD_GETFD = 438  # linux/unistd.h, the same on every machine
 
 
-def watch(stop: threading.Event) -> threading.Thread:
-    """Look after the sockets of this process until `stop`."""
-    thread = threading.Thread(target=_run, args=(stop,), name="timeouts", daemon=True)
+def watch(stop: threading.Event, child: int = 0) -> threading.Thread:
+    """Look after the sockets of this process, or of a child by its number, until `stop`."""
+    thread = threading.Thread(target=_run, args=(stop, child), name="timeouts", daemon=True)
     thread.start()
     return thread
 
 
-def _run(stop: threading.Event) -> None:
+def _run(stop: threading.Event, child: int) -> None:
     while not stop.wait(LOOK_S):
-        look()
+        look(child)
 
 
-def look() -> None:
+def look(child: int = 0) -> None:
     """Once: every TCP socket, those that are still connecting too."""
-    for entry in Path("/proc/self/fd").iterdir():
-        with contextlib.suppress(OSError, ValueError):
-            if not os.readlink(entry).startswith("socket:"):
-                continue
-            with socket.socket(fileno=os.dup(int(entry.name))) as one:
-                if one.family in (socket.AF_INET, socket.AF_INET6) and not _here(one):
-                    one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, GIVEN_UP_MS)
+    with contextlib.ExitStack() as stack, contextlib.suppress(OSError):
+        pidfd = -1
+        if child:
+            pidfd = os.pidfd_open(child)  # raises where it has ended
+            stack.callback(os.close, pidfd)
+        for entry in Path(f"/proc/{child or 'self'}/fd").iterdir():
+            with contextlib.suppress(OSError, ValueError):
+                if not os.readlink(entry).startswith("socket:"):
+                    continue
+                with socket.socket(fileno=_copy(pidfd, int(entry.name))) as one:
+                    if one.family in (socket.AF_INET, socket.AF_INET6) and not _here(one):
+                        one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, GIVEN_UP_MS)
+
+
+def _copy(pidfd: int, descriptor: int) -> int:
+    """A descriptor of ours for the same socket; raises OSError."""
+    if pidfd < 0:
+        return os.dup(descriptor)
+    libc = ctypes.CDLL(None, use_errno=True)
+    copy = libc.syscall(PIDFD_GETFD, pidfd, descriptor, 0)
+    if copy < 0:
+        raise OSError(ctypes.get_errno(), "pidfd_getfd")
+    return copy
 
 
 def _here(one: socket.socket) -> bool:

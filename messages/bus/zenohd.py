@@ -116,6 +116,11 @@ class Zenohd:
                 if self._stop.is_set():
                     raise
 
+    @property
+    def pid(self) -> int:
+        """Of the program."""
+        return self._process.pid
+
     def wait(self) -> None:
         """Until `stop`; raises BusUnavailable where the program ends before."""
         while not self._stop.wait(LOOK_S):

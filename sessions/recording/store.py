@@ -35,6 +35,13 @@ from sessions.recording.settings import RecorderSettings
 
 log = logging.getLogger(__name__)
 
+
+class AnotherDisk(OSError):
+    """What is written to is not what stands in the session's folder any more: the disk was mounted
+    anew under it.
+    """
+
+
 LATEST_NS = (1 << 63) - 1
 MANIFEST_EVERY_S = 5.0  # counts in session.json of an open session are at most this old
 
@@ -165,18 +172,30 @@ class SessionStore:
 
     def flush(self) -> None:
         """Close the running chunk and hand it to the operating system; a refusal is kept in
-        `error`.
+        `error`. Raises AnotherDisk where writing again would never help.
         """
         self._log.close_chunk()
         try:
             self._log.push()
         except OSError as error:
             self._fail("writing", error)
+            self._look_for_another()
             return
         self._pushed = self._accepted
         self._news.set()
         self.manifest.bytes = self._log.size
         self._write_error = ""
+
+    def _look_for_another(self) -> None:
+        """A file system that failed takes nothing from who had its files open, for ever; once it is
+        mounted again the same file is another one.
+        """
+        try:
+            there, ours = os.stat(self.folder / RECORDING), os.fstat(self._fd)
+        except OSError:  # not mounted again yet
+            return
+        if (there.st_dev, there.st_ino) != (ours.st_dev, ours.st_ino):
+            raise AnotherDisk(f"{self.folder}: its disk was mounted anew: beginning anew")
 
     def _fail(self, what: str, error: OSError) -> None:
         text = (

@@ -7,14 +7,18 @@ from faults.of_processes import PROCESSES
 from faults.of_sites import SITES
 from faults.of_the_bus import BUS
 from faults.of_the_line import LINE
+from faults.of_the_link import LINK
+from faults.of_the_machine import MACHINE
 from faults.scenario import Scenario
 
 SCENARIOS: dict[str, tuple[Scenario, ...]] = {
     "The line and the board": LINE,
     "Processes": PROCESSES,
     "Disks and the clock": DISKS,
+    "Memory, files and journals": MACHINE,
     "The bus": BUS,
     "Certificates": SITES,
+    "The link between two places": LINK,
 }
 
 

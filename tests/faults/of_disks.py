@@ -3,11 +3,12 @@
 import time
 
 from faults.bench import Bench
-from faults.disk import Disk
-from faults.scenario import Alarmed, Scenario, Status
+from faults.disk import Device, Disk
+from faults.scenario import Alarmed, Line, Scenario, Status
 
 FULL_S = 3.0
 SLOW_S = 2.0  # of each fsync
+HANG_S = 4.0
 HOUR_S = 3600.0
 STEP_S = 2.5  # that a clock is left as it was set
 
@@ -22,6 +23,20 @@ def full(disk: Disk) -> None:
     disk.fill()
     time.sleep(FULL_S)
     disk.free()
+
+
+def read_only(disk: Device) -> None:
+    """The kernel finds an error on it; a person unmounts, checks and mounts it again."""
+    disk.fail()
+    time.sleep(FULL_S)
+    disk.replace()
+
+
+def hangs(disk: Device) -> None:
+    """Who writes on it waits."""
+    disk.hang(True)
+    time.sleep(HANG_S)
+    disk.hang(False)
 
 
 def slow(bench: Bench) -> None:
@@ -42,6 +57,9 @@ def steps(state) -> bool:
     return state.clock_steps > 0
 
 
+READ_ONLY = Status(
+    "`message` of the recorder", "states", lambda state: "Read-only" in state.message
+)
 DISKS = (
     Scenario(
         "disk of the recordings full",
@@ -70,6 +88,32 @@ DISKS = (
             Alarmed("recorder"),
             Status("`message` of the recorder", "states", lambda state: "slow" in state.message),
         ),
+    ),
+    Scenario(
+        "disk of the recordings read-only",
+        f"the kernel finds an error on it; unmounted, checked and mounted again after {FULL_S:g} s",
+        lambda bench: read_only(bench.sessions),
+        said=(Alarmed("recorder"), READ_ONLY, Line("its disk was mounted anew: beginning anew")),
+        on="device",
+    ),
+    Scenario(
+        "disk of the journals read-only",
+        f"the kernel finds an error on it; unmounted, checked and mounted again after {FULL_S:g} s",
+        lambda bench: read_only(bench.journals),
+        said=(Alarmed("link-said"), Line("data are shown but NOT KEPT"), Line("writable again")),
+        on="device",
+    ),
+    Scenario(
+        "disk of the recordings hangs",
+        f"who writes waits, for {HANG_S:g} s",
+        lambda bench: hangs(bench.sessions),
+        on="device",
+    ),
+    Scenario(
+        "disk of the journals hangs",
+        f"who writes waits, for {HANG_S:g} s",
+        lambda bench: hangs(bench.journals),
+        on="device",
     ),
     Scenario(
         "clock set back by an hour",

@@ -81,18 +81,20 @@ def far_site(
     services: tuple[tuple[str, ...], ...] = (("up",),),
     congestion: str = "cubic",
     syn_retries: int = 0,
+    board: bool = True,
 ) -> Iterator[FarSite]:
     """Made and joined as docs/sites.md says, with `gyrofree up` at the lab and `services` at the
     office. congestion: how TCP takes losses; CUBIC is what most machines have.
-    syn_retries: of TCP's first packet; 0: as the machine has it.
+    syn_retries: of TCP's first packet; 0: as the machine has it. board: a simulated one is begun,
+    too; else the lab's port is `board` in its folder.
 
     settings, office: further lines of the gyrofree.toml of the lab and of the office. Raises
     NoNamespaces.
     """
     with far_link(Line()) as link:
         made = FarSite(link, folder / "lab", folder / "office", [])
-        made.lab.mkdir(parents=True)
-        made.office.mkdir(parents=True)
+        made.lab.mkdir(parents=True, exist_ok=True)
+        made.office.mkdir(parents=True, exist_ok=True)
         for place in (link.a, link.b):
             place.congestion(congestion)
             if syn_retries:
@@ -102,7 +104,8 @@ def far_site(
             _append(made.lab, BOARD + settings)
             _append(made.office, office)
             link.line = line
-            made.begin(link.a, made.lab, "simulate", "--link", "board", "--profile", "wobble")
+            if board:
+                made.begin(link.a, made.lab, "simulate", "--link", "board", "--profile", "wobble")
             made.begin(link.a, made.lab, "up")
             for words in services:
                 made.begin(link.b, made.office, *words)
