@@ -12,6 +12,8 @@ from faults.disk import Disk
 
 PATIENCE_S = 180.0  # a busy machine; nothing is judged by it
 LOOK_S = 0.05
+# what the estimator says when it publishes fewer estimates than there are samples, and when all
+THINNED, AS_SET = "too slow for all", "estimates are published as set"
 
 
 class NotWell(AssertionError):
@@ -65,6 +67,14 @@ class Ground:
     def said(self, pattern: str, since: int) -> bool:
         """Does the log have such a line behind the character `since`?"""
         return re.search(pattern, self.text()[since:]) is not None
+
+    def thinned(self, since: int) -> bool:
+        """Has the estimator said, for the time behind the character `since`, that its machine was
+        too slow for all estimates?
+        """
+        before = self.text()[:since]
+        slow = before.rfind(THINNED) > before.rfind(AS_SET)
+        return slow or self.said(THINNED, since)
 
     def well(self, since_ns: int = 0) -> bool:
         """Is everything there? since_ns: monotonic; nothing older counts."""

@@ -4,7 +4,7 @@ import time
 
 from faults.bench import Bench
 from faults.disk import Device, Disk
-from faults.scenario import Alarmed, Line, Scenario, Status
+from faults.scenario import Alarmed, Line, Loss, Scenario, Status
 
 FULL_S = 3.0
 SLOW_S = 2.0  # of each fsync
@@ -113,6 +113,8 @@ DISKS = (
         "disk of the journals hangs",
         f"who writes waits, for {HANG_S:g} s",
         lambda bench: hangs(bench.journals),
+        Loss("what the line's buffer does not hold meanwhile", (0, 300), complete=None),
+        (Alarmed("link"), Status("`stops` of the link", "links", lambda link: link.stops > 0)),
         on="device",
     ),
     Scenario(

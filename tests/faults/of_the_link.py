@@ -97,7 +97,7 @@ LINK = (
         "link between the places cut for 10 s",
         "nothing passes in either way",
         lambda bench: cut(bench, CUT_S),
-        said=(OUT_OF_REACH,),
+        said=(OUT_OF_REACH, SILENT),
         on="far",
     ),
     Scenario(
@@ -138,18 +138,23 @@ LINK = (
         said=(Line("router ended by signal SIGKILL: starting it again"),),
         on="far",
     ),
-    copying("link cut during a copy", "nothing passes for 10 s", lambda bench: cut(bench, CUT_S)),
+    copying(
+        "link cut during a copy",
+        f"nothing passes for {CUT_S:g} s",
+        lambda bench: cut(bench, CUT_S),
+        said=(OUT_OF_REACH, SILENT),
+    ),
     copying(
         "who serves copies killed",
         "`kill -9` of the lab's `site serve`",
         lambda bench: bench.kill("lab", "site"),
-        said=(RESTARTED,),
+        said=(RESTARTED, Alarmed("service-lab-authority")),
     ),
     copying(
         "who copies killed",
         "`kill -9` of the office's `site serve`",
         lambda bench: bench.kill("office", "site"),
-        said=(RESTARTED,),
+        said=(RESTARTED, Alarmed("service-office-authority")),
     ),
     copying(
         "half a copy spoilt",
