@@ -7,6 +7,7 @@ office, and the page's own feed (tests/support/far_watch.py); two network namesp
 link between them. Both places have this machine's clock, so ages are true.
 
 Usage: python tests/bench/bench_far.py [--json] [--congestion cubic|bbr] [--syn-retries 2]
+       [--zenohd PROGRAM, which routes at both places in place of our router]
        [--cuts 5,30,120] [--rate 1e6] [--delay 0.1] [--loss 0.05] [--seconds 60] [--copy 9000000]
 """
 
@@ -42,6 +43,7 @@ def main() -> None:
             services=SERVICES,
             congestion=arguments.congestion,
             syn_retries=arguments.syn_retries,
+            zenohd=arguments.zenohd,
         ) as site:
             watcher = Watcher(site)
             found = {"first_picture_s": until(lambda: watcher.lines, PATIENCE_S, "a picture")}
@@ -53,6 +55,7 @@ def main() -> None:
                 found |= copied(site, watcher, arguments.copy)
             found["counted_as_lost"] = watcher.lines[-1]["lost"]
     about = {"bench": "far", "congestion": arguments.congestion, "rate": line.rate}
+    about |= {"router": "zenohd" if arguments.zenohd else "gyrofree"}
     about |= {"delay_s": line.delay_s, "loss": line.loss}
     if arguments.json:
         print(json.dumps(about | found))
@@ -70,6 +73,7 @@ def parsed() -> argparse.Namespace:
         "--cuts", default="5,30,120", type=lambda s: [float(x) for x in s.split(",")]
     )
     parser.add_argument("--syn-retries", type=int, default=2)
+    parser.add_argument("--zenohd", type=Path)
     parser.add_argument("--rate", type=float, default=1e6)
     parser.add_argument("--delay", type=float, default=0.1)
     parser.add_argument("--loss", type=float, default=0.05)

@@ -153,6 +153,13 @@ class Bench(Ground):
         self.ended, self._up = self._up.returncode, None
         return time.monotonic() - began
 
+    def kill_all(self) -> None:
+        """kill -9 of everything at once."""
+        for process in [psutil.Process(self._up.pid), *sum(self._all().values(), [])]:
+            process.kill()
+        self._up.wait()
+        self.stop_router()
+
     def start_router(self) -> None:
         """In a process of its own."""
         self._router = self._start("router", log=self.folder / "router.log")
@@ -164,10 +171,10 @@ class Bench(Ground):
             self._router.wait()
             self._router = None
 
-    def _start(self, *words: str, log: Path) -> subprocess.Popen:
+    def _start(self, *words: str, log: Path, config: Path | None = None) -> subprocess.Popen:
         with log.open("ab") as stream:
             return subprocess.Popen(
-                command(*words, "--config", str(self.config)),
+                command(*words, "--config", str(config or self.config)),
                 stdin=subprocess.DEVNULL,
                 stdout=stream,
                 stderr=stream,
@@ -176,9 +183,15 @@ class Bench(Ground):
             )
 
     @contextlib.contextmanager
-    def another(self, service: str) -> Iterator[subprocess.Popen]:
-        """A second process of a service, from the same configuration."""
-        process = self._start(service, log=self.log)
+    def another(self, service: str, **changed: object) -> Iterator[subprocess.Popen]:
+        """A second process of a service; changed: texts of the configuration and what stands there
+        for it.
+        """
+        text, config = self.config.read_text(), self.config.with_name("another.toml")
+        for old, new in changed.items():
+            text = text.replace(f"{self.folder}/{old}", f"{self.folder}/{new}")
+        config.write_text(text)
+        process = self._start(service, log=self.log, config=config)
         try:
             yield process
         finally:

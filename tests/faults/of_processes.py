@@ -56,9 +56,10 @@ def guardian_killed(bench: Bench) -> None:
     bench.until(lambda: bench.watch.newest("link").header.run != run, "another gateway")
 
 
-def up_killed(bench: Bench) -> None:
-    """Everything but the router ends, and is started anew."""
-    bench.stop_up(signal.SIGKILL)
+def all_killed(bench: Bench) -> None:
+    """Everything at once, as without power, and all is started again."""
+    bench.kill_all()
+    bench.start_router()
     bench.start_up()
 
 
@@ -88,6 +89,13 @@ PROCESSES = (
             Line("the process that guards this one is gone: handing over"),
             Certified("`dark_s` of the certificate, where samples are missing", dark),
         ),
+    ),
+    Scenario(
+        "everything killed",
+        "`kill -9` of all processes at once, guardian and router too, and all is started again",
+        all_killed,
+        Loss("what the board says until its port is open again", (0, 6000), complete=None),
+        (Line("recovered"), Line("going on where")),
     ),
     frozen(
         "gateway",

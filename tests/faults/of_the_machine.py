@@ -11,6 +11,7 @@ from pathlib import Path
 import psutil
 
 from faults.bench import SERVICES, Bench
+from faults.board import Board
 from faults.scenario import Alarmed, Line, Scenario
 
 GROUPS = Path("/sys/fs/cgroup")
@@ -86,9 +87,20 @@ def spoilt_tail(bench: Bench) -> None:
 
 
 def second_gateway(bench: Bench) -> None:
-    """Another one with the same board, for a while."""
+    """Another one with the same configuration, for a while."""
     with bench.another("gateway"):
         time.sleep(TWINS_S)
+
+
+def second_board(bench: Bench) -> None:
+    """Another gateway with another board of the same name, for a while."""
+    board = Board(bench.folder / "board2")
+    board.boot()
+    try:
+        with bench.another("gateway", board="board2", journals="journals2"):
+            time.sleep(TWINS_S)
+    finally:
+        board.close()
 
 
 MACHINE = (
@@ -121,6 +133,12 @@ MACHINE = (
         "second gateway of the same board",
         f"`gyrofree gateway` with the same configuration runs beside the first for {TWINS_S:g} s",
         second_gateway,
-        said=(Alarmed("twin"),),
+        said=(Line("another gateway writes it"),),
+    ),
+    Scenario(
+        "second board of the same name",
+        f"another gateway, with another board and journal, runs beside the first for {TWINS_S:g} s",
+        second_board,
+        said=(Alarmed("twin-cube"),),
     ),
 )

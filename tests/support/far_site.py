@@ -82,11 +82,12 @@ def far_site(
     congestion: str = "cubic",
     syn_retries: int = 0,
     board: bool = True,
+    zenohd: Path | None = None,
 ) -> Iterator[FarSite]:
     """Made and joined as docs/sites.md says, with `gyrofree up` at the lab and `services` at the
     office. congestion: how TCP takes losses; CUBIC is what most machines have.
     syn_retries: of TCP's first packet; 0: as the machine has it. board: a simulated one is begun,
-    too; else the lab's port is `board` in its folder.
+    too; else the lab's port is `board` in its folder. zenohd: the program that routes at both.
 
     settings, office: further lines of the gyrofree.toml of the lab and of the office. Raises
     NoNamespaces.
@@ -103,6 +104,9 @@ def far_site(
             _join(made)
             _append(made.lab, BOARD + settings)
             _append(made.office, office)
+            if zenohd is not None:
+                for folder in (made.lab, made.office):
+                    _route_by(folder / "gyrofree.toml", zenohd)
             link.line = line
             if board:
                 made.begin(link.a, made.lab, "simulate", "--link", "board", "--profile", "wobble")
@@ -117,6 +121,12 @@ def far_site(
 def _append(folder: Path, text: str) -> None:
     with (folder / "gyrofree.toml").open("a") as stream:
         stream.write(text)
+
+
+def _route_by(config: Path, zenohd: Path) -> None:
+    text = config.read_text()
+    assert text.count("[bus]\n") == 1
+    config.write_text(text.replace("[bus]\n", f'[bus]\nzenohd = "{zenohd}"\n'))
 
 
 def _join(made: FarSite) -> None:
