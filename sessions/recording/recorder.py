@@ -138,8 +138,9 @@ class Recorder:
         if store is not None and now - self._last_flush >= self.settings.flush_s:
             self._last_flush = now
             store.flush()
-            if store.size >= self.settings.max_file_bytes:
+            if store.astray or store.size >= self.settings.max_file_bytes:
                 self._rotate(store)
+                self._message = self._message or store.astray
 
     def _drain(self) -> None:
         store, inbox = self._store, self._inbox
@@ -222,14 +223,12 @@ class Recorder:
         return True
 
     def _rotate(self, store: SessionStore) -> None:
-        manifest = store.manifest
-        log.info("%s: %d bytes: continuing in a new session", manifest.id, store.size)
-        name = manifest.id[16:48]  # after the time
+        old = store.manifest
+        log.info("%s: %d bytes: continuing in a new session", old.id, store.size)
+        name = old.id[16:48]  # after the time
         self._end(keep_listening=True)
         self._fresh = False
-        if not self._begin(
-            name=name, note=manifest.note, user=manifest.user, continues=manifest.id
-        ):
+        if not self._begin(name=name, note=old.note, user=old.user, continues=old.id):
             self._retry_at = time.monotonic() + RETRY_S
 
     def _end(self, *, keep_listening: bool = False) -> None:

@@ -79,6 +79,9 @@ class SessionStore:
         self.manifest = manifest
         self.durable_messages = 0
         self._write_error = self._sync_error = ""
+        self.astray = (
+            ""  # says so where what is written goes into a file that nobody finds any more
+        )
         self._settings = settings
         self._keys: dict[str, KeyState] = {}
         self._witness = Witness()
@@ -179,23 +182,28 @@ class SessionStore:
             self._log.push()
         except OSError as error:
             self._fail("writing", error)
-            self._look_for_another()
+            if self._place() == "another":
+                text = f"{self.folder}: its disk was mounted anew: beginning anew"
+                raise AnotherDisk(text) from None
             return
+        if self._place() != "ours":
+            self.astray = f"{self.folder} was deleted or moved: what it held is not here any more"
+            log.error("%s", self.astray)
         self._pushed = self._accepted
         self._news.set()
         self.manifest.bytes = self._log.size
         self._write_error = ""
 
-    def _look_for_another(self) -> None:
-        """A file system that failed takes nothing from who had its files open, for ever; once it is
-        mounted again the same file is another one.
+    def _place(self) -> str:
+        """What stands where the recording should: "ours"; "another" where a disk was mounted anew,
+        as one that failed takes nothing for ever from who had its files open; or "nothing".
         """
         try:
             there, ours = os.stat(self.folder / RECORDING), os.fstat(self._fd)
-        except OSError:  # not mounted again yet
-            return
-        if (there.st_dev, there.st_ino) != (ours.st_dev, ours.st_ino):
-            raise AnotherDisk(f"{self.folder}: its disk was mounted anew: beginning anew")
+        except OSError:
+            return "nothing"
+        same = (there.st_dev, there.st_ino) == (ours.st_dev, ours.st_ino)
+        return "ours" if same else "another"
 
     def _fail(self, what: str, error: OSError) -> None:
         text = (

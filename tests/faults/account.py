@@ -24,6 +24,7 @@ class Account:
     unestimated: int = 0  # samples without an estimate, between an estimator's first and last
     acknowledged_lost: int = 0  # messages that the recorder had called durable
     boots: int = 0
+    gone: int = 0  # sessions that were deleted
     complete: bool = True  # all of their certificates
     said_missing: int = 0  # samples, by the certificates
     said_lost: dict[str, int] = field(
@@ -38,6 +39,9 @@ def account(root: Path, sessions: list[str], durable: dict[str, int]) -> Account
     made, catalogue = Account(sessions=sessions), Catalogue(root)
     found = Recorded(_counted)
     for name in sessions:
+        if not (root / name).exists():
+            made.gone += 1
+            continue
         found.read(catalogue.path(name))
         made.acknowledged_lost += max(0, durable.get(name, 0) - found.rows[name])
         _certificate(made, catalogue, name)

@@ -1,5 +1,6 @@
 """Faults of disks and of the clock."""
 
+import shutil
 import time
 
 from faults.bench import Bench
@@ -37,6 +38,11 @@ def hangs(disk: Device) -> None:
     disk.hang(True)
     time.sleep(HANG_S)
     disk.hang(False)
+
+
+def deleted(bench: Bench) -> None:
+    """Somebody tidies up."""
+    shutil.rmtree(bench.sessions.path / bench.watch.newest("status").session)
 
 
 def slow(bench: Bench) -> None:
@@ -116,6 +122,13 @@ DISKS = (
         Loss("what the line's buffer does not hold meanwhile", (0, 300), complete=None),
         (Alarmed("link"), Status("`stops` of the link", "links", lambda link: link.stops > 0)),
         on="device",
+    ),
+    Scenario(
+        "recording deleted",
+        "`rm -r` of its folder while it is written",
+        deleted,
+        Loss("what it held; another recording goes on", gone=1),
+        (Alarmed("recorder"), Line("was deleted or moved: what it held is not here any more")),
     ),
     Scenario(
         "clock set back by an hour",

@@ -102,12 +102,12 @@ PROCESSES = (
         1.8,
         Status("`stops` of the link", "links", lambda link: link.stops > 0),
     ),
-    frozen("record", 5.0),
-    frozen("estimator", 5.0, Alarmed("estimator-products-ekf")),
-    frozen("procedures", 5.0),
-    frozen("alarms", 5.0),
-    frozen("dashboard", 5.0),
-    frozen("router", 8.0),
+    frozen("record", 5.0, Alarmed("service-here-recorder")),
+    frozen("estimator", 5.0, Alarmed("service-here-estimator"), Alarmed("estimator-products-ekf")),
+    frozen("procedures", 5.0, Alarmed("service-here-procedures")),
+    frozen("alarms", 5.0),  # nobody else says what is wrong
+    frozen("dashboard", 5.0, Alarmed("service-here-dashboard")),
+    frozen("router", 8.0, Alarmed("link")),
     Scenario(
         "router killed",
         "`kill -9` of the router, started again at once",

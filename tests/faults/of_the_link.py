@@ -119,6 +119,12 @@ LINK = (
         on="far",
     ),
     Scenario(
+        "link that is long and loses much",
+        f"20 % of packets each way and 200 ms there and back, for {BAD_S:g} s",
+        lambda bench: worse(bench, delay_s=0.1, loss=0.2),
+        on="far",
+    ),
+    Scenario(
         "link that is slow, lossy and long",
         f"1 Mbit/s, 5 % of packets lost, 200 ms, for {BAD_S:g} s",
         lambda bench: worse(bench, rate=FAR.rate, delay_s=FAR.delay_s, loss=FAR.loss),

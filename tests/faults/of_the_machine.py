@@ -17,7 +17,7 @@ from faults.scenario import Alarmed, Line, Scenario
 GROUPS = Path("/sys/fs/cgroup")
 LEAST = 65536  # bytes of memory; the next page that is wanted is one too many
 LATEST = 24  # bytes of a journal that are spoilt
-SHUT_S = 5.0  # that no file can be opened
+SHUT_S = 8.0  # that no file can be opened
 TWINS_S = 6.0
 
 
@@ -122,6 +122,7 @@ MACHINE = (
         "no file can be opened",
         f"no service may open a file or a connection for {SHUT_S:g} s; the page is asked meanwhile",
         no_more_files,
+        said=(Alarmed("recorder"), Alarmed("disk-state")),
     ),
     Scenario(
         "end of the gateway's journal spoilt",

@@ -97,6 +97,7 @@ class Loss:
     complete: bool | None = True  # the certificates say so; None: as it comes
     unestimated: int = 0  # samples without an estimate at most
     boots: int = 1
+    gone: int = 0  # recordings
 
 
 NOTHING = Loss()
@@ -162,6 +163,7 @@ def judge(scenario: Scenario, run: Run) -> None:
         # a busy machine: the estimator says so, and loses no sample by it
         "estimates of all samples": counted.unestimated <= lost.unestimated
         or run.bench.thinned(run.log_from),
+        f"{lost.gone} recordings deleted": counted.gone == lost.gone,
         f"complete: {lost.complete}": lost.complete in (None, counted.complete),
         f"{lost.boots} boots of the board": counted.boots == lost.boots,
     }
