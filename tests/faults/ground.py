@@ -64,6 +64,10 @@ class Ground:
             time.sleep(LOOK_S)
         return time.monotonic() - began
 
+    def hear(self, *alarms: str) -> None:
+        """Wait until these were there: for a fault that lasts until it is said. Raises NotWell."""
+        self.until(lambda: self.watch.alarms >= set(alarms), f"alarms {', '.join(alarms)}")
+
     def said(self, pattern: str, since: int) -> bool:
         """Does the log have such a line behind the character `since`?"""
         return re.search(pattern, self.text()[since:]) is not None

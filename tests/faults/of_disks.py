@@ -43,12 +43,14 @@ def hangs(disk: Device) -> None:
 def deleted(bench: Bench) -> None:
     """Somebody tidies up."""
     shutil.rmtree(bench.sessions.path / bench.watch.newest("status").session)
+    bench.hear("recorder")
 
 
 def slow(bench: Bench) -> None:
-    """Each fsync takes seconds."""
+    """Each fsync takes seconds, until that is said."""
     bench.sync.set(SLOW_S)
     time.sleep(3 * SLOW_S)
+    bench.hear("link-said", "recorder")
     bench.sync.set(0.0)
 
 
@@ -87,7 +89,7 @@ DISKS = (
     ),
     Scenario(
         "slow disk",
-        "each `fsync` takes 2 s longer, for 6 s",
+        "each `fsync` takes 2 s longer, for 6 s and until that is said",
         slow,
         said=(
             Alarmed("link-said"),

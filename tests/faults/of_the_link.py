@@ -166,7 +166,7 @@ LINK = (
         "half a copy spoilt",
         "a bit of what is on the office's disk is turned and its `site serve` killed",
         spoil,
-        said=(RESTARTED,),
+        said=(RESTARTED, Alarmed("service-office-authority")),
     ),
     copying(
         "disk of the office full",
