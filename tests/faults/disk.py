@@ -4,7 +4,7 @@ import contextlib
 import subprocess
 from pathlib import Path
 
-SIZE = 64 << 20  # bytes
+SIZE = 256 << 20  # bytes; a whole run of faults writes a hundred MB of journals
 BLOCK = 1 << 16
 
 

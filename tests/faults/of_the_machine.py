@@ -12,7 +12,7 @@ import psutil
 
 from faults.bench import SERVICES, Bench
 from faults.board import Board
-from faults.scenario import Alarmed, Line, Scenario
+from faults.scenario import Alarmed, Brief, Line, Scenario
 
 GROUPS = Path("/sys/fs/cgroup")
 LEAST = 65536  # bytes of memory; the next page that is wanted is one too many
@@ -62,25 +62,30 @@ def no_more_files(bench: Bench) -> None:
             limits = process.rlimit(resource.RLIMIT_NOFILE)
             process.rlimit(resource.RLIMIT_NOFILE, (process.num_fds(), limits[1]))
             before.append((process, limits))
-    end = time.monotonic() + SHUT_S
-    while time.monotonic() < end:
-        bench.page()
-        time.sleep(0.2)
-    for process, limits in before:
-        with contextlib.suppress(psutil.NoSuchProcess):
-            process.rlimit(resource.RLIMIT_NOFILE, limits)
+    try:
+        end = time.monotonic() + SHUT_S
+        while time.monotonic() < end:
+            bench.page()
+            time.sleep(0.2)
+        bench.hear("recorder", "disk-state")
+    finally:
+        for process, limits in before:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                process.rlimit(resource.RLIMIT_NOFILE, limits)
 
 
 def spoilt_tail(bench: Bench) -> None:
     """The newest bytes of the gateway's journal are others when it is started again."""
     victim = bench.children()["gateway"]
     victim.send_signal(signal.SIGSTOP)
-    folder = bench.journals.path / "gateway"
-    newest = max(folder.rglob("*.gfj"), key=lambda path: path.stat().st_mtime_ns)
-    with newest.open("r+b") as stream:
-        stream.seek(-LATEST, os.SEEK_END)
-        stream.write(b"\xa5" * LATEST)
-    victim.kill()
+    try:
+        folder = bench.journals.path / "gateway"
+        newest = max(folder.rglob("*.gfj"), key=lambda path: path.stat().st_mtime_ns)
+        with newest.open("r+b") as stream:
+            stream.seek(-LATEST, os.SEEK_END)
+            stream.write(b"\xa5" * LATEST)
+    finally:
+        victim.kill()
     bench.until(
         lambda: bench.children().get("gateway", victim).pid != victim.pid, "another gateway"
     )
@@ -120,9 +125,14 @@ MACHINE = (
     ),
     Scenario(
         "no file can be opened",
-        f"no service may open a file or a connection for {SHUT_S:g} s; the page is asked meanwhile",
+        f"neither file nor connection, for {SHUT_S:g} s and until that is said; the page is asked",
         no_more_files,
-        said=(Alarmed("recorder"), Alarmed("disk-state")),
+        said=(
+            Alarmed("recorder"),
+            Alarmed("disk-state"),
+            Line("no file is left for another connection"),
+            Brief(100),
+        ),
     ),
     Scenario(
         "end of the gateway's journal spoilt",

@@ -49,6 +49,20 @@ class Line:
 
 
 @dataclass(frozen=True)
+class Brief:
+    """The log stays readable, and its disk does not fill."""
+
+    lines: int
+
+    @property
+    def text(self) -> str:
+        return f"in at most {self.lines} lines"
+
+    def heard(self, run: Run) -> bool:
+        return run.bench.text().count("\n", run.log_from) <= self.lines
+
+
+@dataclass(frozen=True)
 class Alarmed:
     """An alarm that was there, and is gone."""
 
