@@ -84,7 +84,7 @@ PROCESSES = (
         "guardian killed",
         "`kill -9` of the gateway's guardian",
         guardian_killed,
-        Loss("what the board says while the port changes hands", (0, 500), complete=None),
+        Loss("what the board says while the port changes hands", (0, 3000), complete=None),
         (
             Line("the process that guards this one is gone: handing over"),
             Certified("`dark_s` of the certificate, where samples are missing", dark),
