@@ -79,8 +79,12 @@ class Pace:
     def _refuse(self, now: float) -> None:
         _, before = self._refused.get(self.rate, (0.0, AGAIN_S / 2))
         self._refused[self.rate] = (now + min(2 * before, LONGEST_S), min(2 * before, LONGEST_S))
-        if self.rate != RATES[-1]:
-            self._change(now, RATES[0] if self.rate == FULL else self._next(1))
+        if self.rate == FULL:
+            self._change(now, RATES[0])
+        elif self.rate != RATES[-1]:  # at once to what comes through, at least one down
+            span_s = max(self._came[-1][0] - self._came[0][0], 1.0)
+            through = [rate for rate in RATES if rate <= (len(self._came) - 1) / span_s]
+            self._change(now, min(self._next(1), max(through, default=RATES[-1])))
 
     def _more(self, now: float, late_s: float) -> None:
         if self.rate == FULL:

@@ -97,6 +97,14 @@ def simulate(
     half_side: Annotated[
         float, typer.Option(min=0.001, max=10.0, help="With --csv: centre to face, m.")
     ] = 0.05,
+    rate: Annotated[
+        float,
+        typer.Option(
+            min=1.0,
+            max=1000.0,
+            help="Samples a second of the cube on its table; above 100 a frame has several.",
+        ),
+    ] = 100.0,
     config: Config = None,
     verbose: Verbose = False,
 ) -> None:
@@ -114,8 +122,11 @@ def simulate(
         if csv is not None:
             from gyrofree.running import simulate_csv
 
-            say(f"{csv}: {simulate_csv.write(csv, motion, seed, layout, half_side)} samples")
+            count = simulate_csv.write(csv, motion, seed, layout, half_side, rate)
+            say(f"{csv}: {count} samples")
             return
+        if rate != 100.0 and (arm or tilt):
+            raise ValueError("--rate is for the cube on its table, not for --arm or --tilt")
     except (ValueError, OSError) as error:
         raise fail(error, CONFIG) from None
 
@@ -124,7 +135,18 @@ def simulate(
         from gyrofree.running import simulate_hand
 
         options = simulator.Options(
-            link, tcp, motion, seed, device, once, faults, arm or 0.0, table_link, table_tcp, slips
+            link=link,
+            tcp=tcp,
+            profile=motion,
+            seed=seed,
+            device=device,
+            once=once,
+            faults=faults,
+            arm_m=arm or 0.0,
+            table_link=table_link,
+            table_tcp=table_tcp,
+            slips=slips,
+            rate_hz=rate,
         )
         bus = settings.bus.acting_as("simulator")
         (simulate_hand if tilt else simulator).run(options, bus, stop)

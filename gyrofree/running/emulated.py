@@ -22,7 +22,8 @@ from emulator.world import Fault, World
 from firmware_protocol.codec import Deframer, Frame
 from firmware_protocol.frames import Acc12
 from gateway.virtual.board_link import PtyLink, TcpLink
-from gyrofree.running.simulate import GPS_SIGMA, TruthPublisher, sentences
+from gateway.virtual.receiver import GPS_SIGMA, sentences
+from gyrofree.running.simulate import TruthPublisher
 from inertial.simulation.table import TableTest
 from messages.bus.session import BusSettings
 from messages.contract import gyrofree_pb2 as pb

@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 import zenoh
-from pynmeagps import GET, NMEAMessage
 
 from gateway.virtual.board_link import PtyLink, TcpLink
+from gateway.virtual.receiver import GPS_SIGMA, PLACE, sentences
 from gateway.virtual.satellites import of_sky
 from gateway.virtual.virtual_board import (
     SIMULATED,
@@ -43,17 +43,9 @@ from messages.contract.topics import TRUTH
 
 log = logging.getLogger(__name__)
 
-PLACE = (
-    37.759,
-    45.978,
-    1468.0,
-)  # deg, deg, m above the ellipsoid: where the published test was made, roughly
-GEOID = 17.0  # m, ellipsoid above mean sea level there, rounded
-GPS_SIGMA = (0.8, 0.8, 1.6)  # m, north, east, up, white: a receiver at rest
 GPS_PERIOD = 1.0  # s
-KNOT = 1852.0 / 3600.0  # m/s
 ARM_GPS_PERIOD, ARM_SIGMA_P, ARM_SIGMA_V = 0.5, 0.3, 0.1  # s, m, m/s: a better receiver, on the arm
-METRES_PER_DEGREE = 111_195.0  # m of latitude
+FRAME_S = 0.01  # a board of more samples sends several in a frame; the truth is told as often
 
 
 @dataclass(frozen=True)
@@ -73,13 +65,17 @@ class Options:
     table_link: Path | None = None  # where the table's text protocol is offered
     table_tcp: int | None = None
     slips: int = 0  # of the person who turns a table that is not driven
+    rate_hz: float = 100.0  # samples a second of the table's cube; of the arm always 100
 
 
 class TruthPublisher:
     """Publishes the truth once the bus is there; until then truth has nobody to hear it."""
 
-    def __init__(self, bus: BusSettings, device: str, source: int = pb.SOURCE_SIMULATED) -> None:
-        self._device, self._source = device, source
+    def __init__(
+        self, bus: BusSettings, device: str, source: int = pb.SOURCE_SIMULATED, every: int = 1
+    ) -> None:
+        """every: so many samples the truth is told once."""
+        self._device, self._source, self._every = device, source, every
         self._epoch = 0
         self._publishers: Publishers | None = None
         self._session = LateSession(bus, lambda session: self._attach(session, bus.prefix))
@@ -98,6 +94,8 @@ class TruthPublisher:
 
     def put(self, index: int, t_s: float, truth: Truth) -> None:
         """Truth at sample `index`, t_s after boot."""
+        if index % self._every:
+            return
         self._put(
             pb.Truth(
                 header=self._header(t_s),
@@ -139,64 +137,6 @@ class TruthPublisher:
     def _put(self, message: pb.Truth) -> None:
         if self._publishers is not None:
             self._publishers.put(TRUTH, self._device, message)
-
-
-def sentences(
-    place_noise: np.ndarray, utc: datetime.datetime, v_n: tuple[float, float] = (0.0, 0.0)
-) -> bytes:
-    """GGA, GST and RMC of a receiver at PLACE plus place_noise (3,), m north, east, up; v_n north,
-    east, m/s.
-    """
-    lat = PLACE[0] + place_noise[0] / METRES_PER_DEGREE
-    lon = PLACE[1] + place_noise[1] / (METRES_PER_DEGREE * np.cos(np.radians(PLACE[0])))
-    clock, day = utc.time(), utc.date()
-    gga = NMEAMessage(
-        "GP",
-        "GGA",
-        GET,
-        time=clock,
-        lat=lat,
-        NS="N",
-        lon=lon,
-        EW="E",
-        quality=1,
-        numSV=9,
-        HDOP=0.9,
-        alt=round(PLACE[2] + place_noise[2] - GEOID, 2),
-        altUnit="M",
-        sep=GEOID,
-        sepUnit="M",
-    )
-    north, east, up = GPS_SIGMA
-    gst = NMEAMessage(
-        "GP",
-        "GST",
-        GET,
-        time=clock,
-        rangeRms=1.0,
-        stdMajor=east,
-        stdMinor=north,
-        orient=0.0,
-        stdLat=north,
-        stdLong=east,
-        stdAlt=up,
-    )
-    rmc = NMEAMessage(
-        "GP",
-        "RMC",
-        GET,
-        time=clock,
-        status="A",
-        lat=lat,
-        NS="N",
-        lon=lon,
-        EW="E",
-        spd=round(float(np.hypot(*v_n)) / KNOT, 3),
-        cog=round(float(np.degrees(np.arctan2(v_n[1], v_n[0]))) % 360.0, 2),
-        date=day,
-        posMode="A",
-    )
-    return gga.serialize() + gst.serialize() + rmc.serialize()
 
 
 def _receiver(seed: int) -> Iterator[BoardBytes]:
@@ -241,7 +181,11 @@ def _table(
             if desk.remote and not options.arm_m:
                 at = block.index + row, float(block.angle_z[row]), float(block.omega_b[row, 2])
                 driven = DrivenTable(
-                    seed=options.seed, profile=test.profile, run=test.run, start=at
+                    seed=options.seed,
+                    profile=test.profile,
+                    run=test.run,
+                    start=at,
+                    rate_hz=options.rate_hz,
                 )
                 yield from desk.items(driven, truths, faults)
                 return
@@ -254,7 +198,12 @@ def _table(
 def _test(options: Options, run: int) -> TableTest:
     if options.arm_m:
         return arm_test(options.seed, options.arm_m, run=run)
-    return TableTest(seed=options.seed, profile=options.profile, run=run)
+    return TableTest(seed=options.seed, profile=options.profile, run=run, rate_hz=options.rate_hz)
+
+
+def _in_frame(test: TableTest) -> int:
+    """Samples in one frame."""
+    return max(1, round(FRAME_S / test.period_s))
 
 
 def open_link(options: Options) -> tuple[PtyLink | TcpLink, str]:
@@ -269,7 +218,7 @@ def run(options: Options, bus: BusSettings, stop: threading.Event) -> None:
     """
     test = _test(options, 0)  # before the link: an unknown profile is said at once
     link, port = open_link(options)
-    truths = TruthPublisher(bus, options.device)
+    truths = TruthPublisher(bus, options.device, every=_in_frame(test))
     person = Person(options.seed, options.slips)
     desk = TableDesk(_table_line(options), bus, options.device, person)
     log.info("simulated cube, profile %s, seed %d, on %s", test.profile.name, options.seed, port)
@@ -306,7 +255,14 @@ def _one_run(
     """
     truths.begin(epoch)
     desk.begin()
-    board = VirtualBoard(link, SIMULATED, epoch=epoch, firmware="simulated table")
+    board = VirtualBoard(
+        link,
+        SIMULATED,
+        epoch=epoch,
+        sample_period_s=test.period_s,
+        batch=_in_frame(test),
+        firmware="simulated table",
+    )
     table = _table(test, truths, Faults(options.faults), options, desk)
     receiver = _rider(test, options.seed) if options.arm_m else _receiver(options.seed)
     items = heapq.merge(table, receiver, key=lambda item: item.t_s)

@@ -21,6 +21,7 @@ def write(
     seed: int,
     layout: str = "cube",
     half_side_m: float | None = None,
+    rate_hz: float = 100.0,
 ) -> int:
     """One run of the profile as CSV; returns the number of samples. Raises ValueError
     (GeometryError), OSError.
@@ -30,7 +31,7 @@ def write(
     """
     shape = find(layout, half_side_m)
     profile = named(profile) if isinstance(profile, str) else profile
-    test = TableTest(seed=seed, profile=profile, layout=shape)
+    test = TableTest(seed=seed, profile=profile, layout=shape, rate_hz=rate_hz)
     n = round(test.profile.seconds / test.period_s)
     rates = _tacho(test, n)
     with whole(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:

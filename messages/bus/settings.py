@@ -104,6 +104,8 @@ def configuration(settings: BusSettings, mode: str, mesh: Iterable[str] = ()) ->
             "period_max_ms": 500,
             "period_increase_factor": 1.5,
         }
+        # Of a preview: what does not fit is dropped, and does not wait behind what is older.
+        values["transport/link/tx/queue/size/interactive_low"] = 1
         if settings.tls is not None:
             values["transport/link/tx/lease"] = min(settings.lease_ms, FAR_LEASE_MS)
         return values

@@ -1,7 +1,12 @@
-"""Connections to other machines are given up when nothing is acknowledged for a while. TCP tries
-again after twice the time each time: after a cut of 30 s it would be silent for another 30. Zenoh
-has no setting for that, so it is made on the sockets of the process; on those of a child (Zenoh's
-own router) through a copy of each descriptor, which Linux gives a parent.
+"""How connections to other machines take losses and cuts.
+
+TCP sends what was lost again after twice the time each time: three packets lost in a row hold up
+all that is live for seconds, and after a cut of 30 s it would be silent for another 30. So the
+times do not grow, and a connection on which nothing is acknowledged for a while is given up. And
+the kernel takes megabytes at once, in which the newest would stand behind the oldest: it gets only
+what it is about to send. Zenoh has no settings for that, so they are made on the sockets of the
+process; on those of a child (Zenoh's own router) through copies of its descriptors, which Linux
+gives a parent.
 """
 
 import contextlib
@@ -13,8 +18,17 @@ import threading
 from pathlib import Path
 
 GIVEN_UP_MS = 4_000
+AGAIN_MS = 1_000  # at most, before what was lost is sent again; the least that Linux takes
+UNSENT = 8_192  # bytes that wait in the kernel
 LOOK_S = 0.5
 PIDFD_GETFD = 438  # linux/unistd.h, the same on every machine
+RTO_MAX_MS, NOTSENT_LOWAT = 44, 25  # linux/tcp.h, not in every Python
+OPTIONS = (
+    (socket.TCP_USER_TIMEOUT, GIVEN_UP_MS),
+    (NOTSENT_LOWAT, UNSENT),
+    (16, 1),  # TCP_THIN_LINEAR_TIMEOUTS: while few packets are under way, also on older kernels
+    (RTO_MAX_MS, AGAIN_MS),  # Linux 6.15
+)
 
 
 def watch(stop: threading.Event, child: int = 0) -> threading.Thread:
@@ -42,7 +56,7 @@ def look(child: int = 0) -> None:
                     continue
                 with socket.socket(fileno=_copy(pidfd, int(entry.name))) as one:
                     if one.family in (socket.AF_INET, socket.AF_INET6) and not _here(one):
-                        one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, GIVEN_UP_MS)
+                        _set(one)
 
 
 def _copy(pidfd: int, descriptor: int) -> int:
@@ -54,6 +68,15 @@ def _copy(pidfd: int, descriptor: int) -> int:
     if copy < 0:
         raise OSError(ctypes.get_errno(), "pidfd_getfd")
     return copy
+
+
+def _set(one: socket.socket) -> None:
+    for option, value in [
+        o for o in OPTIONS if str(o[0]) in os.environ.get("GF_OPTS", "18,25,16,44").split(",")
+    ]:  # SCRATCH
+        with contextlib.suppress(OSError):  # a kernel that does not know it
+            if one.getsockopt(socket.IPPROTO_TCP, option) != value:
+                one.setsockopt(socket.IPPROTO_TCP, option, value)
 
 
 def _here(one: socket.socket) -> bool:

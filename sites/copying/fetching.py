@@ -10,20 +10,24 @@ import hashlib
 import json
 import logging
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from pydantic import ValidationError
 
 from inertial.whole_file import put_in_place
-from sites.copying.roads import Ask, all_of
+from sites.copying.gathering import Drafts, Gathering, Segment
+from sites.copying.roads import Ask, Ways
 from sites.copying.shelf import FILE, SEGMENT, SESSION, Listed, Listing, list_file
+from sites.copying.since import Heard
 from sites.place import SiteError, write
 
 PART = ".part"
 BOOK = "copies.json"
 LAST = "session.json"
+INDEX = "index"  # asks for the sessions that there are
 LARGEST = 64 << 20  # bytes of a list
+UNREADABLE = "home's list of segments cannot be read: is it of another version?"
 
 log = logging.getLogger(__name__)
 
@@ -34,19 +38,21 @@ class Copies:
     def __init__(self, root: Path, folder: Path) -> None:
         """root: of the sessions here; folder: of the place, where the proof is kept."""
         self._root, self._book = root, folder / BOOK
+        self._heard, self._drafts = Heard(), Drafts()
+        self._small: dict[str, bytes] = {}  # session.json of open sessions, by sha256
         self.known: dict[str, dict] = load_copies(folder)
 
-    def round(self, asks: Sequence[Ask], stop: Callable[[], bool]) -> int:
-        """Copy what is new or has changed, on all roads at once; how many sessions became equal.
+    def round(self, ways: Ways, stop: Callable[[], bool]) -> int:
+        """Copy what is new or has changed, on all ways at once; how many sessions became equal.
         Raises SiteError when home does not answer, OSError when nothing can be written here.
         """
-        there, count = _index(asks[0]("index")), 0
+        there, count = _index(self._ask(INDEX, ways)), 0
         for session in sorted(there, reverse=True):
             if stop():
                 break
             if self.known.get(session, {}).get("stamp") == there[session]:
                 continue
-            proof = self._session(session, asks, stop)
+            proof = self._session(session, ways, stop)
             if proof is not None:
                 now = dt.datetime.now(dt.UTC).isoformat(timespec="seconds")
                 self.known[session] = {"stamp": there[session], "equal_since": now, "files": proof}
@@ -55,10 +61,19 @@ class Copies:
                 count += 1
         return count
 
-    def _session(self, session: str, asks: Sequence[Ask], stop: Callable[[], bool]) -> dict | None:
+    def _ask(self, what: str, ways: Ways) -> bytes:
+        """What may be long, and changes a little."""
+        try:
+            return self._heard.asked(what, ways()[0])
+        except SiteError:
+            raise
+        except ValueError:
+            raise SiteError(UNREADABLE) from None
+
+    def _session(self, session: str, ways: Ways, stop: Callable[[], bool]) -> dict | None:
         """By file home's hash and the one here; None while it has not come to its end."""
-        listing = _listing(asks[0](session))
-        recording = _open(listing, session, asks[0])
+        listing = _listing(self._ask(session, ways))
+        recording = self._open(listing, session, ways()[0])
         folder = self._root / session
         folder.mkdir(parents=True, exist_ok=True)
         proof = {}
@@ -68,7 +83,7 @@ class Copies:
             wanted, path = listing.files[name], folder / name
             if recording:
                 wanted = _full(wanted)  # its end changes with every message
-            if not self._file(path, wanted, asks, stop):
+            if not self._file(path, wanted, ways, stop):
                 return None
             if recording:
                 continue
@@ -80,9 +95,23 @@ class Copies:
             proof[name] = {"home_sha256": wanted.sha256, "here_sha256": here.sha256}
         return proof
 
-    def _file(
-        self, path: Path, wanted: Listed, asks: Sequence[Ask], stop: Callable[[], bool]
-    ) -> bool:
+    def _open(self, listing: Listing, session: str, ask: Ask) -> bool:
+        """Is this session still being recorded? What says so is asked for when it has changed."""
+        if LAST not in listing.files:
+            return True
+        listed = listing.files[LAST]
+        if listed.sha256 not in self._small:
+            pieces = [
+                ask(f"{session}/{LAST}/{number * SEGMENT}-{sha256}")
+                for number, sha256 in enumerate(listed.segments)
+            ]
+            self._small = {listed.sha256: b"".join(pieces)}
+        try:
+            return json.loads(self._small[listed.sha256]).get("state") == "open"
+        except (ValueError, AttributeError):
+            return True
+
+    def _file(self, path: Path, wanted: Listed, ways: Ways, stop: Callable[[], bool]) -> bool:
         """Bring the draft of a file to what home has; False when `stop` came first."""
         part = _part(path)
         if not part.exists() and path.exists():
@@ -91,16 +120,17 @@ class Copies:
         with os.fdopen(descriptor, "r+b") as stream:
             stream.truncate(min(os.fstat(descriptor).st_size, wanted.size))
 
-            def keep(first: int, sha256: str, piece: bytes) -> bool:
-                if hashlib.sha256(piece).hexdigest() != sha256:
+            def keep(segment: Segment, content: bytes) -> bool:
+                if hashlib.sha256(content).hexdigest() != segment.sha256:
                     log.info("%s: a segment changed while it was fetched", path.name)
                     return False
-                stream.seek(first)
-                stream.write(piece)
+                stream.seek(segment.first)
+                stream.write(content)
                 return True
 
             name = f"{path.parent.name}/{path.name}"
-            whole = all_of(_missing(stream, wanted), name, asks, keep, stop)
+            missing = _missing(stream, wanted)
+            whole = Gathering(name, missing, self._drafts, keep).run(ways, stop)
             stream.flush()
             os.fsync(descriptor)
         return whole
@@ -115,12 +145,13 @@ def load_copies(folder: Path) -> dict[str, dict]:
     return known if isinstance(known, dict) else {}
 
 
-def _missing(stream, wanted: Listed) -> Iterator[tuple[int, str]]:
+def _missing(stream, wanted: Listed) -> Iterator[Segment]:
     """Segments that are not here as they are at home."""
     for number, sha256 in enumerate(wanted.segments):
-        stream.seek(number * SEGMENT)
+        first = number * SEGMENT
+        stream.seek(first)
         if hashlib.sha256(stream.read(SEGMENT)).hexdigest() != sha256:
-            yield number * SEGMENT, sha256
+            yield Segment(first, sha256, min(SEGMENT, wanted.size - first))
 
 
 def _full(listed: Listed) -> Listed:
@@ -132,21 +163,6 @@ def _full(listed: Listed) -> Listed:
 
 def _part(path: Path) -> Path:
     return path.with_name(path.name + PART)
-
-
-def _open(listing: Listing, session: str, ask: Ask) -> bool:
-    """Is this session still being recorded?"""
-    if LAST not in listing.files:
-        return True
-    first = listing.files[LAST]
-    pieces = [
-        ask(f"{session}/{LAST}/{number * SEGMENT}-{sha256}")
-        for number, sha256 in enumerate(first.segments)
-    ]
-    try:
-        return json.loads(b"".join(pieces)).get("state") == "open"
-    except (ValueError, AttributeError):
-        return True
 
 
 def _index(answer: bytes) -> dict[str, str]:
@@ -167,9 +183,7 @@ def _listing(answer: bytes) -> Listing:
             raise ValueError
         listing = Listing.model_validate_json(answer)
     except (ValidationError, ValueError):
-        raise SiteError(
-            "home's list of segments cannot be read: is it of another version?"
-        ) from None
+        raise SiteError(UNREADABLE) from None
     for name, listed in listing.files.items():
         if not FILE.fullmatch(name) or len(listed.segments) != -(-listed.size // SEGMENT):
             raise SiteError(f"home's list of segments has {name[:60]!r}, which cannot be")

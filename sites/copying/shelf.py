@@ -8,12 +8,14 @@ gets another hash, and is fetched again; nothing else is.
 import hashlib
 import os
 import re
+import threading
 from pathlib import Path
 from typing import NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field
 
 SEGMENT = 250_000  # bytes
+PART = 25_000  # of a segment, asked for at once
 KEPT = (".mcap", ".json")  # what is copied; drawings of curves are made anew where they are wanted
 SESSION = re.compile(r"[0-9]{8}-[0-9]{6}(-[a-z0-9][a-z0-9_-]{0,40})?")
 FILE = re.compile(r"[a-z][a-z0-9_-]{0,39}\.(mcap|json)")
@@ -29,9 +31,10 @@ class Listed(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
+    # first, so that of a list that has grown only the end is another (since.py)
+    segments: list[str] = Field(max_length=4_000_000)  # sha256 of each
     size: int = Field(ge=0, lt=1 << 46)
     sha256: str = Field(pattern="^[0-9a-f]{64}$")
-    segments: list[str] = Field(max_length=4_000_000)  # sha256 of each
 
 
 class Listing(BaseModel):
@@ -48,6 +51,7 @@ class Shelf:
     def __init__(self, root: Path) -> None:
         self._root = root
         self._known: dict[Path, tuple[tuple[int, int, int], Hashed]] = {}
+        self._hashing = threading.Lock()  # a long file is hashed once, whoever asks
 
     def stamps(self) -> dict[str, str]:
         """By session what changes when one of its files does, without reading them."""
@@ -71,24 +75,34 @@ class Shelf:
 
     def listed(self, path: Path) -> Listed:
         """One file; raises OSError."""
-        stamp = _stamp(path)
-        old, hashed = self._known.get(path, (None, None))
-        if hashed is None or old != stamp:
-            grown = old is not None and old[2] == stamp[2] and old[0] <= stamp[0]
-            hashed = hash_file(path, hashed if grown else None)
-            self._known[path] = stamp, hashed
-        return hashed.listed
+        with self._hashing:
+            stamp = _stamp(path)
+            old, hashed = self._known.get(path, (None, None))
+            if hashed is None or old != stamp:
+                grown = old is not None and old[2] == stamp[2] and old[0] <= stamp[0]
+                hashed = hash_file(path, hashed if grown else None)
+                self._known[path] = stamp, hashed
+            return hashed.listed
 
     def segment(self, session: str, name: str, first: int) -> bytes:
         """The bytes from `first` on, one segment at most; raises ShelfError, OSError."""
-        if not FILE.fullmatch(name) or first % SEGMENT:
-            raise ShelfError(f"no segment {name[:60]!r} {first}")
+        return self._bytes(session, name, first, 0, SEGMENT)
+
+    def part(self, session: str, name: str, first: int, offset: int) -> bytes:
+        """Of the segment at `first` the bytes from `offset` on, one part at most; raises
+        ShelfError, OSError.
+        """
+        return self._bytes(session, name, first, offset, PART)
+
+    def _bytes(self, session: str, name: str, first: int, offset: int, size: int) -> bytes:
+        if not FILE.fullmatch(name) or first % SEGMENT or offset % PART or offset >= SEGMENT:
+            raise ShelfError(f"no segment {name[:60]!r} {first}, or no part {offset} of it")
         path = next((each for each in self._files(session) if each.name == name), None)
         if path is None:
             raise ShelfError(f"no file {name!r} in {session[:60]!r}")
         with path.open("rb") as stream:
-            stream.seek(first)
-            return stream.read(SEGMENT)
+            stream.seek(first + offset)
+            return stream.read(size)
 
     def _files(self, session: str) -> list[Path]:
         folder = self._root / session

@@ -114,7 +114,7 @@ class FarBench(Ground):
             opened.callback(board.close)
             board.boot()
             self.site = opened.enter_context(
-                far_site(self._folder, LINE, services=(), syn_retries=SYN_RETRIES, board=False)
+                far_site(self._folder, LINE, services=(), syn_retries=SYN_RETRIES, board=None)
             )
             self.link = self.site.link
             self._lab_up = self.site.processes[-1]

@@ -9,11 +9,12 @@ from support.wire import Wire
 
 from firmware_protocol.codec import FLAG_SIMULATED, Deframer, Frame
 from firmware_protocol.frames import Acc12, Gps, Hello, Tacho
+from gateway.virtual import receiver
 from gyrofree.running import simulate
 from messages.bus.session import BusSettings
 
 
-def run_at_once(monkeypatch, profile):
+def run_at_once(monkeypatch, profile, **options):
     """The frames of one run, without waiting for real time."""
     wire = Wire()
     monkeypatch.setattr(simulate, "PtyLink", lambda link: wire)
@@ -25,11 +26,24 @@ def run_at_once(monkeypatch, profile):
     stop = threading.Event()
     monkeypatch.setattr(stop, "wait", lambda timeout=None: stop.is_set())
     nobody = BusSettings(router="tcp/127.0.0.1:1")
-    simulate.run(simulate.Options(None, None, profile, 1, "cube", True), nobody, stop)
+    simulate.run(simulate.Options(None, None, profile, 1, "cube", True, **options), nobody, stop)
     stop.set()
     frames = Deframer().feed(bytes(wire.data))
     assert all(isinstance(frame, Frame) for frame in frames)
     return frames
+
+
+def test_a_quick_board_sends_all_its_samples_in_frames_of_ten(monkeypatch):
+    told = []
+    monkeypatch.setattr(
+        simulate.TruthPublisher, "_put", lambda self, message: told.append(message.for_index)
+    )
+    frames = run_at_once(monkeypatch, "published", rate_hz=1000.0)
+    samples = [frame.payload for frame in frames if isinstance(frame.payload, Acc12)]
+    assert [sample.first_index for sample in samples] == list(range(0, 30_000, 10))
+    assert {len(sample.counts) for sample in samples} == {10}
+    assert {sample.period_ns for sample in samples} == {1_000_000}
+    assert told[:3000] == list(range(0, 30_000, 10))  # the next is ready, and not sent
 
 
 def test_a_run_is_one_boot_of_thirty_seconds(monkeypatch):
@@ -50,11 +64,11 @@ def test_a_run_is_one_boot_of_thirty_seconds(monkeypatch):
 
 def test_the_receiver_stands_where_it_says():
     utc = datetime.datetime(2026, 3, 1, 23, 59, 59, tzinfo=datetime.UTC)
-    lines = simulate.sentences(np.array([3.0, -4.0, 1.0]), utc).splitlines(keepends=True)
+    lines = receiver.sentences(np.array([3.0, -4.0, 1.0]), utc).splitlines(keepends=True)
     gga, _gst, rmc = (NMEAReader.parse(line) for line in lines)
-    north = (gga.lat - simulate.PLACE[0]) * simulate.METRES_PER_DEGREE
-    east = (gga.lon - simulate.PLACE[1]) * simulate.METRES_PER_DEGREE * np.cos(np.radians(gga.lat))
+    north = (gga.lat - receiver.PLACE[0]) * receiver.METRES_PER_DEGREE
+    east = (gga.lon - receiver.PLACE[1]) * receiver.METRES_PER_DEGREE * np.cos(np.radians(gga.lat))
     assert abs(north - 3.0) < 0.05
     assert abs(east + 4.0) < 0.05
-    assert abs(gga.alt + gga.sep - simulate.PLACE[2] - 1.0) < 0.02
+    assert abs(gga.alt + gga.sep - receiver.PLACE[2] - 1.0) < 0.02
     assert str(rmc.date) == "2026-03-01"

@@ -18,9 +18,11 @@ from support.far_link import FarLink, Line, Place, far_link
 
 GYROFREE = [sys.executable, "-P", "-m", "gyrofree"]
 ROOT = Path(__file__).resolve().parents[2]
+PATHS = os.pathsep.join((str(ROOT), str(ROOT / "tests")))
 SITE, DEVICE = "lab", "cube"
 START_S = 90.0  # for everything to run and the first picture to come; a busy machine takes its time
 STOP_S = 20.0
+PROFILE = ("--profile", "wobble")
 BOARD = f"""
 [[gateway.devices]]
 name = "{DEVICE}"
@@ -59,6 +61,14 @@ class FarSite:
         )
         return done.stdout
 
+    def order(self, *words: str) -> None:
+        """To the lab's recorder: "start", NAME or "stop" (far_order.py)."""
+        self.link.a.run(
+            [sys.executable, "-P", "-m", "support.far_order", SITE, *words],
+            cwd=self.lab,
+            env=os.environ | {"PYTHONPATH": PATHS},
+        )
+
     def close(self) -> None:
         """End all that was begun, the last first."""
         for process in reversed(self.processes):
@@ -81,14 +91,15 @@ def far_site(
     services: tuple[tuple[str, ...], ...] = (("up",),),
     congestion: str = "cubic",
     syn_retries: int = 0,
-    board: bool = True,
+    lab: tuple[str, ...] = ("up",),
+    board: tuple[str, ...] | None = (),
     zenohd: Path | None = None,
 ) -> Iterator[FarSite]:
-    """Made and joined as docs/sites.md says, with `gyrofree up` at the lab and `services` at the
-    office. congestion: how TCP takes losses; CUBIC is what most machines have.
-    syn_retries: of TCP's first packet; 0: as the machine has it. board: a simulated one is begun,
-    too; else the lab's port is `board` in its folder. zenohd: the program that routes at both.
+    """Made and joined as docs/sites.md says, with `lab` at the lab and `services` at the office.
 
+    congestion: how TCP takes losses; CUBIC is what most machines have. syn_retries: of TCP's first
+    packet; 0: as the machine has it. board: further words of `gyrofree simulate`; None: nothing is
+    simulated, the lab's port is `board` in its folder. zenohd: the program that routes at both.
     settings, office: further lines of the gyrofree.toml of the lab and of the office. Raises
     NoNamespaces.
     """
@@ -108,9 +119,9 @@ def far_site(
                 for folder in (made.lab, made.office):
                     _route_by(folder / "gyrofree.toml", zenohd)
             link.line = line
-            if board:
-                made.begin(link.a, made.lab, "simulate", "--link", "board", "--profile", "wobble")
-            made.begin(link.a, made.lab, "up")
+            if board is not None:
+                made.begin(link.a, made.lab, "simulate", "--link", "board", *PROFILE, *board)
+            made.begin(link.a, made.lab, *lab)
             for words in services:
                 made.begin(link.b, made.office, *words)
             yield made
@@ -146,11 +157,10 @@ class Watcher:
     """What an office's page has of the board (far_watch.py), as it comes."""
 
     def __init__(self, site: FarSite, live: str = "auto") -> None:
-        path = os.pathsep.join((str(ROOT), str(ROOT / "tests")))
         self._process = site.link.b.popen(
             [sys.executable, "-P", "-m", "support.far_watch", SITE, DEVICE, live],
             cwd=site.office,
-            env=os.environ | {"PYTHONPATH": path},
+            env=os.environ | {"PYTHONPATH": PATHS},
             stdout=subprocess.PIPE,
             text=True,
             start_new_session=True,
