@@ -34,7 +34,7 @@ LEFT = dt.timedelta(days=DAYS / 3)  # of a certificate's life; less is renewed
 ASK_S = 10.0
 INDEX_S = 15.0  # for what there is: short, and asked again
 SEGMENT_S = 60.0  # for a part or a list of segments over a slow link
-ROUND_S = 2.0  # between two looks at what home has recorded
+ROUND_S = 1.0  # between two looks at what home has recorded
 
 log = logging.getLogger(__name__)
 
