@@ -1,5 +1,6 @@
 # make demo   everything it needs, then the live dashboard on one printed URL (SOURCE=drive DATA=<folder> plays a log,
-#             SOURCE=tilt or arm other simulated boards, BOARD=emulated the firmware image in the emulator)
+#             SOURCE=tilt or arm other simulated boards, BOARD=emulated the firmware image in the emulator, OFFICE=1 also
+#             an office that watches over a slow line)
 # make test   everything it needs, then all tests
 # make cases  inputs that once failed, from $GYROFREE_CASES or ../shared/cases
 # make zenohd Zenoh's own router (cargo builds it), held against our rules
@@ -26,7 +27,7 @@ DRIVE := $(if $(DATA),--data "$(DATA)")
 
 # BOARD=emulated: the table is sensed by the firmware image in the emulator
 demo: setup $(if $(filter emulated,$(BOARD)),.make/board firmware)
-	@$(BIN)/gyrofree demo --source $(if $(filter emulated,$(BOARD)),emulated,$(SOURCE)) $(DRIVE) --speed $(SPEED) --port $(PORT) --bus-port $(BUS_PORT)
+	@$(BIN)/gyrofree demo --source $(if $(filter emulated,$(BOARD)),emulated,$(SOURCE)) $(DRIVE) $(if $(OFFICE),--office) --speed $(SPEED) --port $(PORT) --bus-port $(BUS_PORT)
 
 # Packages come while the core compiles; neither needs the other.
 setup: .make/tools

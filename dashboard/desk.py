@@ -21,12 +21,14 @@ from messages.bus import session as busmod
 from messages.bus.command.history import newest_of
 from messages.bus.command.said import words
 from messages.bus.command.watch import Watch, name_of
+from messages.bus.turning import Loop
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import COMMAND, NOTE, ORDER, TopicError
 
 log = logging.getLogger(__name__)
 
 KEEP_S = 3.0  # between two words that a holder is still there
+ORDER_S = 30.0  # that saying so may take, where nobody answers
 PRESENT_S = 90.0  # without a page of his that asks; one in the background asks once a minute
 KEPT = 200  # orders remembered here, for a bench where nobody keeps them
 SEAT = pb.SeatCommand
@@ -140,6 +142,8 @@ class Desk:
 
     def history(self, find: str = "", most: int = 200) -> tuple[list[pb.OrderGiven], str]:
         """Orders of all, the newest first; and why it is those of this page alone where it is."""
+        if self._watching:  # nor may it ask
+            return [], f"The site's orders are shown at its home, and not here: {self._watching}."
         ask = SEAT(action=SEAT.ACTION_LOOK, text=find[:200], most=most)
         try:
             reply = orders.give(self._session, self._prefix, orders.SEAT, ask)
@@ -158,28 +162,34 @@ class Desk:
         """Say of holders and of those who ask that they are still there, until `stop`; give up
         what is of a sign-in that has ended (`alive` of its seat says no) or has no page open.
         """
-        due = 0.0
-        while not stop.wait(0.5):
-            status, now = self.status, time.monotonic()
-            if status is None:
+        with Loop("command", ORDER_S) as loop:
+            due = 0.0
+            while not stop.wait(0.5):
+                loop.turn()
+                due = self._keep_seats(due, alive)
+
+    def _keep_seats(self, due: float, alive: Callable[[str], bool]) -> float:
+        """One look of `keep`; due, and what it gives: when it says so next, s, monotonic."""
+        status, now = self.status, time.monotonic()
+        if status is None:
+            return due
+        kept = now >= due
+        for seat in (status.holder, status.asks):
+            at, mine = self._present.get(seat.id, (0.0, pb.Seat()))
+            if not mine.id:
                 continue
-            kept = now >= due
-            due = now + KEEP_S if kept else due
-            for seat in (status.holder, status.asks):
-                at, mine = self._present.get(seat.id, (0.0, pb.Seat()))
-                if not mine.id:
-                    continue
-                desk, why = self.of(mine), ""
-                if not alive(mine.id):
-                    why = "signed out"
-                elif now - at > PRESENT_S:
-                    why = "closed the page"
-                if why or kept:
-                    action = SEAT.ACTION_RELEASE if why else SEAT.ACTION_KEEP
-                    with contextlib.suppress(orders.OrderError):
-                        desk.command(action, why=why)
-                if why:
-                    self._present.pop(mine.id, None)
+            desk, why = self.of(mine), ""
+            if not alive(mine.id):
+                why = "signed out"
+            elif now - at > PRESENT_S:
+                why = "closed the page"
+            if why or kept:
+                action = SEAT.ACTION_RELEASE if why else SEAT.ACTION_KEEP
+                with contextlib.suppress(orders.OrderError):
+                    desk.command(action, why=why)
+            if why:
+                self._present.pop(mine.id, None)
+        return now + KEEP_S if kept else due
 
     def _by(self, kind: orders.Kind, command: object) -> pb.OrderBy:
         """Who gives an order; the command is taken where it is needed and nobody has it."""

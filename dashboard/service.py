@@ -5,12 +5,16 @@ import contextlib
 import errno
 import logging
 import socket
+import sys
 import threading
 from collections.abc import Callable
 from typing import Any
 
 import uvicorn
 
+from dashboard.alarms.own_place import OwnPlace, shown
+from dashboard.alarms.settings import AlarmSettings
+from dashboard.data.fault import Alarm
 from dashboard.data.feed import Feed
 from dashboard.data.store import Store
 from dashboard.desk import Desk
@@ -28,6 +32,7 @@ from dashboard.web.tls.certificate import open_certificate
 from dashboard.web.users import UserStore, load_users
 from messages.bus.beating import Beating
 from messages.bus.session import BusSettings, open_client
+from messages.bus.turning import Loop
 from messages.contract import gyrofree_pb2 as pb
 from sessions.library.catalogue import Catalogue
 
@@ -39,6 +44,9 @@ STOP_LOOK_S = 0.1  # s between two looks at the stop event
 SEND_BYTES = 1 << 19
 BACKLOG = 512  # connections that wait to be taken; a flood must not fill it
 HEAD_LIMIT = 32_768  # bytes of the head of one request
+# A thread that sent to one browser may go on with the next one after so long, while another thread
+# draws; Python's own 5 ms add up over fifty browsers.
+SWITCH_S = 0.005
 GRACE_S = 1  # s, for answers under way when the process ends
 
 
@@ -110,10 +118,12 @@ def serve(front: Front, bound: socket.socket, stop: threading.Event) -> None:
 
     async def until_stopped() -> None:
         serving = asyncio.create_task(server.serve(sockets=[bound]))
-        while not stop.is_set() and not serving.done():
-            if front.certificate is not None:
-                front.certificate.look()
-            await asyncio.sleep(STOP_LOOK_S)
+        with Loop("web server") as loop:
+            while not stop.is_set() and not serving.done():
+                loop.turn()
+                if front.certificate is not None:
+                    front.certificate.look()
+                await asyncio.sleep(STOP_LOOK_S)
         server.should_exit = True
         await serving
 
@@ -140,6 +150,20 @@ def audited(audit: Audit) -> Callable[[pb.OrderGiven], None]:
     return tell
 
 
+def _own_place(
+    store: Store, settings: DashboardSettings, bus: BusSettings, alarms: AlarmSettings | None
+) -> contextlib.AbstractContextManager[None]:
+    """Shows what is wrong with this place where nobody else of it says so."""
+    if alarms is None:
+        return contextlib.nullcontext()
+    own = OwnPlace(store.presence, alarms, settings.sessions_root, bus.tls)
+
+    def show(found: list[Alarm]) -> None:
+        store.own_faults = found
+
+    return shown(own, show)
+
+
 def run(
     settings: DashboardSettings,
     bus: BusSettings,
@@ -150,13 +174,15 @@ def run(
     watching: str = "",
     place: str = "",
     afar: bool = False,
+    alarms: AlarmSettings | None = None,
 ) -> None:
     """The dashboard until `stop` is set.
 
     `replay` starts replays for the sessions page (control.ProcessReplay); without it the page has
     no such button. `jobs` makes reports and exports in the background; `first_run` asks an
     administrator for the first board. `watching`: why nobody here may give orders. `place`: of a
-    site, this one. `afar`: the boards are at another place, over a link that may be slow. Raises
+    site, this one. `afar`: the boards are at another place, over a link that may be slow.
+    `alarms`: what is one, where no service of alarms runs at this place. Raises
     PortTaken when the port or viser's is in use, CertificateError, UsersError for a damaged users
     file, BusUnavailable when it is stopped before a router answers.
     """
@@ -164,6 +190,7 @@ def run(
         service as scene,
     )  # here: viser takes a second to import, a taken port should not wait
 
+    sys.setswitchinterval(SWITCH_S)
     certificate = open_certificate(settings)
     with listen(settings.host, settings.port) as bound:
         if not load_users(settings.users):
@@ -206,7 +233,10 @@ def run(
             keeping.start()
             log.info("dashboard at %s", settings.url)
             try:
-                with Beating(session, bus, viewers=front.lookers.by_role):
+                with (
+                    Beating(session, bus, viewers=front.lookers.by_role),
+                    _own_place(store, settings, bus, alarms),
+                ):
                     serve(front, bound, stop)
             finally:
                 if replay is not None:

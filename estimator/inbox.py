@@ -8,16 +8,22 @@ to end are never dropped.
 
 import threading
 from collections import deque
+from collections.abc import Callable
 from typing import Any
 
 from messages.history.mending_state import Arrival
+
+WAKE_S = 1.0  # who waits says so often that he does
 
 
 class Inbox:
     """A bounded queue of many lanes; `get` waits, all else returns at once."""
 
-    def __init__(self, most: int, most_bytes: int) -> None:
-        """most, most_bytes: of all arrivals that wait."""
+    def __init__(
+        self, most: int, most_bytes: int, waits: Callable[[], object] = lambda: None
+    ) -> None:
+        """most, most_bytes: of all arrivals that wait. waits(): there is still nothing."""
+        self._waits = waits
         self._most, self._most_bytes = most, most_bytes
         self._lanes: dict[str, deque[Any]] = {}
         self._turns: deque[str] = deque()  # lanes that hold something, the next first
@@ -59,7 +65,8 @@ class Inbox:
         """The next lane and its oldest item; None at the end."""
         with self._news:
             while not self._turns and not self._ended:
-                self._news.wait()
+                self._news.wait(WAKE_S)
+                self._waits()
             if not self._turns:
                 return None
             lane = self._turns.popleft()

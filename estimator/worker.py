@@ -18,6 +18,7 @@ from estimator.overload import Overload
 from estimator.pipeline import Pipeline
 from estimator.stream import worth_a_line
 from messages.bus import orders
+from messages.bus.turning import Loop
 from messages.clock import elapsed_ns
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import Refusal
@@ -33,6 +34,10 @@ BACKLOG = 20_000
 BACKLOG_BYTES = 256 << 20
 FAILURES_SHOWN = 20  # faults of ours that stand in the log with all that is known of them
 SAVE_S, SAVE_SHARE = 2.0, 0.05  # so often, and at most this share of the time: many boards are much
+KEEP_S, ORDER_S = (
+    15.0,
+    120.0,
+)  # that keeping the state, and an order, may take: a calibration is long
 SAMPLES = (ACCEL, IMU, ADC)  # inputs that may be passed over when there is no time for all
 
 
@@ -85,7 +90,8 @@ class Worker:
         )
         self._put, self._save, self._trouble, self._now_ns = put, save, trouble, now_ns
         self.overload = Overload()
-        self.inbox = Inbox(BACKLOG, BACKLOG_BYTES)
+        self._loop = Loop("estimator")
+        self.inbox = Inbox(BACKLOG, BACKLOG_BYTES, self._loop.turn)
         self._ready = 0  # messages that the mender has given on and the pipeline has not taken
         self._bad = 0
         self._save_at = time.monotonic() + SAVE_S
@@ -126,23 +132,29 @@ class Worker:
         `stop`: run() raises it, the supervisor starts anew.
         """
         try:
-            while (turn := self.inbox.get()) is not None:
-                device, item = turn
-                if isinstance(item, Order):
-                    self._obey(item)
-                elif isinstance(item, Gone):
-                    self.pipeline.forget(item.device)
-                    self.mender.forget(item.device)
-                    self.overload.forget(item.device)
-                elif isinstance(item, Ready):
-                    self._ready -= 1
-                    self._handle(item.arrival)
-                else:
-                    self._mend(device, item)
-                self._keep()
+            with self._loop:
+                while (turn := self.inbox.get()) is not None:
+                    self._loop.turn()
+                    self._do(*turn)
+                    self._keep()
         except BaseException as error:
             self.failure = error
             stop.set()
+
+    def _do(self, device: str, item: Any) -> None:
+        """One item of the inbox."""
+        if isinstance(item, Order):
+            with self._loop.during("an order", ORDER_S):
+                self._obey(item)
+        elif isinstance(item, Gone):
+            self.pipeline.forget(item.device)
+            self.mender.forget(item.device)
+            self.overload.forget(item.device)
+        elif isinstance(item, Ready):
+            self._ready -= 1
+            self._handle(item.arrival)
+        else:
+            self._mend(device, item)
 
     def _mend(self, device: str, item: Any) -> None:
         """A message, or the answer to a question: what is in order now is handled, one at a
@@ -176,7 +188,8 @@ class Worker:
             return
         began = time.monotonic()
         if began >= self._save_at:
-            self._save(self)
+            with self._loop.during("keeping the state", KEEP_S):
+                self._save(self)
             took = time.monotonic() - began
             self._save_at = began + max(SAVE_S, took / SAVE_SHARE)
 

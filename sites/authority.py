@@ -17,6 +17,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 from pydantic import BaseModel, ConfigDict
 
+from inertial.one_at_a_time import alone
 from messages.bus.tls import TRUSTED
 from messages.contract.names import NAME, Name
 from sites.place import SiteError, load_list, save_list, write
@@ -108,8 +109,21 @@ class Authority:
         for text in (place, name or place):
             if not NAME.fullmatch(text):
                 raise SiteError(f"name {text[:40]!r}: want a-z, 0-9, _ and - after a first letter")
+        with alone(self._folder):
+            return self._issue(request, role, place, name or place, devices, hosts, life)
+
+    def _issue(
+        self,
+        request: x509.CertificateSigningRequest,
+        role: str,
+        place: str,
+        name: str,
+        devices: tuple[str, ...],
+        hosts: tuple[str, ...],
+        life: dt.timedelta,
+    ) -> x509.Certificate:
         now, register = dt.datetime.now(dt.UTC), self.register()
-        common_name = _free_name(f"{role}.{name or place}", register)
+        common_name = _free_name(f"{role}.{name}", place, register)
         names = [_host(host) for host in dict.fromkeys((*HOSTS, *hosts))]
         key_id = x509.AuthorityKeyIdentifier.from_issuer_public_key(self._key.public_key())
         usages = [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]
@@ -135,6 +149,10 @@ class Authority:
 
     def revoke(self, common_name: str) -> int:
         """Take a common name from all certificates that have it; how many. Raises SiteError."""
+        with alone(self._folder):
+            return self._revoke(common_name)
+
+    def _revoke(self, common_name: str) -> int:
         register, now = self.register(), dt.datetime.now(dt.UTC)
         meant = [each for each in register if each.common_name == common_name]
         if not meant:
@@ -197,11 +215,13 @@ def _checked(request: x509.CertificateSigningRequest) -> None:
         raise SiteError("a request is not signed by its own key")
 
 
-def _free_name(wanted: str, register: list[Issued]) -> str:
-    """The name itself where no certificate of it was revoked, else with a number."""
-    revoked = {each.common_name for each in register if each.revoked is not None}
+def _free_name(wanted: str, place: str, register: list[Issued]) -> str:
+    """The name itself where no certificate of it was revoked and none is of another place, whose
+    rights would come with the name; else with a number.
+    """
+    taken = {e.common_name for e in register if e.revoked is not None or e.place != place}
     number, name = 1, wanted
-    while name in revoked:
+    while name in taken:
         number += 1
         name = f"{wanted}-{number}"
     return name

@@ -20,7 +20,8 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from messages.bus.tls import TRUSTED
+from inertial.one_at_a_time import alone
+from messages.bus.tls import TRUSTED, key_of
 from sites.authority import Authority, Issued, new_key, pem, private_pem, request_for
 from sites.invitation import hashed, load_book, save_book
 from sites.place import (
@@ -38,6 +39,8 @@ from sites.place import (
 AWAY = ("router", "dashboard", "operator", "authority")  # certificates of a place that watches
 KNOWN = "known.json"  # what home said of the certificates that count in a place
 LARGEST = 64_000  # bytes of a question
+LARGEST_ANSWER = 8 << 20  # of what home gives: a site of many machines has many names
+MOST_STANDING = 20  # certificates of one name that are renewed over the bus
 M = TypeVar("M", bound=BaseModel)
 Text = Field(max_length=8_000)
 
@@ -84,6 +87,10 @@ class Registrar:
     def join(self, question: bytes) -> bytes:
         """Certificates for a place that shows the secret of an invitation."""
         asked = _read(JoinRequest, question)
+        with alone(self._folder):
+            return self._join(asked)
+
+    def _join(self, asked: JoinRequest) -> bytes:
         here, book = load_place(self._folder), load_book(self._folder)
         entry = next((each for each in book if each.place == asked.place), None)
         given = hashed(asked.secret.encode())
@@ -99,6 +106,8 @@ class Registrar:
         authority = Authority(self._folder)
         requests = {role: load_request(text) for role, text in asked.requests.items()}
         peer = next(each for each in here.peers if each.place == entry.place)
+        names = [e.common_name for e in authority.register() if e.place == entry.place]
+        _not_too_often(authority, names, dt.datetime.now(dt.UTC))
         # noted before anything is issued: killed here, the same keys may ask again, others not
         used = entry.model_copy(update={"used": which})
         save_book(self._folder, [used if each is entry else each for each in book])
@@ -125,6 +134,10 @@ class Registrar:
         may have ended.
         """
         asked = _read(RenewRequest, question)
+        with alone(self._folder):
+            return self._renew(asked, ended_of)
+
+    def _renew(self, asked: RenewRequest, ended_of: str) -> bytes:
         authority = Authority(self._folder)
         try:
             old = x509.load_pem_x509_certificate(asked.certificate.encode())
@@ -143,6 +156,8 @@ class Registrar:
         )
         if not stands:
             raise SiteError("the old certificate has ended or was revoked: join the site again")
+        if not ended_of:
+            _not_too_often(authority, [entry.common_name], now)
         hosts = tuple(
             str(name.value)
             for name in old.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
@@ -171,7 +186,7 @@ def renewal(folder: Path, role: str) -> tuple[bytes, bytes]:
     """A new key, PEM, and the question that renews the certificate of a role. Raises OSError,
     ValueError for files that cannot be read.
     """
-    old = serialization.load_pem_private_key((folder / f"{role}.key").read_bytes(), None)
+    old = serialization.load_pem_private_key(key_of(folder, role).read_bytes(), None)
     ((key, request),) = new_requests((role,)).values()
     signature = old.sign(request.encode(), ec.ECDSA(hashes.SHA256()))
     asked = RenewRequest(
@@ -184,7 +199,7 @@ def renewal(folder: Path, role: str) -> tuple[bytes, bytes]:
 
 def keep(folder: Path, answer: bytes, keys: dict[str, bytes], trusted: bytes) -> Answer:
     """Write what home gave, after a look at it; raises SiteError for what is not of this site."""
-    given = _read(Answer, answer)
+    given = _read(Answer, answer, LARGEST_ANSWER)
     authority = x509.load_pem_x509_certificate(trusted)
     if set(given.certificates) != set(keys):
         raise SiteError(f"home gave {', '.join(given.certificates)}: want {', '.join(keys)}")
@@ -215,20 +230,31 @@ def known_here(folder: Path, place: Place) -> list[Issued]:
     return load_list(folder / KNOWN, Issued, "join the site again")
 
 
+def _not_too_often(authority: Authority, names: list[str], now: dt.datetime) -> None:
+    """Raises SiteError: who asks again and again would fill home's register, and its disk."""
+    for name in names:
+        standing = [e for e in authority.register() if e.common_name == name and e.stands(now)]
+        if len(standing) >= MOST_STANDING:
+            raise SiteError(f"{len(standing)} certificates of {name} stand already: use the last")
+
+
 def _standing(authority: Authority, place: str, home: str) -> list[Issued]:
-    """What a place has to know: its own certificates, and those of home that call there."""
+    """What a place has to know: its own certificates, and those of home that call there; of each
+    name the last.
+    """
     now = dt.datetime.now(dt.UTC)
-    return [
-        each
+    meant = {
+        each.common_name: each
         for each in authority.register()
         if each.stands(now)
         and (each.place == place or (each.place == home and each.role in CALLING))
-    ]
+    }
+    return list(meant.values())
 
 
-def _read(model: type[M], content: bytes) -> M:
-    if len(content) > LARGEST:
-        raise SiteError(f"{len(content)} bytes are too much: want at most {LARGEST}")
+def _read(model: type[M], content: bytes, most: int = LARGEST) -> M:
+    if len(content) > most:
+        raise SiteError(f"{len(content)} bytes are too much: want at most {most}")
     try:
         return model.model_validate_json(content)
     except ValidationError as error:

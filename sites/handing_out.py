@@ -3,6 +3,7 @@
 import datetime as dt
 from pathlib import Path
 
+from inertial.one_at_a_time import alone
 from messages.bus.tls import TRUSTED
 from sites.authority import Authority, Issued, pem
 from sites.enrolment import load_request, new_requests
@@ -25,8 +26,24 @@ def hand_out(
         raise SiteError(f"no certificate of role {role!r} is handed out: want {', '.join(wanted)}")
     if bool(devices) != (role == "gateway"):
         raise SiteError("a gateway's certificate names its boards (--board), others none")
+    with alone(folder):
+        return _hand_out(authority, folder, role, name, devices, life, out)
+
+
+def _hand_out(
+    authority: Authority,
+    folder: Path,
+    role: str,
+    name: str,
+    devices: tuple[str, ...],
+    life: dt.timedelta,
+    out: Path,
+) -> Issued:
     ((key, request),) = new_requests((role,)).values()
-    here = load_place(folder).place
+    place = load_place(folder)
+    here = place.place
+    if name in {peer.place for peer in place.peers}:
+        raise SiteError(f"{name} is a place of this site: choose another name for the machine")
     if any(each.common_name == f"{role}.{name}" for each in authority.register()):
         raise SiteError(f"{role}.{name} was issued already: choose another name for the machine")
     with new_folder(out) as draft:

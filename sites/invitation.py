@@ -14,6 +14,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from inertial.one_at_a_time import alone
 from messages.contract.names import Name
 from sites.authority import Authority, new_key, pem, private_pem, request_for
 from sites.place import Peer, Place, Seat, SiteError, load_list, load_place, save_list, save_place
@@ -87,6 +88,13 @@ def invite(
     """Prepare for a place to join, at home: it becomes a peer whose router, at `address`, is
     called from now on. Raises SiteError.
     """
+    with alone(folder):
+        return _invite(folder, place, seat, address, life)
+
+
+def _invite(
+    folder: Path, place: str, seat: Seat, address: str, life: dt.timedelta
+) -> tuple[Invitation, Place]:
     here, authority = load_place(folder), Authority(folder)
     if not here.at_home:
         raise SiteError(f"places are invited at the site's home, {here.home}")
@@ -116,7 +124,9 @@ def invite(
         ends=entry.ends,
         common_name=entry.common_name,
     )
-    save_book(folder, [*load_book(folder), known])
+    # in place of one that was cut off here, before anybody saw it
+    others = [each for each in load_book(folder) if each.place != place]
+    save_book(folder, [*others, known])
     here = here.model_copy(update={"peers": (*here.peers, peer)})
     save_place(folder, here)
     return invitation, here

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import zenoh
 
+from inertial.one_at_a_time import alone
 from messages.bus.session import BusSettings, open_router
 from messages.bus.tls import TRUSTED
 from sites.authority import Authority, pem
@@ -34,13 +35,17 @@ def make_site(folder: Path, name: str, extra: tuple[str, ...] = ()) -> Place:
     """A new site whose home is here, with a certificate for each of its services. Raises
     SiteError.
     """
-    if (folder / PLACE).exists():
-        raise SiteError(f"{folder} is a place of {load_place(folder).site} already")
+    _not_a_place(folder)
     place = Place(site=name, place=name, home=name)
     with new_folder(folder) as draft:
         issue_here(draft, Authority.create(draft, name), place, (*SERVICES, *extra))
         save_place(draft, place)
     return place
+
+
+def _not_a_place(folder: Path) -> None:
+    if (folder / PLACE).exists():
+        raise SiteError(f"{folder} is a place of {load_place(folder).site} already")
 
 
 def issue_here(folder: Path, authority: Authority, place: Place, roles: tuple[str, ...]) -> None:
@@ -74,9 +79,22 @@ def join(
     for, once. Raises SiteError; OSError where the folder cannot be written, zenoh.ZError where
     nothing can listen at `listen`.
     """
-    if (folder / PLACE).exists():
-        raise SiteError(f"{folder} is a place of {load_place(folder).site} already")
+    _not_a_place(folder)
     temporary = folder / JOINING
+    temporary.mkdir(parents=True, exist_ok=True, mode=0o700)
+    with alone(temporary):
+        _not_a_place(folder)  # it may have become one while another joined here
+        return _join(folder, temporary, invitation, listen, stop, said)
+
+
+def _join(
+    folder: Path,
+    temporary: Path,
+    invitation: Invitation,
+    listen: str,
+    stop: threading.Event,
+    said: Callable[[str], None],
+) -> Place:
     trusted = invitation.trusted.encode()
     write(temporary / TRUSTED, trusted, 0o644)
     write_identity(temporary, "join", invitation.key.encode(), invitation.certificate.encode())

@@ -14,7 +14,8 @@ from typing import Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from inertial.whole_file import put_in_place
+from inertial.whole_file import put_in_place, sync_folder
+from messages.bus.tls import NEXT
 from messages.contract.names import Name
 
 Seat = Literal["viewer", "operator"]  # what the people of another place may do here
@@ -106,9 +107,14 @@ def save_list(path: Path, entries: Iterable[BaseModel]) -> None:
 
 
 def write_identity(folder: Path, role: str, key: bytes, certificate: bytes) -> None:
-    """Write key and certificate of a role, both PEM."""
-    write(folder / f"{role}.key", key)
+    """Write key and certificate of a role, both PEM: cut off anywhere, the old pair or the new one
+    is there as a whole (messages.bus.tls.key_of).
+    """
+    waiting = folder / f"{role}.key{NEXT}"
+    write(waiting, key)
     write(folder / f"{role}.pem", certificate, 0o644)
+    waiting.replace(folder / f"{role}.key")
+    sync_folder(folder)
 
 
 @contextlib.contextmanager
@@ -139,5 +145,6 @@ def write(path: Path, content: bytes, mode: int = 0o600) -> None:
             stream.flush()
             os.fsync(stream.fileno())
         put_in_place(draft, path)
+        sync_folder(path.parent)
     finally:
         draft.unlink(missing_ok=True)

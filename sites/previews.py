@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import zenoh
 from google.protobuf.message import DecodeError
 
+from messages.bus.turning import Loop
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 from messages.contract.checks import check
@@ -190,17 +191,19 @@ class Previews:
     def _make(self) -> None:
         due = dict.fromkeys((*RATES, 0), 0.0)
         looked = 0.0
-        while not self._stop.wait(LOOK_S if self._watched else IDLE_S):
-            now = time.monotonic()
-            if now - looked > IDLE_S:
-                looked = now
-                self._look()
-            for rate in due:
-                if now < due[rate]:
-                    continue
-                period = 1.0 / rate if rate else KEPT_EVERY_S
-                due[rate] = max(due[rate] + period, now)
-                self._round(rate)
+        with Loop("previews") as loop:
+            while not self._stop.wait(LOOK_S if self._watched else IDLE_S):
+                loop.turn()
+                now = time.monotonic()
+                if now - looked > IDLE_S:
+                    looked = now
+                    self._look()
+                for rate in due:
+                    if now < due[rate]:
+                        continue
+                    period = 1.0 / rate if rate else KEPT_EVERY_S
+                    due[rate] = max(due[rate] + period, now)
+                    self._round(rate)
 
     def _look(self) -> None:
         """Which rates are watched?"""

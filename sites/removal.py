@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from inertial.one_at_a_time import alone
 from sites.authority import Authority
 from sites.invitation import load_book, save_book
 from sites.place import SiteError, load_place, save_place
@@ -9,6 +10,11 @@ from sites.place import SiteError, load_place, save_place
 
 def remove(folder: Path, place: str) -> int:
     """Revoke all certificates of a place and forget it; how many. Raises SiteError."""
+    with alone(folder):
+        return _remove(folder, place)
+
+
+def _remove(folder: Path, place: str) -> int:
     here, authority = load_place(folder), Authority(folder)
     if place == here.place:
         raise SiteError(f"{place} is this place: the home of a site cannot be removed")

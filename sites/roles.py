@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from messages.bus import orders
+from messages.bus.pulse import UP
 from messages.contract import topics as tp
 from messages.contract.topics import GATEWAY, RECORDER, TOPICS, check_name
 from messages.previews.frames import frame_key, lane_key, overview_key
@@ -123,11 +124,17 @@ def order_keys(site: str) -> tuple[str, ...]:
 
 
 def presence(site: str, place: str, role: str) -> Rights:
-    """Everybody but a viewer may say that he is there: under his own place and role, no other's."""
+    """Everybody but a viewer may say that he is there: under his own place and role, no other's;
+    and that whoever started him is.
+    """
     if role not in (*SERVICES, "simulator"):
         return Rights()
     beat, token = tp.BEAT.pattern(site, place), tp.alive_key(site, place, "*")
-    return Rights(put=(f"{beat[:-1]}{role}-$*",), token=(f"{token[:-1]}{role}-$*",))
+    said = (role, UP)
+    return Rights(
+        put=tuple(f"{beat[:-1]}{name}-$*" for name in said),
+        token=tuple(f"{token[:-1]}{name}-$*" for name in said),
+    )
 
 
 def presence_of(site: str, place: str = "*") -> Rights:

@@ -5,18 +5,22 @@ Renewed files are seen by `gyrofree up`, which starts the service concerned anew
 port stays open meanwhile, so no board notices.
 """
 
+import contextlib
 import datetime as dt
 import logging
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
 import zenoh
 from cryptography import x509
 
+from inertial.one_at_a_time import alone
 from messages.bus.beating import Beating, tell_time
 from messages.bus.session import BusSettings, open_client
 from messages.bus.tls import TRUSTED
+from messages.bus.turning import Loop
 from sites.authority import DAYS
 from sites.copying.fetching import INDEX, Copies
 from sites.copying.roads import Roads
@@ -33,8 +37,13 @@ AGAIN_S = 60.0  # after a renewal that did not succeed
 LEFT = dt.timedelta(days=DAYS / 3)  # of a certificate's life; less is renewed
 ASK_S = 10.0
 INDEX_S = 15.0  # for what there is: short, and asked again
+RENEW_S = 120.0  # that asking for a certificate of each role may take
 SEGMENT_S = 60.0  # for a part or a list of segments over a slow link
+WAKE_S = 1.0  # while nothing is to be done, that much is said so often
+HASH_S = 60.0  # that reading and hashing a file may take between two segments
 ROUND_S = 1.0  # between two looks at what home has recorded
+
+Beside = Callable[[zenoh.Session], contextlib.AbstractContextManager[None]]
 
 log = logging.getLogger(__name__)
 
@@ -49,9 +58,11 @@ def run(
     bus: BusSettings,
     stop: threading.Event,
     settings: SiteSettings | None = None,
+    beside: Beside = lambda _: contextlib.nullcontext(),
 ) -> None:
     """Until `stop`; raises SiteError where the folder has no place. sessions: the folder of the
-    recordings, which home shows and others fill.
+    recordings, which home shows and others fill. beside: what else runs at a place that is not
+    home, with the session.
     """
     settings = settings or SiteSettings()
     place = load_place(folder)
@@ -81,13 +92,13 @@ def run(
             for one in declared:
                 one.undeclare()
         else:
-            copy(Copies(sessions, folder), place.site, session, stop)
+            with beside(session):
+                copy(Copies(sessions, folder), place.site, session, stop)
         keeping.join(ASK_S + 1.0)
 
 
 def copy(copies: Copies, site: str, session: zenoh.Session, stop: threading.Event) -> None:
     """Bring home's recordings here, round after round, until `stop`."""
-
     until = cancelled_by(stop)
 
     def ask(key: str) -> bytes:
@@ -96,14 +107,21 @@ def copy(copies: Copies, site: str, session: zenoh.Session, stop: threading.Even
 
     roads = Roads(session, site, ask)
     said = ""
-    while not stop.wait(ROUND_S):
-        try:
-            copies.round(roads, stop.is_set)
-            said = ""
-        except (SiteError, OSError) as error:
-            if str(error) != said and not stop.is_set():
-                log.warning("recordings are not copied: %s", error)
-            said = str(error)
+    with Loop("copies", SEGMENT_S + HASH_S) as loop:
+
+        def stopped() -> bool:
+            loop.turn()
+            return stop.is_set()
+
+        while not stop.wait(ROUND_S):
+            loop.turn()
+            try:
+                copies.round(roads, stopped)
+                said = ""
+            except (SiteError, OSError) as error:
+                if str(error) != said and not stop.is_set():
+                    log.warning("recordings are not copied: %s", error)
+                said = str(error)
 
 
 def cancelled_by(stop: threading.Event) -> zenoh.CancellationToken:
@@ -121,9 +139,13 @@ def cancelled_by(stop: threading.Event) -> zenoh.CancellationToken:
 def _keep_certificates(
     folder: Path, place: Place, session: zenoh.Session, stop: threading.Event
 ) -> None:
-    ask, pause = _asker(folder, place, session, cancelled_by(stop)), AGAIN_S / 10
-    while not stop.wait(pause):
-        pause = LOOK_S if look(folder, place, ask) else AGAIN_S
+    ask, due = _asker(folder, place, session, cancelled_by(stop)), time.monotonic() + AGAIN_S / 10
+    with Loop("certificates") as loop:
+        while not stop.wait(WAKE_S):
+            loop.turn()
+            if time.monotonic() >= due:
+                with loop.during("renewing certificates", RENEW_S):
+                    due = time.monotonic() + (LOOK_S if look(folder, place, ask) else AGAIN_S)
 
 
 def look(folder: Path, place: Place, ask: Callable[[bytes], bytes]) -> bool:
@@ -149,8 +171,9 @@ def look(folder: Path, place: Place, ask: Callable[[bytes], bytes]) -> bool:
 
 def renew(folder: Path, role: str, ask: Callable[[bytes], bytes]) -> None:
     """Have the certificate of a role made anew; raises SiteError, OSError, ValueError."""
-    key, question = renewal(folder, role)
-    keep(folder, ask(question), {role: key}, (folder / TRUSTED).read_bytes())
+    with alone(folder):
+        key, question = renewal(folder, role)
+        keep(folder, ask(question), {role: key}, (folder / TRUSTED).read_bytes())
 
 
 def own_certificates(folder: Path) -> dict[str, dt.datetime]:

@@ -37,6 +37,7 @@ class Found:
 
     causes: dict[str, Cause]
     looked_at: frozenset[str]
+    lasted: frozenset[str] = frozenset()  # causes that have stayed for as long as it takes
 
 
 def of_device(store: Store, device: Device, settings: AlarmSettings, now: float) -> Found:
@@ -85,7 +86,8 @@ def of_bench(
                 " delete old sessions, or record elsewhere"
             )
             found.append(Alarm("disk", "disk low", text, ""))
-    return Found(_causes(found, settings), frozenset(kinds))
+    lasted = frozenset(one.id for one in found if one.lasted)
+    return Found(_causes(found, settings), frozenset(kinds), lasted)
 
 
 def free_bytes(folder: Path) -> int | None:

@@ -12,7 +12,7 @@ from dashboard.data.fault import Alarm
 from dashboard.data.lateness import clock
 from dashboard.data.store import Store
 from messages.bus import tls
-from messages.bus.presence import Process, State
+from messages.bus.presence import Process
 from messages.text import plain
 
 FOLDER_S = 60.0  # between two looks at the certificates of this place
@@ -35,7 +35,7 @@ class Certificates:
         for one in store.presence.all():
             ends_s = one.beat.certificate_ends_utc_ns * 1e-9
             about = f"{one.place}-{one.role}"
-            if ends_s and about not in said and one.state is State.RUNNING:
+            if ends_s and about not in said and one.lives:
                 said.add(about)
                 life_s = one.beat.certificate_life_s
                 yield from _near(about, f"{one.role} at {one.place}", ends_s, life_s, days, now_s)
@@ -77,7 +77,7 @@ def clocks_off(store: Store, settings: AlarmSettings) -> Iterator[Alarm]:
     """Clocks that differ from the site's, or that nobody can compare. Call under the store's
     lock.
     """
-    running = [one for one in store.presence.all() if one.state is State.RUNNING and one.beats]
+    running = [one for one in store.presence.all() if one.lives and one.beats]
     for place in sorted({one.place for one in running}):
         there = [one for one in running if one.place == place]
         known = [one for one in there if math.isfinite(one.beat.clock_ahead_s)]

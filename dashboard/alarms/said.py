@@ -140,3 +140,29 @@ def way(sender: Sender) -> pb.AlarmReply.Way:
         given_up=sender.given_up,
         fault=plain(sender.fault, 300),
     )
+
+
+def source(heard: object) -> int:
+    """Where a device's data come from, as its link says."""
+    return pb.SOURCE_UNKNOWN if heard is None else heard.message.header.source  # type: ignore[attr-defined]
+
+
+def steady(alarm: pb.Alarm) -> bytes:
+    """What makes a message worth sending at once."""
+    kept = pb.Alarm()
+    kept.CopyFrom(alarm)
+    kept.shelved_s = 1.0 if alarm.shelved_s else 0.0
+    kept.text, kept.value = "", 0.0
+    return kept.SerializeToString(deterministic=True)
+
+
+def sides(limit: pb.AlarmLimit) -> str:
+    """ "above 200 or below -200"."""
+    sides = [f"above {limit.above:g}"] if limit.HasField("above") else []
+    return " or ".join(sides + ([f"below {limit.below:g}"] if limit.HasField("below") else []))
+
+
+def fault(one: object) -> str:
+    """What pydantic finds wrong with a limit, in a line."""
+    where = ".".join(map(str, one["loc"]))  # type: ignore[index]
+    return f"{where}: {one['msg']}" if where else str(one["msg"])  # type: ignore[index]

@@ -25,6 +25,7 @@ from logs.figures.quantity import ExpressionError
 from messages.bus import orders
 from messages.bus.claiming import Claim
 from messages.bus.session import BusSettings
+from messages.bus.turning import Loop
 from messages.bus.turns import in_turn, sessions
 from messages.clock import Clock, elapsed_s
 from messages.contract import gyrofree_pb2 as pb
@@ -153,14 +154,15 @@ class Service:
     def _publish(self, now: Now) -> None:
         with self._store.lock:
             sources = {
-                name: _source(self._store.devices[name].get("link")) for name in self._store.names()
+                name: said.source(self._store.devices[name].get("link"))
+                for name in self._store.names()
             }
         for device, source in sources.items():
             if device.endswith("-replay"):
                 continue
             points = [p for key, p in self._watch.book.points.items() if key[0] in ("", device)]
             alarms = [said.alarm(point, now) for point in said.in_order(points)[:SHOWN]]
-            content = b"".join(_steady(one) for one in alarms)
+            content = b"".join(said.steady(one) for one in alarms)
             when, before = self._sent.get(device, (-STATUS_S, b""))
             if now.s - when < STATUS_S and content == before:
                 continue
@@ -219,7 +221,7 @@ class Service:
         except (NoSuchAlarm, ExpressionError) as error:
             return False, str(error)
         except ValidationError as error:
-            return False, "; ".join(_fault(one) for one in error.errors()[:5])
+            return False, "; ".join(said.fault(one) for one in error.errors()[:5])
         return False, "no such order"
 
     def _set_limit(self, wanted: pb.AlarmLimit, who: str, now: Now) -> str:
@@ -231,7 +233,7 @@ class Service:
         what = "limit changed" if limit.name in self._own else "limit set"
         self._watch.set_limit(limit)
         self._own[limit.name], self._users[limit.name] = limit, who
-        self._note(limit.name, what, who, f"{limit.field} {_sides(wanted)}", limit.level, now)
+        self._note(limit.name, what, who, f"{limit.field} {said.sides(wanted)}", limit.level, now)
         return f"{limit.name}: {what}"
 
     def _remove_limit(self, name: str, who: str, now: Now) -> str:
@@ -272,30 +274,6 @@ class Service:
         order.answer(self._reply(ok and bool(found), "; ".join(found) or none))
 
 
-def _source(heard: object) -> int:
-    """Where a device's data come from, as its link says."""
-    return pb.SOURCE_UNKNOWN if heard is None else heard.message.header.source  # type: ignore[attr-defined]
-
-
-def _steady(alarm: pb.Alarm) -> bytes:
-    """What makes a message worth sending at once."""
-    kept = pb.Alarm()
-    kept.CopyFrom(alarm)
-    kept.shelved_s = 1.0 if alarm.shelved_s else 0.0
-    kept.text, kept.value = "", 0.0
-    return kept.SerializeToString(deterministic=True)
-
-
-def _sides(limit: pb.AlarmLimit) -> str:
-    sides = [f"above {limit.above:g}"] if limit.HasField("above") else []
-    return " or ".join(sides + ([f"below {limit.below:g}"] if limit.HasField("below") else []))
-
-
-def _fault(fault: object) -> str:
-    where = ".".join(map(str, fault["loc"]))  # type: ignore[index]
-    return f"{where}: {fault['msg']}" if where else str(fault["msg"])  # type: ignore[index]
-
-
 def run(settings: AlarmSettings, recordings: Path, bus: BusSettings, stop: threading.Event) -> None:
     """Watch until `stop` is set; wait while another process does."""
     with sessions(bus, stop) as mine:
@@ -322,9 +300,11 @@ def _serve(
     service = Service(settings, recordings, session, bus.prefix, claimed.number, bus.tls)
     log.info("watching %s/*: %d limits", bus.prefix, len(settings.limits))
     try:
-        while not (claimed.lost.is_set() or stop.is_set()):
-            service.step()
-            service.wake.wait(TICK_S)
-            service.wake.clear()
+        with Loop("alarms") as loop:
+            while not (claimed.lost.is_set() or stop.is_set()):
+                loop.turn()
+                service.step()
+                service.wake.wait(TICK_S)
+                service.wake.clear()
     finally:
         service.close(tidy=not claimed.lost.is_set())

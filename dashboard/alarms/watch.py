@@ -2,7 +2,8 @@
 
 import math
 import time
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dashboard.alarms import health
@@ -109,6 +110,7 @@ class Watch:
     recordings: Path
     book: Book
     certificates: Certificates | None = None
+    only: Callable[[str], bool] = bool  # which faults of the bench, by their ids; any
     limits: dict[str, LimitSettings] = field(default_factory=dict)
     eyes: dict[tuple[str, str], Eye] = field(default_factory=dict)  # limit, device
     _turning: dict[tuple[str, str], float] = field(default_factory=dict)  # since, elapsed s
@@ -146,7 +148,8 @@ class Watch:
             bench = health.of_bench(
                 self.store, self.settings, self.recordings, at, self.certificates
             )
-        self._health("", bench, now)
+        ours = {id: cause for id, cause in bench.causes.items() if self.only(id)}
+        self._health("", replace(bench, causes=ours), now)
         for device, id in [key for key in self.book.points if key[0] and key[0] not in names]:
             self.book.unknown(device, id)
         for (_, device), eye in self.eyes.items():
@@ -164,7 +167,8 @@ class Watch:
         }
         for id, cause in found.causes.items():
             active = id in mine and mine[id].active
-            if active or self._has_lasted(device, id, self.settings.on_delay_s, now):
+            delay_s = 0.0 if id in found.lasted else self.settings.on_delay_s
+            if active or self._has_lasted(device, id, delay_s, now):
                 self.book.found(device, id, cause, now)
                 self._turning.pop((device, id), None)
         for id, point in mine.items():

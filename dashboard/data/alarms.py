@@ -11,7 +11,12 @@ from typing import Any
 from dashboard.data.device import BEHIND_STALE_S, Device
 from dashboard.data.fault import Alarm
 from dashboard.data.store import Store
-from dashboard.data.there import service_faults, twin_fault
+from dashboard.data.there import (
+    gateway_out_of_reach,
+    role_out_of_reach,
+    service_faults,
+    twin_fault,
+)
 from logs.figures.words import words_of
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
@@ -92,7 +97,8 @@ def alarms(store: Store, device: Device, now: float | None = None) -> list[Alarm
     if store.replay.state(device.name, time.monotonic()) == "ended":
         return []
     now = time.monotonic() if now is None else now
-    found = [*twin_fault(store, device.name), *faults(device, now)]
+    cut = gateway_out_of_reach(store, device.name)
+    found = [*twin_fault(store, device.name), *faults(device, now, cut)]
     return judged(found, device, now, False)[:MOST]
 
 
@@ -126,10 +132,13 @@ def _said(one: pb.Alarm) -> dict[str, Any]:
     return {"level": level, "state": state, "raised_s": one.raised_utc_ns * 1e-9}
 
 
-def faults(device: Device, now: float) -> list[Alarm]:
-    """All of them. Call under the store's lock."""
-    found = [*_table(device, now), *_link(device, now), *_board(device, now), *_axes(device, now)]
-    return [*found, *_estimators(device, now), *_sight(device, now)]
+def faults(device: Device, now: float, cut: bool = False) -> list[Alarm]:
+    """All of them. Call under the store's lock. cut: its place is out of reach, which is an alarm
+    of its own: whoever is silent there is not blamed for it.
+    """
+    found = [*_table(device, now), *_link(device, now, cut), *_board(device, now)]
+    found += [*_axes(device, now), *_estimators(device, now, cut), *_sight(device, now)]
+    return found
 
 
 def bench_alarms(store: Store, now: float | None = None) -> list[Alarm]:
@@ -141,12 +150,16 @@ def bench_alarms(store: Store, now: float | None = None) -> list[Alarm]:
 
 def bench_faults(store: Store, now: float | None = None) -> list[Alarm]:
     """As found here. Call under the store's lock."""
-    return [*_recorder(store, now), *service_faults(store)]
+    found = [*_recorder(store, now), *service_faults(store)]
+    known = {one.id for one in found}
+    return found + [one for one in store.own_faults if one.id not in known]
 
 
 def _recorder(store: Store, now: float | None) -> Iterator[Alarm]:
     heard = store.recorder
-    if heard is None:
+    if heard is None or (
+        heard.age(now) > RECORDER_STALE_S and role_out_of_reach(store, "recorder")
+    ):
         return
     text = plain(heard.message.message)
     if heard.message.recording and heard.age(now) > RECORDER_STALE_S:
@@ -178,12 +191,14 @@ def _table(device: Device, now: float) -> Iterator[Alarm]:
         yield Alarm("table", "the table may turn", plain(heard.message.alarm), "procedure", "turns")
 
 
-def _link(device: Device, now: float) -> Iterator[Alarm]:
+def _link(device: Device, now: float, cut: bool) -> Iterator[Alarm]:
     heard = device.get("link")
     if heard is None:
         return
     m = heard.message
     if device.stale("link", now=now):
+        if cut:
+            return
         text = f"its gateway has been silent for {heard.age(now):.0f} s: does it still run?"
         yield Alarm("link", "gateway silent", text, "link")
     elif not m.connected and not m.bytes_in and now - device.born < STARTING_S:
@@ -221,12 +236,14 @@ def _axes(device: Device, now: float) -> Iterator[Alarm]:
         yield Alarm("axis", title, text + (", not used" if axis.excluded else ""), "health", name)
 
 
-def _estimators(device: Device, now: float) -> Iterator[Alarm]:
+def _estimators(device: Device, now: float, cut: bool) -> Iterator[Alarm]:
     page = {"nav": "position", "attitude": "tilt", "rate": "rates"}[device.body]
     for name in device.estimators("estimator"):
         heard = device.get("estimator", name)
         m, called = heard.message, plain(name, 40)
         if device.stale("estimator", name, now):
+            if cut:
+                continue
             text = f"nothing from it for {heard.age(now):.0f} s: does its process still run?"
             yield Alarm("estimator", f"{called} silent", text, page, called)
             continue

@@ -1,5 +1,6 @@
 """What is known of one device: the newest message of each topic, tables over time, tracks."""
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -19,6 +20,7 @@ LEADERS = (  # estimators that stand first wherever they run
 )
 HISTORY_S = 620.0  # kept in the rings; the longest window a view offers is 600 s
 STALE_S = 1.0  # a value older than this is greyed
+PREVIEW_PAUSES = 3.0  # of a preview's rows, before what it shows is greyed, too
 SLOW_STALE_S = {
     "link": 3.0,
     "status": 3.0,
@@ -130,8 +132,15 @@ class Device:
     def stale(self, topic: str, estimator: str = "", now: float | None = None) -> bool:
         """True when there is none or it is older than its topic allows."""
         latest = self.get(topic, estimator)
-        old = latest is None or latest.age(now) > SLOW_STALE_S.get(topic, STALE_S)
+        limit_s = max(SLOW_STALE_S.get(topic, STALE_S), PREVIEW_PAUSES * self.thinned_s)
+        old = latest is None or latest.age(now) > limit_s
         return old or (topic in ESTIMATED and self.behind_s(estimator) > BEHIND_STALE_S)
+
+    @property
+    def thinned_s(self) -> float:
+        """Between two rows of the preview that comes now, s; 0: everything comes."""
+        last = self.thin[-1] if self.thin else (0.0, -math.inf, 0.0)
+        return last[2] if self.t_newest - last[1] < PREVIEW_PAUSES * last[2] else 0.0
 
     def behind_s(self, estimator: str) -> float:
         """By how much an estimator says that it is behind its samples, s."""

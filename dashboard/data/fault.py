@@ -15,6 +15,7 @@ class Alarm:
     level: str = ""  # watch, warning or critical, where the service has said so
     state: str = ""  # unacknowledged or acknowledged, likewise
     raised_s: float = 0.0  # s since 1970, likewise
+    lasted: bool = False  # whoever found it has waited for it to stay
 
     @property
     def id(self) -> str:

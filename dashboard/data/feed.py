@@ -21,6 +21,7 @@ from dashboard.data.store import Store
 from messages.bus.fencing import Fence
 from messages.bus.presence import Watching
 from messages.bus.session import connected
+from messages.bus.turning import Loop
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 from messages.contract.checks import Refusal
@@ -108,9 +109,11 @@ class Feed:
         answering = self._fence.declare(self._session, self._prefix)
         watching = Watching(self._session, self._prefix, self._store.presence)
         log.info("showing %s/*", self._prefix)
-        while not self._stop.wait(BUSY_S if self._watched.is_set() else IDLE_S):
-            self._drain()
-            self._look()
+        with Loop("feed") as loop:
+            while not self._stop.wait(BUSY_S if self._watched.is_set() else IDLE_S):
+                loop.turn()
+                self._drain()
+                self._look()
         self._far.close()
         self._overviews.close()
         watching.undeclare()

@@ -105,37 +105,67 @@ def lateness(store: Store, device: Device, wall_s: float | None = None) -> Laten
     """
     if device.name.endswith(REPLAY_SUFFIX) or not device.rings:
         return None
-    presence, mine, gateway = (
-        store.presence,
-        store.presence.mine,
-        store.presence.gateway_of(device.name),
-    )
-    ahead, bound = ahead_of(mine)
-    theirs, their_bound = ahead_of(gateway)
+    presence, gateway = store.presence, store.presence.gateway_of(device.name)
     there = gateway.place if gateway is not None else ""
     afar = presence.here not in ("", there) and len(presence.places()) > 1
-    why, hz = _why(gateway, ahead, theirs), float(store.preview_hz)
-    if why:
-        return Lateness(math.nan, math.nan, ahead, bound, why, afar, hz)
-    link = device.get("link")
-    was_set = 0.0 if link is None else link.message.clock_offset_s
-    theirs -= was_set  # time stamps go on without it
-    sample_s = device.utc0_ns * 1e-9 + device.t_newest
-    age = (time.time() if wall_s is None else wall_s) - ahead - (sample_s - theirs)
     data = max(device.latest.values(), key=lambda one: one.arrived)
-    sigma = data.message.header.utc_sigma_s - (abs(was_set) if abs(was_set) >= STEP_S else 0.0)
-    total = bound + their_bound + SIGMAS * max(sigma, 0.0)
-    return Lateness(age, total, ahead, bound, "", afar, hz)
+    sample_s = device.utc0_ns * 1e-9 + device.t_newest
+    age = age_of(store, device, sample_s, data.message.header.utc_sigma_s, wall_s)
+    ahead, bound = ahead_of(presence.mine)
+    return Lateness(age.s, age.bound_s, ahead, bound, age.why, afar, float(store.preview_hz))
 
 
-def _why(gateway: Process | None, ahead: float, theirs: float) -> str:
+@dataclass(frozen=True)
+class Age:
+    """By the clock of the site."""
+
+    s: float  # NaN: not known
+    bound_s: float  # the most that it may be wrong by; NaN: not known
+    why: str = ""  # it is not known; empty: it is
+
+
+def age_of(
+    store: Store, device: Device, sample_s: float, sigma_s: float, wall_s: float | None = None
+) -> Age:
+    """Of what a device said of `sample_s`, s since 1970 by its gateway's clock, +- sigma_s. Call
+    under the store's lock. wall_s: time.time().
+    """
+    if device.name.endswith(REPLAY_SUFFIX):
+        return Age(math.nan, math.nan, "a replay: its time is another")
+    gateway, link = store.presence.gateway_of(device.name), device.get("link")
+    was_set = 0.0 if link is None else link.message.clock_offset_s  # time stamps go on without it
+    sigma_s -= abs(was_set) if abs(was_set) >= STEP_S else 0.0
+    return said_by(store, gateway, "gateway", sample_s + was_set, sigma_s, wall_s)
+
+
+def said_by(
+    store: Store,
+    process: Process | None,
+    role: str,
+    said_s: float,
+    sigma_s: float = 0.0,
+    wall_s: float | None = None,
+) -> Age:
+    """Of what a process said at `said_s`, s since 1970 by its own clock, +- sigma_s. Call under the
+    store's lock. role: of it, for people.
+    """
+    ahead, bound = ahead_of(store.presence.mine)
+    theirs, their_bound = ahead_of(process)
+    why = _why(process, role, ahead, theirs)
+    if why:
+        return Age(math.nan, math.nan, why)
+    age = (time.time() if wall_s is None else wall_s) - ahead - (said_s - theirs)
+    return Age(age, bound + their_bound + SIGMAS * max(sigma_s, 0.0))
+
+
+def _why(process: Process | None, role: str, ahead: float, theirs: float) -> str:
     """Why there is no age; empty where there is one."""
     if not math.isfinite(ahead):
         return "no offset of this clock to the site's is measured yet"
-    if gateway is None:
-        return "its gateway says nothing of its clock"
+    if process is None:
+        return f"its {role} says nothing of its clock"
     if not math.isfinite(theirs):
-        return "no offset of its gateway's clock to the site's is measured yet"
+        return f"no offset of its {role}'s clock to the site's is measured yet"
     return ""
 
 

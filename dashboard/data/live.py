@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from dashboard.data.device import Device, Latest
+from dashboard.data.lateness import Age, age_of
+from dashboard.data.store import Store
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import rates
 
@@ -45,6 +47,24 @@ def live(device: Device, topic: str, estimator: str = "") -> Live | None:
     return _about(device, topic, chosen, latest) | made(latest)
 
 
+def aged(age: Age) -> Live:
+    """By the clock of the site: what is not known is None, and why is said."""
+    return {
+        "site_age_s": finite(age.s),
+        "site_age_bound_s": finite(age.bound_s),
+        "site_age_why": age.why,
+    }
+
+
+def live_aged(store: Store, device: Device, topic: str, estimator: str = "") -> Live | None:
+    """The same with its age by the clock of the site."""
+    said = live(device, topic, estimator)
+    if said is None:
+        return None
+    utc_s, sigma_s = said["utc_s"], said.pop("utc_sigma_s")
+    return said | aged(age_of(store, device, utc_s, sigma_s))
+
+
 def _about(device: Device, topic: str, estimator: str, latest: Latest) -> Live:
     message = latest.message
     after_s = (rates.count(message) - 1) * message.period_s if topic == "rate" else 0.0
@@ -52,6 +72,7 @@ def _about(device: Device, topic: str, estimator: str, latest: Latest) -> Live:
         "device": device.name,
         "estimator": estimator,
         "utc_s": message.header.utc_ns * 1e-9 + after_s,
+        "utc_sigma_s": message.header.utc_sigma_s,
         "age_s": latest.age(),
         "stale": device.stale(topic, estimator),
         "simulated": message.header.source in (pb.SOURCE_SIMULATED, pb.SOURCE_EMULATED),

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from google.protobuf.message import Message
 
 from dashboard.data.device import HISTORY_S, Device, Latest
+from dashboard.data.fault import Alarm
 from dashboard.data.intake import INTAKE
 from dashboard.data.replayed import Replayed
 from messages.bus.presence import Presence
@@ -51,6 +52,7 @@ class Store:
         self.devices: dict[str, Device] = {}
         self.recorder: Latest | None = None
         self.presence = Presence()
+        self.own_faults: list[Alarm] = []  # of this place, where no service of alarms says them
         self.replay = Replayed()
         self.logs: list[tuple[float, str, str]] = []  # arrived, device, text
         self.dropped = 0  # messages the feed could not keep up with

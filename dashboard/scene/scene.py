@@ -56,6 +56,7 @@ class Choice:
 
     dark: bool = True
     follow: bool = True
+    sheet: bool = False  # panels lie over the lower part of the scene: a phone
     axis_names: bool = False  # of all axes; those left out are named always
     layers: dict[str, bool] = field(default_factory=lambda: dict.fromkeys(LAYERS, True))
 
@@ -80,7 +81,7 @@ class SceneView:
         """Look at the body from the usual side."""
         seen = self._client.camera
         position, look_at = camera.aim(
-            camera.VEHICLE if vehicle else camera.CUBE, seen.fov, seen.aspect
+            camera.VEHICLE if vehicle else camera.CUBE, seen.fov, seen.aspect, self._choice.sheet
         )
         with self._client.atomic():
             seen.up_direction = (0.0, 0.0, 1.0)

@@ -1,5 +1,6 @@
 """start(): the viser server on the loopback, and the two loops that bring browsers up to date."""
 
+import asyncio
 import contextlib
 import io
 import logging
@@ -7,7 +8,7 @@ import socket
 import threading
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Protocol
 
 import viser
@@ -18,6 +19,7 @@ from dashboard.scene.shared import Shared
 from dashboard.scene.style import LEFT_WIDTH, css
 from dashboard.scene.view import OWN_INPUTS, View
 from dashboard.scene.waking import Waking
+from messages.bus.turning import Loop
 
 log = logging.getLogger(__name__)
 
@@ -27,6 +29,14 @@ POSE_S = 1 / 20  # period of poses ...
 POSES_PER_S = 200  # ... of as many browsers as can have it; more of them share these ...
 SELDOMEST_S = 1 / 10  # ... but none waits longer for a pose, however many there are
 PANEL_S = 0.4  # period of charts and tables
+TURN_S = 0.5
+WAKE_S = 1.0  # while nobody looks, that much is said so often
+# Charts of many browsers are drawn by so many at a time, spread over so much of their period, lest
+# the poses of all wait behind the charts of all.
+TOGETHER = 5
+SPREAD = 0.6
+
+Seen = tuple[int, View]  # number of a browser, what it shows
 
 
 class SceneSettings(Protocol):
@@ -82,6 +92,7 @@ class SceneHandle:
         ]
         for thread in self._threads:
             thread.start()
+        self._turning = asyncio.run_coroutine_threadsafe(self._turn(), server.get_event_loop())
 
     @property
     def clients(self) -> int:
@@ -92,10 +103,18 @@ class SceneHandle:
     def stop(self) -> None:
         """End loops and server."""
         self._stop.set()
+        self._turning.cancel()
         self._watched.set()  # wakes the loops
         for thread in self._threads:
             thread.join(timeout=5.0)
         self._server.stop()
+
+    async def _turn(self) -> None:
+        """In viser's own loop: it goes on."""
+        with Loop("scene") as loop:
+            while True:
+                loop.turn()
+                await asyncio.sleep(TURN_S)
 
     def _connected(self, client: viser.ClientHandle) -> None:
         self._waking.take(client)
@@ -117,25 +136,45 @@ class SceneHandle:
     ) -> None:
         """Call begin once and tick for each view; nothing at all is done while nobody looks."""
         complained: set[int] = set()
-        while not self._stop.is_set():
-            self._watched.wait()
-            began = time.monotonic()
-            with self._lock:
-                views = list(self._views.items())
-            panels = tick is View.tick_panels
-            views = [(number, view) for number, view in views if view.pace.due(panels)]
-            begin()
-            with self._waking.once():
-                for number, view in views:
-                    try:
-                        tick(view)
-                    except Exception:  # one browser's trouble must not stop the others' picture
-                        if number not in complained:
-                            log.exception("browser %d: update failed", number)
-                        complained.add(number)
-            each_s = period_s if panels else min(len(views) / POSES_PER_S, SELDOMEST_S)
-            wanted_s = max(period_s, each_s) - (time.monotonic() - began)
-            self._stop.wait(max(wanted_s, period_s / 4))
+        panels = tick is View.tick_panels
+        with Loop("panels" if panels else "poses") as loop:
+            while not self._stop.is_set():
+                loop.turn()
+                if not self._watched.wait(WAKE_S):
+                    continue
+                began = time.monotonic()
+                with self._lock:
+                    views = list(self._views.items())
+                views = [(number, view) for number, view in views if view.pace.due(panels)]
+                begin()
+                for group, until_s in spread(views, SPREAD * period_s if panels else 0.0):
+                    with self._waking.once():
+                        for number, view in group:
+                            loop.turn()
+                            self._tick(tick, number, view, complained)
+                    self._stop.wait(max(0.0, began + until_s - time.monotonic()))
+                each_s = period_s if panels else min(len(views) / POSES_PER_S, SELDOMEST_S)
+                wanted_s = max(period_s, each_s) - (time.monotonic() - began)
+                self._stop.wait(max(wanted_s, period_s / 4))
+
+    @staticmethod
+    def _tick(tick: Callable[[View], None], number: int, view: View, complained: set[int]) -> None:
+        """One browser's trouble must not stop the others' picture."""
+        try:
+            tick(view)
+        except Exception:
+            if number not in complained:
+                log.exception("browser %d: update failed", number)
+            complained.add(number)
+
+
+def spread(views: list[Seen], over_s: float) -> Iterator[tuple[list[Seen], float]]:
+    """Groups of a round, each with the s since its beginning that the next one waits for; without a
+    time to spread over all are one group.
+    """
+    size = TOGETHER if over_s else max(1, len(views))
+    for first in range(0, len(views), size):
+        yield views[first : first + size], over_s * min(1.0, (first + size) / len(views))
 
 
 def start(

@@ -13,6 +13,7 @@ from dashboard.data.device import Device
 from dashboard.data.store import Store
 from dashboard.desk import Desk
 from dashboard.scene.drawing.page import alert, tag
+from dashboard.scene.fitting import Fitting
 from dashboard.scene.pace import Pace
 from dashboard.scene.panels import PAGES, Devices, Record, Snapshot, Timeline
 from dashboard.scene.panels.base import Input
@@ -20,7 +21,6 @@ from dashboard.scene.rights import Rights
 from dashboard.scene.scene import Choice, SceneView
 from dashboard.scene.shared import Shared
 from dashboard.scene.span import Span
-from dashboard.scene.style import LEFT_WIDTH
 from dashboard.scene.workspaces import LAYERS, WORKSPACES, Wish, offered, stated
 from logs.figures.expression import many
 
@@ -34,7 +34,6 @@ FIRST = {"nav": "position", "attitude": "tilt", "rate": "rates"}  # page, by wha
 OWN_INPUTS = frozenset([ASK, *(label for page in PAGES for label in page.own_inputs)])
 KEYS = [page.key() for page in PAGES]
 NAMING = ("diagnose", "calibrate")  # workspaces in which every axis has its name in the scene
-WIDTHS = {"s": (300.0, 470.0), "m": (270.0, 380.0), "l": (LEFT_WIDTH, 470.0)}  # px, by the page's
 
 
 class View:
@@ -50,7 +49,7 @@ class View:
         self._device_chosen = False  # by the person, or by the replay that it began
         self._opened_at = time.monotonic()
         self._generation = -1
-        self._span, self._size = Span(), "l"
+        self._span = Span()
         self._derived: list[str] = []  # lines of expression.py
         self._rights_of, self.pace = Rights(desk), Pace()
         self._tracks_at = 0.0
@@ -83,6 +82,8 @@ class View:
                 return
             self.scene.update(device)
             now = time.monotonic()
+            if self._fitting.moved(now):
+                self.scene.reset_camera(device.body == "nav")
             if now - self._tracks_at > TRACK_S:
                 self._tracks_at = now
                 self.scene.trails.update(device)
@@ -138,7 +139,7 @@ class View:
 
     def _build_right(self) -> None:
         gui = self._client.gui
-        panel = self._panel = gui.add_panel()
+        panel = gui.add_panel()
         with panel.add_tab("Charts", viser.Icon.CHART_LINE):
             self._rights = gui.add_html("", visible=False)
             self._folders = [gui.add_folder(None, visible=False) for _ in PAGES]
@@ -147,8 +148,7 @@ class View:
         ]
         for page in self._pages:
             page.desk = self._desk
-        panel.dock_right()
-        panel.set_width(470)
+        self._fitting = Fitting(self._client, panel)
         self._open(0)
 
     # --- what is said to the page around the scene
@@ -172,7 +172,7 @@ class View:
             derived=[] if device is None else judged(device, self._derived),
             dark=self._choice.dark,
             follow=self._choice.follow,
-            size=self._size,
+            size=self._fitting.size,
             quality=self.pace.quality,
             layers=[layer for layer in LAYERS if self._choice.layers[layer]],
         )
@@ -202,7 +202,7 @@ class View:
                 self._choice.layers.update({layer: layer in wish.layers for layer in LAYERS})
             if wish.cursors is not None:
                 self._cursors = wish.cursors
-            if wish.size in WIDTHS:
+            if wish.size is not None:
                 self._fit(wish.size)
             self._turn_to(wish)
             for what in wish.do:
@@ -225,16 +225,9 @@ class View:
                 self._choose_page(last if last in there else (there or of_it)[0])
 
     def _fit(self, size: str) -> None:
-        """Panels for the width of the page; a phone has one sheet, in which the charts are to be
-        near.
-        """
-        self._size = size
-        left, right = WIDTHS[size]
-        self._client.gui.main_panel.set_width(left)
-        self._panel.set_width(right)
-        self._devices.short = self._record.short = self._timeline.short = size == "s"
-        if size == "s":
-            self._panel.expand()
+        self._fitting.become(size, time.monotonic())
+        self._choice.sheet = short = self._fitting.sheet
+        self._devices.short = self._record.short = self._timeline.short = short
 
     def _theme(self) -> None:
         self._client.gui.configure_theme(

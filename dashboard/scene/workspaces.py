@@ -78,7 +78,7 @@ class Wish:
     device: str | None = None
     prefer: str | None = None  # the device to begin with, unless a replay was just asked for
     window: str | None = None
-    size: str | None = None  # of the page: s, m, l
+    size: str | None = None  # of the page: s, n, m, l
     quality: str = ""  # key of pace.QUALITIES; empty: as it is
     dark: bool | None = None
     pause: bool | None = None

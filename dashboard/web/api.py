@@ -10,7 +10,9 @@ from fastapi import APIRouter, Depends, HTTPException, Query, Request
 from fastapi.responses import FileResponse
 
 from dashboard.data.alarms import alarms, bench_alarms
-from dashboard.data.lateness import lateness
+from dashboard.data.lateness import Age, lateness, said_by
+from dashboard.data.live import aged
+from dashboard.data.store import Store
 from dashboard.web.auth import Role
 from dashboard.web.control import ControlError
 from dashboard.web.front import Asker, Front, asker, desk_of, front_of, needs
@@ -30,7 +32,7 @@ from dashboard.web.schemas import (
 )
 from messages.bus.orders import OrderError
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import STATUS
+from messages.contract.topics import RECORDER, STATUS
 from messages.text import composed
 from sessions.library.catalogue import SessionError, SessionInfo
 from sessions.library.curves import Curves
@@ -118,6 +120,7 @@ def recording_out(front: Front) -> RecordingOut:
         bytes=0,
         lost=0,
         message="the recorder has not been heard of",
+        site_age_why="the recorder has not been heard of",
         replaying=replayed.parent.name if replayed else "",
         alarms=[],
     )
@@ -128,9 +131,18 @@ def recording_out(front: Front) -> RecordingOut:
     if heard is None:
         return out
     age = heard.age()
+    with front.store.lock:
+        out = out.model_copy(update=aged(_said_at(front.store, heard.message)))
     if age > RECORDER_STALE_S:
         return out.model_copy(update={"message": f"the recorder has been silent for {age:.0f} s"})
     return out.model_copy(update={"available": True} | recorder_fields(heard.message))
+
+
+def _said_at(store: Store, status: pb.RecorderStatus) -> Age:
+    """How old the recorder's word is. Call under the store's lock."""
+    found = (one for one in store.presence.all() if one.role == RECORDER and one.lives)
+    said_s = status.header.utc_ns * 1e-9 + status.clock_offset_s  # it counts on without steps
+    return said_by(store, next(found, None), RECORDER, said_s)
 
 
 def order_recorder(

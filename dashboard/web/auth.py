@@ -12,7 +12,7 @@ import json
 import logging
 import secrets
 import threading
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import asdict, dataclass, field
 
 from starlette.requests import HTTPConnection
@@ -50,6 +50,7 @@ log = logging.getLogger(__name__)
 
 SESSIONS = 1024  # sign-ins at a time
 AGENT = 120  # characters kept of what a browser calls itself
+LINK = "one-time link"  # can be nobody's name
 PARALLEL = 2  # passwords verified at once: each takes 32 MiB and a core
 
 
@@ -68,6 +69,10 @@ class SignIn:
     means: str = ""  # password, one-time link ...
     agent: str = ""  # what the browser calls itself
     external: bool = False  # an identity provider vouched for him; no user of our file
+
+
+async def _no_farewell(_: str) -> str:
+    return ""
 
 
 class Gate:
@@ -90,6 +95,8 @@ class Gate:
         self._lock = threading.Lock()
         self._sessions: dict[str, SignIn] = self._load()
         self._verifying = asyncio.Semaphore(PARALLEL)
+        # where an identity provider ends the sign-in of this key, too; empty: it does not
+        self.farewell: Callable[[str], Awaitable[str]] = _no_farewell
 
     async def sign_in(self, name: str, password: str, address: str, agent: str = "") -> str | None:
         """A new session id, or None for a wrong name or password; raises WaitError and
@@ -100,27 +107,27 @@ class Gate:
 
     async def verified(self, name: str, password: str, address: str) -> User | None:
         """The user whose password this is; raises WaitError and UsersError."""
-        self.backoff.attempt(address)
+        self.backoff.attempt(address, name)
         async with self._verifying:
             user = await asyncio.to_thread(self.users.verify, name, password)
         if user is None:
             self.audit.refused("password", name, address, "wrong name or password")
             return None
-        self.backoff.forgive(address)
+        self.backoff.forgive(address, name)
         return user
 
     def redeem(self, token: str, address: str, agent: str = "") -> str | None:
         """A new session id for a one-time link, or None when it is used, expired or unknown; raises
         WaitError.
         """
-        self.backoff.attempt(address)
+        self.backoff.attempt(address, LINK)
         now = None if self._own else self._clock()
         name = redeem_link_token(self.settings.users, token, now)
         if name is None or self.users.get(name) is None:
             self.audit.refused("sign-in", "", address, "one-time link: used, expired or unknown")
             return None
-        self.backoff.forgive(address)
-        return self.begin(name, address, "one-time link", agent)
+        self.backoff.forgive(address, LINK)
+        return self.begin(name, address, LINK, agent)
 
     def session_of(self, connection: HTTPConnection) -> tuple[SignIn, User] | None:
         """Who sends this request or opens this WebSocket; None for nobody."""
@@ -259,7 +266,7 @@ def _by_a_person(connection: HTTPConnection) -> bool:
     if connection.scope["type"] != "http":
         return False
     asks = connection.scope["method"] in ("GET", "HEAD")
-    return not (asks and connection.url.path.startswith(("/api/", "/map/", "/metrics")))
+    return not (asks and connection.url.path.startswith(("/api/", "/map/", "/metrics", "/wall/")))
 
 
 def _elapsed() -> Callable[[], float]:

@@ -20,11 +20,12 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
-from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.http.h11_impl import H11Protocol, h11
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from dashboard.settings import DashboardSettings
 from dashboard.web.auth import Backoff
+from dashboard.web.guard import security_headers
 from dashboard.web.tls.certificate import Certificate
 from dashboard.web.tls.first_byte import FirstByte
 
@@ -117,6 +118,16 @@ class Connections:
                 super().on_response_complete()
                 if self._counted is not None:
                     self._counted.idle_since = time.monotonic()
+
+            def send_400_response(self, msg: str) -> None:
+                """What is no HTTP never comes to our application: the same headers here."""
+                text = msg.encode("ascii", "replace")
+                headers = {"content-type": "text/plain; charset=utf-8", "connection": "close"}
+                headers |= {"content-length": f"{len(text)}", **dict(security_headers(False))}
+                answer = h11.Response(status_code=400, headers=list(headers.items()))
+                for event in (answer, h11.Data(data=text), h11.EndOfMessage()):
+                    self.transport.write(self.conn.send(event))
+                self.transport.close()
 
             def connection_lost(self, exc: Exception | None) -> None:
                 connections.leave(self._counted)

@@ -15,11 +15,13 @@ from dashboard.web.auth import Gate, Role, SignIn, User, WaitError, same_token
 from dashboard.web.command.seats import Seats
 from dashboard.web.control import Replay
 from dashboard.web.first.control import FirstRun
+from dashboard.web.guard import STILL
 from dashboard.web.jobs import Jobs
 from dashboard.web.places.lookers import Lookers
 from dashboard.web.readings import Readings
 from dashboard.web.tls.certificate import Certificate
 from dashboard.web.uploads import Uploads
+from dashboard.web.users import UsersError
 from dashboard.web.views import Views
 from messages.contract import gyrofree_pb2 as pb
 from sessions.library.catalogue import Catalogue
@@ -101,6 +103,24 @@ def asker(request: Request) -> Asker:
     """Who asks: by his cookie, or for REST by an API token in `Authorization: Bearer`; HTTP 401
     for nobody.
     """
+    who = _asker(request)
+    request.scope[STILL] = lambda: still_may(request, who)
+    return who
+
+
+def still_may(request: Request, who: Asker) -> bool:
+    """Does the right stand with which he asked, while the answer is sent?"""
+    gate = front_of(request).gate
+    try:
+        if who.token:
+            secret = request.headers["authorization"].partition(" ")[2].strip()
+            return gate.tokens.find(secret) is not None
+        return gate.session_of(request) is not None
+    except UsersError:
+        return False
+
+
+def _asker(request: Request) -> Asker:
     path = request.url.path
     if "authorization" in request.headers and (path.startswith("/api/") or path == METRICS):
         return _by_token(request)
@@ -120,7 +140,7 @@ def _by_token(request: Request) -> Asker:
     found = gate.tokens.find(secret.strip()) if scheme.lower() == "bearer" else None
     if found is None:
         try:
-            gate.backoff.attempt(address_of(request))
+            gate.backoff.attempt(address_of(request), "API token")
         except WaitError as wait:
             raise _wait(str(wait).replace("passwords", "tokens"), wait.seconds) from None
         gate.audit.refused("API token", "", address_of(request), request.url.path)
@@ -170,7 +190,8 @@ def check_role(who: Asker, role: Role, request: Request) -> None:
         raise HTTPException(
             403, f"{who.name} is signed in as {who.role.name}; this takes the role {role.name}"
         )
-    if request.method not in ("GET", "HEAD"):
+    # what everybody may do, such as to have his own view kept, would wash the rest out of the log
+    if request.method not in ("GET", "HEAD") and role > Role.viewer:
         audit.done(_act(request), who.name, where, by)
 
 

@@ -5,8 +5,10 @@ One ASGI layer around the whole application, HTTP and WebSocket alike.
 """
 
 import asyncio
+import contextlib
 import ipaddress
 import json
+import time
 from collections.abc import Iterator
 from urllib.parse import urlsplit
 
@@ -29,6 +31,14 @@ PERMISSIONS = ", ".join(
         " serial storage-access usb window-management xr-spatial-tracking"
     ).split()
 )
+
+
+STILL = "still signed in"  # in a request's scope: may who asked go on to read the answer?
+LOOK_S = 1.0  # between two looks at that, while a long answer is sent
+
+
+class SignedOut(Exception):
+    """In the middle of an answer."""
 
 
 class Refused(Exception):
@@ -82,7 +92,7 @@ class Guard:
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
-        with_headers = self._add_headers(send, Headers(scope=scope).get("host", ""))
+        with_headers = self._answering(send, scope)
         try:
             self._check(scope)
             if scope["type"] == "http":
@@ -90,7 +100,8 @@ class Guard:
         except Refused as refused:
             await refuse(scope, with_headers if scope["type"] == "http" else send, refused)
             return
-        await self._app(scope, receive, with_headers if scope["type"] == "http" else send)
+        with contextlib.suppress(SignedOut):  # what is not complete ends with its connection
+            await self._app(scope, receive, with_headers if scope["type"] == "http" else send)
 
     def _check(self, scope: Scope) -> None:
         headers = Headers(scope=scope)
@@ -118,7 +129,11 @@ class Guard:
 
     async def _body(self, scope: Scope, receive: Receive) -> bytes:
         limit = self._settings.body_limit
-        length = Headers(scope=scope).get("content-length", "0")
+        headers = Headers(scope=scope)
+        if "content-length" in headers and "transfer-encoding" in headers:
+            # a proxy that goes by the other one would take the rest for somebody's next request
+            raise Refused(400, "the length of the body is said in two ways")
+        length = headers.get("content-length", "0")
         if not length.isdigit() or int(length) > limit:
             raise Refused(413, f"body larger than {limit} bytes")
         body = bytearray()
@@ -138,14 +153,25 @@ class Guard:
                 408, f"body not complete within {self._settings.body_timeout_s:g} s"
             ) from None
 
-    def _add_headers(self, send: Send, host: str) -> Send:
+    def _answering(self, send: Send, scope: Scope) -> Send:
+        """Adds our headers, and ends a long answer with the sign-in of who asked for it."""
+        host = Headers(scope=scope).get("host", "")
         lasting = self._settings.secure and not host.startswith("localhost")
+        due, events = time.monotonic() + LOOK_S, False
 
         async def wrapped(message: Message) -> None:
+            nonlocal due, events
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
                 for name, value in security_headers(lasting):
                     headers.setdefault(name, value)
+                # streams of events look themselves, and say why they end
+                events = headers.get("content-type", "").startswith("text/event-stream")
+            elif not events and message.get("more_body") and time.monotonic() >= due:
+                due = time.monotonic() + LOOK_S
+                still = scope.get(STILL)
+                if still is not None and not still():
+                    raise SignedOut
             await send(message)
 
         return wrapped

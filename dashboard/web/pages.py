@@ -277,8 +277,12 @@ async def link(request: Request) -> Response:
 async def logout(request: Request) -> Response:
     await signed_form(request)
     front = front_of(request)
+    key = front.gate.key_of(request)
     front.gate.sign_out(request)
-    answer = RedirectResponse("/login", 303)
+    away = await front.gate.farewell(key)
+    # a page, and not a redirect: a form of ours may lead to pages of ours only
+    left = render(request, "left.html", None, wanted=away) if away else None
+    answer = left or RedirectResponse("/login", 303)
     answer.delete_cookie(
         front.settings.cookie,
         path="/",

@@ -87,6 +87,16 @@ class LateOut(BaseModel):
     details: str
 
 
+class AgedOut(BaseModel):
+    site_age_s: float | None = Field(
+        default=None, description="how old it is by the site's clock, s; null: not known"
+    )
+    site_age_bound_s: float | None = Field(
+        default=None, description="the most that this may be wrong by, s"
+    )
+    site_age_why: str = Field(default="", description="why it is not known; empty: it is")
+
+
 class DeviceOut(BaseModel):
     name: str
     source: str = Field(description="hardware, simulated, emulated, played or unknown")
@@ -113,7 +123,9 @@ class DeviceOut(BaseModel):
     )
 
 
-class RecordingOut(BaseModel):
+class RecordingOut(AgedOut):
+    """Its age is that of what the recorder said last."""
+
     available: bool = Field(description="the recorder was heard of in the last seconds")
     recording: bool
     session: str

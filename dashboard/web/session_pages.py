@@ -17,6 +17,7 @@ from dashboard.web.session_api import REPORT_FOLDER, find_session
 from dashboard.web.trend import Point, Trend, draw
 from sessions.export.export import FORMATS
 from sessions.library.annotations import Annotations, read_annotations
+from sessions.library.copied import read_copied
 from sessions.recording.manifest import Manifest, SessionError
 from sessions.report import photo
 
@@ -62,6 +63,7 @@ def session_page(request: Request, session: str, who: SignedIn) -> HTMLResponse:
         report=report,
         photo=_photo(front, session),
         completeness=_completeness(manifest),
+        copied=read_copied(front.catalogue.root / session),
         formats=list(FORMATS),
         derived=parse_qs(front.views.of(who.name, "session")).get("derived", [""])[0],
         can_replay=front.replay is not None and not barred(front, who),

@@ -16,6 +16,8 @@ import secrets
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from pathlib import Path
@@ -24,6 +26,7 @@ from argon2 import PasswordHasher
 from argon2.exceptions import InvalidHashError, VerificationError
 
 from dashboard.web.accounts.passwords import PASSWORD_MAX, fault_of
+from inertial.one_at_a_time import alone
 from messages.clock import Moment
 
 USER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._@-]{0,63}")
@@ -78,6 +81,21 @@ def write_private(path: Path, text: str) -> None:
         raise
 
 
+@contextmanager
+def changing(path: Path) -> Iterator[None]:
+    """The page and commands change users and tokens one after the other: of two at once one would
+    be lost, and who was removed would be there again. Raises UsersError.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        with alone(path.parent):
+            yield
+    except OSError as error:
+        raise UsersError(
+            f"{path.parent}: {error.strerror}; choose another [dashboard] users"
+        ) from None
+
+
 def load_users(path: Path) -> dict[str, User]:
     """All users by name; none when the file is absent. Raises UsersError for a file that cannot be
     read.
@@ -120,10 +138,25 @@ def add_user(path: Path, name: str, password: str, role: str | Role) -> User:
     if fault := fault_of(password, name):
         raise UsersError(fault)
     rank = role_of(role)
-    users = load_users(path)
-    users[name] = User(name, rank, _hasher.hash(password), round(time.time()))
-    _save(path, users)
-    return users[name]
+    made = User(name, rank, _hasher.hash(password), round(time.time()))
+    with changing(path):
+        _save(path, load_users(path) | {name: made})
+    return made
+
+
+def set_password(path: Path, name: str, password: str) -> None:
+    """Another password, with the role that he has now; raises UsersError for one that is not
+    acceptable, and when there is no such user any more.
+    """
+    if fault := fault_of(password, name):
+        raise UsersError(fault)
+    made = _hasher.hash(password)
+    with changing(path):
+        users = load_users(path)
+        if name not in users:
+            raise UsersError(f"there is no user {name!r} any more")
+        users[name] = replace(users[name], hash=made, created=round(time.time()))
+        _save(path, users)
 
 
 def role_of(role: str | Role) -> Role:
@@ -136,22 +169,25 @@ def role_of(role: str | Role) -> Role:
 
 def set_role(path: Path, name: str, role: str | Role) -> User:
     """Another role with the same password; raises UsersError when there is no such user or role."""
-    rank, users = role_of(role), load_users(path)
-    if name not in users:
-        raise UsersError(f"{path}: no user {name!r}; there are {', '.join(sorted(users))}")
-    users[name] = replace(users[name], role=rank)
-    _save(path, users)
+    rank = role_of(role)
+    with changing(path):
+        users = load_users(path)
+        if name not in users:
+            raise UsersError(f"{path}: no user {name!r}; there are {', '.join(sorted(users))}")
+        users[name] = replace(users[name], role=rank)
+        _save(path, users)
     return users[name]
 
 
 def remove_user(path: Path, name: str) -> None:
     """Remove a user; raises UsersError when there is none of that name."""
-    users = load_users(path)
-    if users.pop(name, None) is None:
-        raise UsersError(
-            f"{path}: no user {name!r}; there are {', '.join(sorted(users)) or 'none'}"
-        )
-    _save(path, users)
+    with changing(path):
+        users = load_users(path)
+        if users.pop(name, None) is None:
+            raise UsersError(
+                f"{path}: no user {name!r}; there are {', '.join(sorted(users)) or 'none'}"
+            )
+        _save(path, users)
 
 
 class UserStore:

@@ -34,6 +34,7 @@ from gateway.settings import DeviceSettings, GatewaySettings
 from gateway.time.clock import DeviceClock
 from gateway.time.pps import PpsClock
 from gateway.time.wall import WallClock
+from messages.bus.turning import Loop
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import Refusal
 from messages.contract.door import Door
@@ -47,6 +48,7 @@ log = logging.getLogger(__name__)
 JOIN_WAIT_S = 0.01  # samples held back for joining wait no longer than this for the next frame
 FAILURES_SHOWN = 20  # faults of ours that stand in the log with all that is known of them
 STATUS_EVERY_S = 1.0
+AGAIN_S = 60.0  # that what an earlier life read may take to be decoded again
 STOPPED_S = 1.5  # longer than any wait below: this process was stopped, or got no processor
 
 
@@ -110,19 +112,25 @@ class DeviceLink:
         ports = [(self.device.port, self.device.baud, BOARD)]
         if self.device.gnss_port:
             ports.append((self.device.gnss_port, self.device.gnss_baud, GNSS))
+        with Loop(f"link {self.name}") as loop:
+            self._run(ports, loop, stop)
+
+    def _run(self, ports: list[tuple[str, int, int]], loop: Loop, stop: threading.Event) -> None:
         past, left = None, []
         if self._next_put is not None and self._keeper.holds(self.device.port):
             past = Past(self.spool, self._next_put)
             # before the readers append to the journal what came since
-            left = unseen(past, self.journal) if past.read_ns else []
+            with loop.during("reading the journal", AGAIN_S):
+                left = unseen(past, self.journal) if past.read_ns else []
         scale = self.device.time_scale
         self.readers = [
             Reader(*port, self.journal, self.queue, self._keeper, scale) for port in ports
         ]
         try:
             if past is not None and past.read_ns:
-                self.resume(past, left)
-            self._loop(stop)
+                with loop.during("decoding the journal", AGAIN_S):
+                    self.resume(past, left)
+            self._loop(loop, stop)
         finally:
             for reader in self.readers:
                 reader.close()
@@ -139,9 +147,10 @@ class DeviceLink:
         self.decoder.count_anew()
         self.report.message(self.readers, 0)  # rates and latency from here on
 
-    def _loop(self, stop: threading.Event) -> None:
+    def _loop(self, loop: Loop, stop: threading.Event) -> None:
         due = self._looked = time.monotonic()
         while not stop.is_set():
+            loop.turn()
             left = due - self._look()
             if left <= 0:
                 self._each_second()

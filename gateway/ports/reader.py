@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from gateway.ports.backlog import LINE_BYTES_S, Backlog, Pace
 from gateway.ports.keeper import Keeper
 from gateway.ports.ports import Port, PortEnd, PortError, adopt_port, open_port
+from messages.bus.turning import Loop
 from messages.history.journal import Journal
 
 log = logging.getLogger(__name__)
@@ -22,6 +23,7 @@ FIRST_RETRY_S = 0.1
 LAST_RETRY_S = 2.0
 LOOK_MS = 500  # a silent port is looked at so often, so that silence is told from being stopped
 HOLD_S = 0.02
+OPEN_S = 20.0  # that a port may take to be opened: over a network it has a conversation first
 STOPPED_NS = 1_500_000_000  # between two looks: this process was stopped, or got no processor
 
 
@@ -85,10 +87,16 @@ class Reader:
         port.write(data)
 
     def _run(self) -> None:
+        with Loop(f"reader {self.url}") as loop:
+            self._read(loop)
+
+    def _read(self, loop: Loop) -> None:
+        """Until it is told to stop."""
         retry_s = FIRST_RETRY_S
         while not self._stop.is_set():
             try:
-                port = self._open()
+                with loop.during("opening the port", OPEN_S):
+                    port = self._open()
             except (PortError, ValueError) as error:
                 self._say(str(error))
                 self._stop.wait(retry_s)
@@ -102,10 +110,11 @@ class Reader:
             self._out.put(Chunk(self._channel, b"", time.monotonic_ns()))  # says that it is open
             log.info("%s: open", self.url)
             try:
-                self._read_until_lost(port)
+                self._read_until_lost(port, loop)
             except PortEnd as end:
                 self._say(str(end))
-                self._stop.wait()
+                while not self._stop.wait(LOOK_MS * 1e-3):
+                    loop.turn()
             except PortError as error:
                 self._say(str(error))
                 self._stop.wait(FIRST_RETRY_S)  # a port that opens and closes at once must not spin
@@ -133,12 +142,13 @@ class Reader:
         self._journal.append(self._channel, data, monotonic_ns, utc_ns)
         self._out.put(Chunk(self._channel, data, monotonic_ns, late))
 
-    def _read_until_lost(self, port: Port) -> None:
+    def _read_until_lost(self, port: Port, loop: Loop) -> None:
         poller = select.poll()
         poller.register(port.fileno(), select.POLLIN)
         poller.register(self._wake_out, select.POLLIN)
         looked, late, pace = time.monotonic_ns(), False, Pace(self._rate)
         while not self._stop.is_set():
+            loop.turn()
             if self._out.full(self._channel):
                 self._hold(HOLD_S)
                 looked, late = time.monotonic_ns(), True

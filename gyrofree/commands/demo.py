@@ -49,6 +49,16 @@ def demo(
             help="The table is not driven: in a test a simulated person turns it, and slips once.",
         ),
     ] = False,
+    office: Annotated[
+        bool,
+        typer.Option(
+            "--office",
+            help=(
+                "Also an office that watches over a slow line, with a page of its own at the next"
+                " port; SIGUSR1 pulls the cable."
+            ),
+        ),
+    ] = False,
     fault: Fault = None,
 ) -> None:
     """Start router, gateway, estimator, recorder, dashboard and a board, and print one URL.
@@ -56,7 +66,7 @@ def demo(
     The board is simulated, but it speaks the real wire through a pseudo-terminal. Ctrl-C ends
     everything.
     """
-    from gyrofree.running import demo as demonstration
+    from gyrofree.demo import bench as demonstration
 
     if source == "table":
         faults_of(fault)  # a wrong one is said here, not in the board's log
@@ -88,7 +98,12 @@ def demo(
         folder.absolute(), board, device, layout, port, bus_port, record=record, time_scale=scale
     )
     plan = replace(plan, table=source == "table" and not by_hand)
-    demonstration.run(replace(plan, estimator=demonstration.ESTIMATOR.get(source, "")))
+    plan = replace(plan, estimator=demonstration.ESTIMATOR.get(source, ""))
+    if office:
+        from gyrofree.demo import office as both
+
+        return both.run(plan)
+    demonstration.run(plan)
 
 
 def _check_log(path: Path, gnss: Path | None = None, as_named: bool = False) -> str:
@@ -146,7 +161,7 @@ def play(
             player.run(player.Options(log, gnss, speed, loop, link, units_as_named), stop)
 
         return run_service(body, verbose)
-    from gyrofree.running import demo as demonstration
+    from gyrofree.demo import bench as demonstration
 
     board = ["play", f"--speed={speed}"] + (["--loop"] if loop else [])
     board += [f"--gnss={gnss.absolute()}"] if gnss else []

@@ -18,6 +18,8 @@ from gyrofree.config import ConfigError
 from gyrofree.operations.attending import attended
 from gyrofree.running.process import command, run_service
 
+ROUTER_LOOK_S = 0.5
+
 log = logging.getLogger(__name__)
 
 
@@ -30,20 +32,27 @@ def router(config: Config = None, verbose: Verbose = False) -> None:
         from gyrofree.setup.site import router_rules
         from messages.bus import timeouts
         from messages.bus.beating import Beating, tell_time
-        from messages.bus.session import open_router
+        from messages.bus.session import connected, open_router
+        from messages.bus.turning import Loop
         from messages.bus.zenohd import Zenohd
 
         rules, mesh = router_rules(settings)
         bus = settings.bus.acting_as("router")
 
-        def serve(session: Any, wait: Callable[[], object]) -> None:
+        def serve(session: Any, wait: Callable[[Callable[[], object]], object]) -> None:
             # at a site its home tells the time; who is none asks the router
             telling = tell_time(session, bus.prefix) if bus.tls is None else None
             with Beating(session, bus):
                 log.info("router listens on %s", ", ".join(settings.bus.listen))
                 if mesh:
                     log.info("and calls %s", ", ".join(mesh))
-                wait()
+                with Loop("router") as loop:
+
+                    def look() -> None:
+                        connected(session)  # answered by what routes, or not at all
+                        loop.turn()
+
+                    wait(look)
             if telling is not None:
                 telling.undeclare()
 
@@ -51,13 +60,18 @@ def router(config: Config = None, verbose: Verbose = False) -> None:
             if bus.tls is not None:
                 timeouts.watch(stop)
             with open_router(bus, rules, mesh) as session:
-                serve(session, stop.wait)
+                serve(session, lambda look: _wait(stop, look))
             return
         with Zenohd(bus, rules, mesh, stop, die_with_parent) as program:
             log.info("%s routes", bus.zenohd)
             serve(program.session, program.wait)
 
     run_service(body, verbose, attended(settings, "router"))
+
+
+def _wait(stop: threading.Event, look: Callable[[], object]) -> None:
+    while not stop.wait(ROUTER_LOOK_S):
+        look()
 
 
 def gateway(config: Config = None, verbose: Verbose = False) -> None:
@@ -163,6 +177,7 @@ def dashboard(
                 watching,
                 place_of(settings),
                 is_afar(settings),
+                settings.alarms if is_afar(settings) else None,
             )
         except (CertificateError, UsersError) as error:
             raise ConfigError(str(error)) from None

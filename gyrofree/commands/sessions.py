@@ -28,6 +28,7 @@ from gyrofree.commands.run import progress_bar
 from gyrofree.running.process import EXIT_FAILED, fail
 from sessions.library.annotations import read_annotations
 from sessions.library.catalogue import Catalogue
+from sessions.library.copied import read_copied
 from sessions.recording.manifest import SessionError
 
 app = Commands(
@@ -125,12 +126,15 @@ def show(session: SessionId, as_json: AsJson = False, config: Config = None) -> 
     try:
         catalogue.get(session)
         manifest, notes = catalogue.manifest(session), read_annotations(catalogue.root / session)
+        copied = read_copied(catalogue.root / session)
     except SessionError as error:
         raise fail(error) from None
     if as_json:
         say(
             json.dumps(
-                manifest.model_dump(mode="json") | {"annotations": notes.model_dump(mode="json")},
+                manifest.model_dump(mode="json")
+                | {"annotations": notes.model_dump(mode="json")}
+                | {"copied": copied and copied.model_dump(mode="json")},
                 indent=2,
             )
         )
@@ -160,6 +164,9 @@ def show(session: SessionId, as_json: AsJson = False, config: Config = None) -> 
         cells = (count.messages, count.lost, count.restarts, count.repeated, count.unreadable)
         table.add_row(key, *map(str, cells))
     show_table(table)
+    for name, hashes in sorted(copied.files.items()) if copied else ():
+        said = "equal" if hashes.equal else f"DIFFERENT, {hashes.home_sha256}"
+        say(f"{name}: {hashes.here_sha256} at {copied.here}, at {copied.home} {said}")
     for one in notes.notes:
         when = "all" if one.at_s is None else f"{one.at_s:.2f} s"
         say(f"{when}  {one.author}: {one.text}")

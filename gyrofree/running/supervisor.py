@@ -20,6 +20,7 @@ from rich.text import Text
 from gyrofree.operations.log_form import FORMAT, SUPERVISED, said
 from gyrofree.running.guardian import ANEW
 from gyrofree.running.process import EXIT_CONFIG, EXIT_TAKEN, command
+from messages.bus.pulse import Pulse
 from messages.text import printed
 
 PAUSE_FIRST = 0.05  # s; while a gateway is away its board's samples are lost
@@ -27,6 +28,7 @@ PAUSE_LONGEST = 5.0  # s
 GOOD_LIFE = 20.0  # s
 LONGEST_WAIT = 30.0  # s, for a child that waits for another
 PATIENCE = 8.0  # s between SIGTERM and SIGKILL; Docker gives ten to all of us
+TELLERS = ("router", "site", "record", "estimator", "alarms", "dashboard")  # one beats for us, too
 GUARDED = "gateway"  # has a guardian, which begins it anew by itself
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 COLOURS = ("cyan", "green", "magenta", "blue", "yellow", "bright_cyan", "bright_green")
@@ -80,7 +82,7 @@ class Supervisor:
         self.done = False  # a child that runs once has done its work
         self.lines = 0  # that were shown
         self.last_line = 0.0  # s, monotonic: when the last of them was
-        self._printing = threading.Lock()
+        self._printing, self._pulse = threading.Lock(), Pulse()
         self._stopping = False
 
     def add(
@@ -118,6 +120,7 @@ class Supervisor:
 
     def step(self) -> None:
         """Look after the children once; call a few times a second."""
+        self._pulse.turn()
         now = time.monotonic()
         for child in self.children:
             if child.process is None:
@@ -168,8 +171,14 @@ class Supervisor:
     def _command(self, child: Child) -> list[str]:
         return command(*child.arguments)
 
+    def _tells(self, child: Child) -> bool:
+        """Is this the child that beats for us? The first of those that can."""
+        names = {one.name for one in self.children}
+        return child.name == next((name for name in TELLERS if name in names), None)
+
     def _spawn(self, child: Child) -> None:
         child.started = time.monotonic()
+        tells = self._tells(child)
         child.process = subprocess.Popen(
             self._command(child),
             stdin=subprocess.DEVNULL,
@@ -180,7 +189,9 @@ class Supervisor:
             bufsize=1,
             env=os.environ
             | {SUPERVISED: "1", "PYTHONUNBUFFERED": "1"}
-            | {FORMAT: "json" if self.as_json else "text"},
+            | {FORMAT: "json" if self.as_json else "text"}
+            | (self._pulse.environment() if tells else {}),
+            pass_fds=(self._pulse.descriptor,) if tells else (),
             # Ctrl-C reaches the supervisor alone, which then ends them in order
             start_new_session=True,
             preexec_fn=die_with_parent,

@@ -5,14 +5,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from gyrofree.config import ConfigError, Settings
+from gyrofree.config import ConfigError, Settings, load
 from gyrofree.running.supervisor import Supervisor
 from gyrofree.running.watch import SERVICES
+from gyrofree.setup.written import as_toml
 from sites.access import rules_of
 from sites.authority import REGISTER
 from sites.enrolment import KNOWN, known_here
-from sites.place import PLACE, Place, SiteError, load_place
-from sites.service import own_certificates
+from sites.place import PLACE, Place, SiteError, load_place, write
+from sites.service import Beside, own_certificates
 
 SERVICE = "site"  # the child that lets others join, and renews
 WATCHING = ("router", "dashboard")  # all that a place without boards runs
@@ -29,6 +30,33 @@ def services(settings: Settings) -> tuple[str, ...]:
         return SERVICES
     place = _place(folder)
     return (*(SERVICES if place.at_home else WATCHING), SERVICE)
+
+
+def write_place(
+    config: Path,
+    site: str,
+    folder: Path,
+    listen: str,
+    port: int,
+    settings: Settings | None = None,
+) -> None:
+    """Write a place into a configuration; everything else stays as it was, or is as in `settings`.
+
+    folder: of its certificates. listen: endpoint of its router, which has this port. Raises
+    ConfigError, OSError.
+    """
+    if settings is None:
+        settings = load(config) if config.exists() else Settings()
+    bus = settings.bus.model_copy(
+        update={
+            "prefix": site,
+            "router": f"tls/127.0.0.1:{port}",
+            "listen": [listen],
+            "tls": folder,
+        }
+    )
+    text = as_toml(settings.model_copy(update={"bus": bus}), "Written by `gyrofree`.")
+    write(config, text.encode(), 0o644)
 
 
 def only_watching(settings: Settings) -> str:
@@ -49,6 +77,15 @@ def place_of(settings: Settings) -> str:
 def is_afar(settings: Settings) -> bool:
     """Are the boards at another place of the site? Raises ConfigError."""
     return settings.bus.tls is not None and not _place(settings.bus.tls).at_home
+
+
+def own_alarms(settings: Settings) -> Beside:
+    """What tells people of the alarms of a place that is not home; home has a service for it."""
+    from dashboard.alarms.own_place import told  # here: `up` needs none of it
+
+    bus, place = settings.bus.acting_as("authority"), place_of(settings)
+    recordings = Path(settings.recorder.root)
+    return lambda session: told(session, bus, place, settings.alarms, recordings)
 
 
 def router_rules(settings: Settings) -> tuple[dict[str, Any] | None, tuple[str, ...]]:

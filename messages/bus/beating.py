@@ -1,8 +1,9 @@
 """A process says that it is there and runs: a token that goes with its connection, and two beats a
 second, which end when it is stopped by a signal, a debugger or a machine that sleeps.
 
-Each beat also says what the process has (boards, people who look, the end of its certificate) and
-how far its clock is from that of the site's home, which it asks now and then.
+Each beat also says whether its loops turn (turning.py), what the process has (boards, people who
+look, the end of its certificate) and how far its clock is from that of the site's home, which it
+asks now and then.
 """
 
 import logging
@@ -17,7 +18,9 @@ import zenoh
 from google.protobuf.message import DecodeError
 
 from messages.bus import tls
+from messages.bus.pulse import Shared, Voice
 from messages.bus.session import BusSettings, connected
+from messages.bus.turning import Observer
 from messages.clock import elapsed_ns
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import check
@@ -73,6 +76,9 @@ class Beating:
         )
         self._token = session.liveliness().declare_token(alive_key(bus.prefix, place, name))
         self._line, self._stop = _Line(bus), threading.Event()
+        self._observer, self._before = Observer(), time.monotonic()
+        shared = Shared.inherited()
+        self._voice = Voice(session, bus.prefix, self._beat, name, shared) if shared else None
         self._is_router = bus.role == "router"  # it misses none, and knows others as routers only
         self._thread = threading.Thread(target=self._run, name="beating", daemon=True)
         self._thread.start()
@@ -89,6 +95,8 @@ class Beating:
         self._thread.join()
         self._beat.leaving = True
         self._put()
+        if self._voice is not None:
+            self._voice.close()
         self._token.undeclare()
         self._publisher.undeclare()
 
@@ -115,7 +123,14 @@ class Beating:
         for role, count in sorted(self._viewers().items()):
             beat.viewers.add(role=role, count=count)
         beat.clock_ahead_s, beat.clock_bound_s = self.clock_ahead()
+        now = time.monotonic()
+        passed_s, self._before = min(now - self._before, BEAT_S), now
+        standing = self._observer.look(passed_s)
+        beat.loop, beat.doing = standing.loop[:64], standing.doing[:128]
+        beat.turn_ago_s, beat.turn_most_s = standing.ago_s, standing.most_s
         self._publisher.put(beat.SerializeToString())
+        if self._voice is not None:
+            self._voice.put(passed_s, beat)
 
     def clock_ahead(self) -> tuple[float, float]:
         """Our wall clock minus that of the site, s, and the most that this may be wrong by; NaN for

@@ -1,22 +1,27 @@
 """Who is there: what tokens and beats (beating.py) say of every process of every place.
 
 A process whose beats end while its token stands is frozen; one whose token went without its last
-word is gone. Time is counted by the looks of whoever watches, at most LOOK_S from one to the next:
-a watcher that was frozen itself, or had no router, blames nobody for it.
+word is gone; one that beats and whose main work stands (turning.py) hangs. Time is counted by the
+looks of whoever watches, at most LOOK_S from one to the next: a watcher that was frozen itself, or
+had no router, blames nobody for it. Nor is a machine without time taken for a frozen process: the
+others of its place must have beaten PACE times since its last beat.
 """
 
+import statistics
 import threading
+from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from enum import Enum
 
 import zenoh
 
-from messages.bus.claiming import WAITING, rank_of
+from messages.bus.claimants import Claimants
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import GATEWAY, check_name
 
-FROZEN_S = 1.5  # without a beat, of which there are two a second
+FROZEN_S = 1.5  # without a beat, of which there are two a second, ...
+PACE = 3  # ... while others of its place beat so often
 SETTLE_S = 5.0  # after a router came back, for all others to find it too
 QUIET_S = 0.75  # without a beat of anybody of a place, of several: the way there is stuck
 AGAIN_S = 1.0  # after that, for the next beat of each
@@ -32,6 +37,7 @@ class State(Enum):
     """Of a process, as whoever watches sees it."""
 
     RUNNING = "running"
+    HUNG = "hung"  # it beats, and its main work stands
     FROZEN = "frozen"
     GONE = "gone"
     ENDED = "ended"
@@ -49,14 +55,26 @@ class Process:
     held: bool = False  # a token, at some time: without one, beats are anybody's
     beats: int = 0  # that were heard
     heard_s: float = 0.0  # when the last one was, by the watch
+    newest: deque[float] = field(default_factory=lambda: deque(maxlen=PACE))  # likewise, the last
     state: State = State.RUNNING
     since_s: float = 0.0  # that it is in this state, by the watch
     froze: bool = False  # before it went
+    alone: bool = False  # nobody of its place beats whose pace it could be measured by
 
     @property
     def role(self) -> str:
         """From its name: a process that never beat has one, too."""
         return self.beat.role or self.name.rpartition("-")[0] or self.name
+
+    @property
+    def lives(self) -> bool:
+        """Does it beat?"""
+        return self.state in (State.RUNNING, State.HUNG)
+
+    @property
+    def stands(self) -> bool:
+        """Does it say that a loop of its own has not turned for longer than it may?"""
+        return self.beat.turn_ago_s > self.beat.turn_most_s > 0.0
 
 
 @dataclass(frozen=True)
@@ -65,46 +83,6 @@ class Change:
 
     process: Process
     before: State
-
-
-class Claimants:
-    """Who serves and who waits for a gateway's boards; filled by Zenoh's thread."""
-
-    def __init__(self) -> None:
-        self._there: dict[str, dict[str, str]] = {}  # device -> name of a token -> id of a session
-
-    def heard(self, key: str, there: bool) -> None:
-        """A token of a claim came or went."""
-        parts = key.split("/")
-        device, name = parts[1], parts[-1]
-        rank = rank_of(name.removeprefix(f"{WAITING}-"))
-        if rank is None or (device not in self._there and len(self._there) >= MOST):
-            return
-        known = self._there.setdefault(device, {})
-        if not there:
-            known.pop(name, None)
-        elif len(known) < MOST:
-            known[name] = rank[1]
-        if not known:
-            del self._there[device]
-
-    def serving(self, device: str) -> set[str]:
-        """Ids of the sessions that have claimed it."""
-        known = dict(self._there.get(device, {}))
-        return {id_ for name, id_ in known.items() if not name.startswith(WAITING)}
-
-    def waiting(self, device: str) -> set[str]:
-        """Ids of those that wait to."""
-        known = dict(self._there.get(device, {}))
-        return {id_ for name, id_ in known.items() if name.startswith(WAITING)}
-
-    def contested(self) -> dict[str, list[str]]:
-        """Boards that more than one gateway wants, and by which sessions."""
-        return {
-            device: sorted(ids)
-            for device in list(self._there)
-            if len(ids := self.serving(device) | self.waiting(device)) > 1
-        }
 
 
 class Presence:
@@ -122,6 +100,8 @@ class Presence:
         self._settled_s = -SETTLE_S  # since when there is a router
         self._connected = True
         self._quiet: dict[str, float] = {}  # places of which nobody is heard; until when, by now
+        self._mine: Process | None = None  # as of the last look
+        self._paces: dict[str, float] = {}  # places: since when half of those who live beat PACE
         self._lock = threading.RLock()
 
     # --- what is heard
@@ -132,6 +112,7 @@ class Presence:
             one = self._process(place, name)
             if one is not None:
                 one.beat, one.heard_s, one.beats = beat, self.now_s, one.beats + 1
+                one.newest.append(self.now_s)
 
     def token(self, key: str, there: bool) -> None:
         """Zenoh's thread: a token of a process (alive_key) came or went."""
@@ -167,6 +148,7 @@ class Presence:
             if connected:
                 self.now_s += min(max(passed, 0.0), LOOK_S)
             self._listen()
+            self._measure()
             changes = []
             for key, one in list(self.processes.items()):
                 state = self._judge(one)
@@ -195,17 +177,43 @@ class Presence:
         for place in [p for p, until_s in self._quiet.items() if until_s < self.now_s]:
             del self._quiet[place]
 
+    def _measure(self) -> None:
+        """How slowly those beat who live, by place: of a machine without time all are slow."""
+        since: dict[str, list[float]] = {}
+        self._mine = self.mine
+        for one in self.processes.values():
+            alive = one.lives and self.now_s - one.heard_s <= FROZEN_S
+            if alive and len(one.newest) == PACE:
+                since.setdefault(one.place, []).append(one.newest[0])
+        self._paces = {place: statistics.median(times) for place, times in since.items()}
+
+    def _is_silent(self, one: Process) -> bool:
+        """Longer than a process that runs can be? Our own beats tell of our own time alone."""
+        if one is self._mine or self.now_s - one.heard_s <= FROZEN_S:
+            return False
+        pace_s = self._paces.get(one.place)
+        one.alone = pace_s is None
+        if pace_s is None:
+            return self._mine is None or one.place != self._mine.place
+        return one.heard_s < pace_s
+
+    def _is_untold(self, one: Process) -> bool:
+        """Another process speaks for it, which says nothing itself."""
+        teller = self.processes.get((one.place, one.beat.told_by)) if one.beat.told_by else one
+        return teller is None or (teller is not one and not teller.lives)
+
     def _judge(self, one: Process) -> State:
         if not self._connected:
             return State.UNKNOWN if one.state is not State.ENDED else State.ENDED
         if one.beat.leaving:
             return State.ENDED
-        silent = self.now_s - one.heard_s > FROZEN_S
-        if not silent:
-            return State.RUNNING
+        if not self._is_silent(one):
+            return State.HUNG if one.stands else State.RUNNING
         stuck = one.place in self._quiet and not self._is_near(one)
-        if stuck or self.now_s - self._settled_s < SETTLE_S:
-            return one.state if one.state is not State.RUNNING else State.UNKNOWN
+        back = one.heard_s > self._settled_s  # after a router was gone each finds it in its time
+        settling = self.now_s - self._settled_s < SETTLE_S * (1 if back else 2)
+        if stuck or settling or self._is_untold(one):
+            return State.UNKNOWN if one.lives else one.state
         return State.FROZEN if one.token else State.GONE
 
     def _done_with(self, one: Process) -> bool:
@@ -215,7 +223,7 @@ class Presence:
         if one.state is not State.GONE and (one.state is not State.UNKNOWN or one.token):
             return False
         replaced = any(
-            other.place == one.place and other.role == one.role and other.state is State.RUNNING
+            other.place == one.place and other.role == one.role and other.lives
             for other in self.processes.values()
         )
         return replaced or for_s > GONE_S or not (one.beats and one.held)
@@ -314,6 +322,6 @@ def viewers(processes: Iterable[Process]) -> dict[str, int]:
     """People who look, by role, of processes that run."""
     found: dict[str, int] = {}
     for one in processes:
-        for many in one.beat.viewers if one.state is State.RUNNING else ():
+        for many in one.beat.viewers if one.lives else ():
             found[many.role] = found.get(many.role, 0) + many.count
     return found

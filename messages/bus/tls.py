@@ -10,17 +10,19 @@ from pathlib import Path
 from typing import Any
 
 from cryptography import x509
+from cryptography.hazmat.primitives import serialization
 from cryptography.x509.oid import NameOID
 
 from messages.bus.faults import IdentityError
 from messages.contract.names import NAME
 
 TRUSTED = "ca.pem"
+NEXT = ".next"  # of a key's name, until its certificate is there
 
 
 def values(folder: Path, role: str) -> dict[str, Any]:
     """Zenoh's settings for a process of this role; raises IdentityError where a file is missing."""
-    certificate, key = folder / f"{role}.pem", folder / f"{role}.key"
+    certificate, key = folder / f"{role}.pem", key_of(folder, role)
     for path in (folder / TRUSTED, certificate, key):
         if not path.is_file():
             raise IdentityError(
@@ -44,6 +46,28 @@ def values(folder: Path, role: str) -> dict[str, Any]:
             "close_link_on_expiration": True,
         },
     }
+
+
+def key_of(folder: Path, role: str) -> Path:
+    """The file with the key of a role's certificate. Who renews writes the new key beside the old
+    one, then the certificate, then puts the key in its place; cut off before that last step, it is
+    done here.
+    """
+    key, waiting = folder / f"{role}.key", folder / f"{role}.key{NEXT}"
+    try:
+        certificate = x509.load_pem_x509_certificate((folder / f"{role}.pem").read_bytes())
+        mine = serialization.load_pem_private_key(waiting.read_bytes(), None).public_key()
+    except (OSError, ValueError, TypeError):
+        return key
+    if mine != certificate.public_key():
+        return key  # cut off earlier: the old pair is whole
+    try:
+        waiting.replace(key)
+    except FileNotFoundError:
+        return key  # another process did it in this moment
+    except OSError:
+        return waiting  # a folder that may only be read
+    return key
 
 
 def place_of(folder: Path, role: str) -> str:

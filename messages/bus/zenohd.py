@@ -116,10 +116,13 @@ class Zenohd:
                 if self._stop.is_set():
                     raise
 
-    def wait(self) -> None:
-        """Until `stop`; raises BusUnavailable where the program ends before."""
+    def wait(self, look: Callable[[], object] = lambda: None) -> None:
+        """Until `stop`; raises BusUnavailable where the program ends before. look(): is called a
+        few times a second.
+        """
         while not self._stop.wait(LOOK_S):
             self._look()
+            look()
 
     def _look(self) -> None:
         code = self._process.poll()

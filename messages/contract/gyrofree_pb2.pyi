@@ -1339,7 +1339,7 @@ class ProcedureCommand(_message.Message):
     def __init__(self, action: _Optional[_Union[ProcedureCommand.Action, str]] = ..., device: _Optional[str] = ..., procedure: _Optional[str] = ..., unit: _Optional[str] = ..., user: _Optional[str] = ..., text: _Optional[str] = ..., own_session: _Optional[bool] = ..., run: _Optional[str] = ..., step: _Optional[int] = ...) -> None: ...
 
 class ProcedureStatus(_message.Message):
-    __slots__ = ("header", "state", "run", "procedure", "title", "sha256", "toml", "unit", "operator", "session", "step", "instruction", "progress", "message", "steps", "table", "table_radps", "offered", "started_utc_ns", "up_b", "reference", "alarm", "if_lost")
+    __slots__ = ("header", "state", "run", "procedure", "title", "sha256", "toml", "unit", "operator", "session", "step", "instruction", "progress", "message", "steps", "table", "table_radps", "offered", "started_utc_ns", "up_b", "reference", "alarm", "if_lost", "offers")
     class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATE_IDLE: _ClassVar[ProcedureStatus.State]
@@ -1354,6 +1354,21 @@ class ProcedureStatus(_message.Message):
     STATE_DONE: ProcedureStatus.State
     STATE_ABORTED: ProcedureStatus.State
     STATE_STOPPED: ProcedureStatus.State
+    class Offer(_message.Message):
+        __slots__ = ("name", "title", "top_radps", "seconds", "steps", "fault")
+        NAME_FIELD_NUMBER: _ClassVar[int]
+        TITLE_FIELD_NUMBER: _ClassVar[int]
+        TOP_RADPS_FIELD_NUMBER: _ClassVar[int]
+        SECONDS_FIELD_NUMBER: _ClassVar[int]
+        STEPS_FIELD_NUMBER: _ClassVar[int]
+        FAULT_FIELD_NUMBER: _ClassVar[int]
+        name: str
+        title: str
+        top_radps: float
+        seconds: float
+        steps: int
+        fault: str
+        def __init__(self, name: _Optional[str] = ..., title: _Optional[str] = ..., top_radps: _Optional[float] = ..., seconds: _Optional[float] = ..., steps: _Optional[int] = ..., fault: _Optional[str] = ...) -> None: ...
     class Step(_message.Message):
         __slots__ = ("name", "kind", "target_radps", "dwell_s", "state", "reason", "attempts", "epoch", "from_us", "until_us", "from_utc_ns", "until_utc_ns", "figures", "spoilt", "confirmed_by", "trouble")
         class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
@@ -1443,6 +1458,7 @@ class ProcedureStatus(_message.Message):
     REFERENCE_FIELD_NUMBER: _ClassVar[int]
     ALARM_FIELD_NUMBER: _ClassVar[int]
     IF_LOST_FIELD_NUMBER: _ClassVar[int]
+    OFFERS_FIELD_NUMBER: _ClassVar[int]
     header: Header
     state: ProcedureStatus.State
     run: str
@@ -1466,7 +1482,8 @@ class ProcedureStatus(_message.Message):
     reference: _containers.RepeatedScalarFieldContainer[str]
     alarm: str
     if_lost: str
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., state: _Optional[_Union[ProcedureStatus.State, str]] = ..., run: _Optional[str] = ..., procedure: _Optional[str] = ..., title: _Optional[str] = ..., sha256: _Optional[str] = ..., toml: _Optional[str] = ..., unit: _Optional[str] = ..., operator: _Optional[str] = ..., session: _Optional[str] = ..., step: _Optional[int] = ..., instruction: _Optional[str] = ..., progress: _Optional[float] = ..., message: _Optional[str] = ..., steps: _Optional[_Iterable[_Union[ProcedureStatus.Step, _Mapping]]] = ..., table: _Optional[str] = ..., table_radps: _Optional[float] = ..., offered: _Optional[_Iterable[str]] = ..., started_utc_ns: _Optional[int] = ..., up_b: _Optional[_Iterable[float]] = ..., reference: _Optional[_Iterable[str]] = ..., alarm: _Optional[str] = ..., if_lost: _Optional[str] = ...) -> None: ...
+    offers: _containers.RepeatedCompositeFieldContainer[ProcedureStatus.Offer]
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., state: _Optional[_Union[ProcedureStatus.State, str]] = ..., run: _Optional[str] = ..., procedure: _Optional[str] = ..., title: _Optional[str] = ..., sha256: _Optional[str] = ..., toml: _Optional[str] = ..., unit: _Optional[str] = ..., operator: _Optional[str] = ..., session: _Optional[str] = ..., step: _Optional[int] = ..., instruction: _Optional[str] = ..., progress: _Optional[float] = ..., message: _Optional[str] = ..., steps: _Optional[_Iterable[_Union[ProcedureStatus.Step, _Mapping]]] = ..., table: _Optional[str] = ..., table_radps: _Optional[float] = ..., offered: _Optional[_Iterable[str]] = ..., started_utc_ns: _Optional[int] = ..., up_b: _Optional[_Iterable[float]] = ..., reference: _Optional[_Iterable[str]] = ..., alarm: _Optional[str] = ..., if_lost: _Optional[str] = ..., offers: _Optional[_Iterable[_Union[ProcedureStatus.Offer, _Mapping]]] = ...) -> None: ...
 
 class Alarm(_message.Message):
     __slots__ = ("id", "device", "kind", "title", "text", "page", "level", "state", "active", "unknown", "value", "limit", "unit", "raised_utc_ns", "returned_utc_ns", "acknowledged_by", "acknowledged_utc_ns", "note", "shelved_by", "shelved_s", "reason", "times", "chattering", "first_out")
@@ -1688,7 +1705,7 @@ class LogLevelCommand(_message.Message):
     def __init__(self, level: _Optional[str] = ..., seconds: _Optional[float] = ..., user: _Optional[str] = ...) -> None: ...
 
 class Beat(_message.Message):
-    __slots__ = ("header", "role", "session", "since_utc_ns", "devices", "viewers", "leaving", "certificate_ends_utc_ns", "certificate_life_s", "certificate", "clock_ahead_s", "clock_bound_s", "version")
+    __slots__ = ("header", "role", "session", "since_utc_ns", "devices", "viewers", "leaving", "certificate_ends_utc_ns", "certificate_life_s", "certificate", "clock_ahead_s", "clock_bound_s", "version", "loop", "turn_ago_s", "turn_most_s", "doing", "told_by")
     class Viewers(_message.Message):
         __slots__ = ("role", "count")
         ROLE_FIELD_NUMBER: _ClassVar[int]
@@ -1709,6 +1726,11 @@ class Beat(_message.Message):
     CLOCK_AHEAD_S_FIELD_NUMBER: _ClassVar[int]
     CLOCK_BOUND_S_FIELD_NUMBER: _ClassVar[int]
     VERSION_FIELD_NUMBER: _ClassVar[int]
+    LOOP_FIELD_NUMBER: _ClassVar[int]
+    TURN_AGO_S_FIELD_NUMBER: _ClassVar[int]
+    TURN_MOST_S_FIELD_NUMBER: _ClassVar[int]
+    DOING_FIELD_NUMBER: _ClassVar[int]
+    TOLD_BY_FIELD_NUMBER: _ClassVar[int]
     header: Header
     role: str
     session: str
@@ -1722,7 +1744,12 @@ class Beat(_message.Message):
     clock_ahead_s: float
     clock_bound_s: float
     version: str
-    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., role: _Optional[str] = ..., session: _Optional[str] = ..., since_utc_ns: _Optional[int] = ..., devices: _Optional[_Iterable[str]] = ..., viewers: _Optional[_Iterable[_Union[Beat.Viewers, _Mapping]]] = ..., leaving: _Optional[bool] = ..., certificate_ends_utc_ns: _Optional[int] = ..., certificate_life_s: _Optional[float] = ..., certificate: _Optional[str] = ..., clock_ahead_s: _Optional[float] = ..., clock_bound_s: _Optional[float] = ..., version: _Optional[str] = ...) -> None: ...
+    loop: str
+    turn_ago_s: float
+    turn_most_s: float
+    doing: str
+    told_by: str
+    def __init__(self, header: _Optional[_Union[Header, _Mapping]] = ..., role: _Optional[str] = ..., session: _Optional[str] = ..., since_utc_ns: _Optional[int] = ..., devices: _Optional[_Iterable[str]] = ..., viewers: _Optional[_Iterable[_Union[Beat.Viewers, _Mapping]]] = ..., leaving: _Optional[bool] = ..., certificate_ends_utc_ns: _Optional[int] = ..., certificate_life_s: _Optional[float] = ..., certificate: _Optional[str] = ..., clock_ahead_s: _Optional[float] = ..., clock_bound_s: _Optional[float] = ..., version: _Optional[str] = ..., loop: _Optional[str] = ..., turn_ago_s: _Optional[float] = ..., turn_most_s: _Optional[float] = ..., doing: _Optional[str] = ..., told_by: _Optional[str] = ...) -> None: ...
 
 class ClockReply(_message.Message):
     __slots__ = ("received_ns", "answered_ns", "wall_ns")

@@ -5,6 +5,7 @@ recorder.
 import logging
 import re
 import time
+from pathlib import Path
 
 import zenoh
 
@@ -12,6 +13,7 @@ from messages import text
 from messages.bus import orders
 from messages.contract import gyrofree_pb2 as pb
 from sessions.procedure import library
+from sessions.procedure.conductor import Conductor
 from sessions.procedure.driven.table import RateTable
 from sessions.procedure.model import DEG
 from sessions.procedure.run import Journal
@@ -118,3 +120,21 @@ def if_lost(table: RateTable | None) -> str:
     if table is None:
         return f"{goes_on}; steps that want a person wait. You turn the table by hand."
     return f"{goes_on}, and the table turns with it. In the lab: {table.if_lost}."
+
+
+def offer(message: pb.ProcedureStatus, folder: Path | None) -> None:
+    """Write into the message what may be started, and what is known of it."""
+    for one in library.offers(folder):
+        message.offered.append(one.name)
+        known = message.offers.add(name=one.name, title=one.title, steps=one.steps)
+        known.top_radps, known.seconds, known.fault = one.top, one.seconds, one.fault
+
+
+def late(conductor: Conductor, command: pb.ProcedureCommand) -> str:
+    """Why an order comes too late: it was meant for what another has answered already."""
+    run = conductor.run
+    if command.run and command.run != run.id:
+        return "another test runs now: look at it first"
+    if command.step and command.step != run.at + 1:
+        return f"step {command.step} has been answered already; this is step {run.at + 1}"
+    return ""

@@ -5,6 +5,7 @@ import functools
 import logging
 import re
 import tomllib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -59,8 +60,49 @@ def find(name: str, folder: Path | None = None) -> Plan:
         near = difflib.get_close_matches(name, names(folder), 1)
         hint = f"did you mean {near[0]!r}? There are" if near else "there are"
         raise ProcedureError(f"no procedure {name!r}; {hint} {', '.join(names(folder))}")
+    return read(path_of(name, folder))
+
+
+@dataclass(frozen=True)
+class Offer:
+    """What is known of a procedure before it starts."""
+
+    name: str
+    title: str = ""
+    top: float = 0.0  # rad/s, the fastest that it wants of the table
+    seconds: float = 0.0  # that it takes at least
+    steps: int = 0
+    fault: str = ""  # why it cannot be used
+
+
+def offers(folder: Path | None = None) -> list[Offer]:
+    """Of each name; a file is read again when it has changed."""
+    return [_offer(name, path_of(name, folder)) for name in names(folder)]
+
+
+def _offer(name: str, path: Path) -> Offer:
+    try:
+        stamp = path.stat()
+    except OSError as error:
+        return Offer(name, fault=f"{path}: {error.strerror}")
+    return _offer_of(name, path, stamp.st_mtime_ns, stamp.st_size)
+
+
+@functools.lru_cache(maxsize=512)
+def _offer_of(name: str, path: Path, changed_ns: int, size: int) -> Offer:  # noqa: ARG001
+    try:
+        plan = read(path)
+    except ProcedureError as error:
+        return Offer(name, fault=texts.plain(error, 400))
+    top = max((abs(step.target) for step in plan.steps), default=0.0)
+    title = texts.plain(plan.procedure.title, 200)
+    return Offer(name, title, top, plan.least_seconds, len(plan.steps))
+
+
+def path_of(name: str, folder: Path | None = None) -> Path:
+    """The file of a name that `names` gives."""
     own = folder / f"{name}.toml" if folder is not None else None
-    return read(own if own is not None and own.exists() else TEMPLATES / f"{name}.toml")
+    return own if own is not None and own.exists() else TEMPLATES / f"{name}.toml"
 
 
 def read(path: Path) -> Plan:

@@ -14,6 +14,7 @@ from messages.bus import orders
 from messages.bus.claiming import Claim
 from messages.bus.command.keeper import Keeper
 from messages.bus.session import BusSettings, subscribe
+from messages.bus.turning import Loop
 from messages.bus.turns import in_turn, sessions
 from messages.clock import elapsed_ns
 from messages.contract import gyrofree_pb2 as pb
@@ -32,7 +33,7 @@ from messages.history.keeping import KeptPublishers
 from sessions.procedure import library, seen
 from sessions.procedure.around import Around
 from sessions.procedure.conductor import Conductor
-from sessions.procedure.desk import ProcedureDesk, if_lost
+from sessions.procedure.desk import ProcedureDesk, if_lost, late, offer
 from sessions.procedure.driven.description import TableError, described
 from sessions.procedure.driven.table import RateTable, TextTable
 from sessions.procedure.run import Journal, unfinished
@@ -45,6 +46,10 @@ TICK_S = 0.05
 STATUS_S = 0.25
 STOPPED_NS = 2_000_000_000  # between two steps: this process did not run
 IDLE_S = 2.0
+ORDER_S = (
+    30.0  # that an order may take, and a step that orders: the recorder's answer is waited for
+)
+RESUME_S = 120.0  # that going on after a crash may take
 DATA = (ACCEL, IMU, TACHO, RATE, AXES, LINK)
 WAITING = 20_000  # messages of a device; more are dropped, which the watch takes for lost data
 COMMAND = pb.ProcedureCommand
@@ -74,6 +79,7 @@ class Service:
     ) -> None:
         """number: of the claim. Raises TableError."""
         self._settings, self._session, self._prefix = settings, session, prefix
+        self.loop = Loop("procedures")
         self._tables = Tables(settings)
         kept = settings.root / ".published"
         self._publishers = KeptPublishers(session, prefix, PROCEDURES, kept, number)
@@ -136,7 +142,8 @@ class Service:
         """Orders, data, status; call it every TICK_S."""
         self._keeper.step()
         while self._orders:
-            self._obey(self._orders.popleft())
+            with self.loop.during("an order", ORDER_S):
+                self._obey(self._orders.popleft())
         while self._around.recorder:
             status = self._around.recorder.popleft()
             for conductor in self._conductors.values():
@@ -226,7 +233,10 @@ class Service:
             note.header.utc_ns = at_utc_ns or time.time_ns()
             self._publishers.put(NOTE, device, note)
 
-        record = lambda on: desk.record(on, journal)  # noqa: E731
+        def record(on: bool) -> object:
+            with self.loop.during("an order to the recorder", ORDER_S):
+                return desk.record(on, journal)
+
         silence = lambda: self._around.silence(device)  # noqa: E731
         conductor = Conductor(journal, self._tables.get(device), say, record, silence)
         self._ended.pop(device, None)
@@ -264,7 +274,7 @@ class Service:
             message = status_of(self._ended[device])
         table = self._tables.get(device)
         message.table = table.name if table is not None else ""
-        message.offered[:] = library.names(self._settings.folder)
+        offer(message, self._settings.folder)
         self._publish(device, message)
 
     def _publish(self, device: str, message: pb.ProcedureStatus) -> None:
@@ -272,16 +282,6 @@ class Service:
         message.header.device, message.header.run = device, self._publishers.run
         message.header.utc_ns = message.header.utc_ns or time.time_ns()
         self._publishers.put(PROCEDURE, device, message)
-
-
-def late(conductor: Conductor, command: COMMAND) -> str:
-    """Why an order comes too late: it was meant for what another has answered already."""
-    run = conductor.run
-    if command.run and command.run != run.id:
-        return "another test runs now: look at it first"
-    if command.step and command.step != run.at + 1:
-        return f"step {command.step} has been answered already; this is step {run.at + 1}"
-    return ""
 
 
 def run(settings: ProcedureSettings, bus: BusSettings, stop: threading.Event) -> None:
@@ -313,13 +313,16 @@ def _serve(
     """
     service = Service(settings, session, bus.prefix, claimed.number)
     try:
-        service.resume()
-        last_ns = elapsed_ns()
-        while not (claimed.lost.is_set() or stop.wait(TICK_S)):
-            if elapsed_ns() - last_ns > STOPPED_NS and not claimed.look():
-                continue
-            service.step()
+        with service.loop:
+            with service.loop.during("going on after a crash", RESUME_S):
+                service.resume()
             last_ns = elapsed_ns()
+            while not (claimed.lost.is_set() or stop.wait(TICK_S)):
+                service.loop.turn()
+                if elapsed_ns() - last_ns > STOPPED_NS and not claimed.look():
+                    continue
+                service.step()
+                last_ns = elapsed_ns()
     finally:
         if claimed.lost.is_set():
             service.abandon()

@@ -17,6 +17,7 @@ from messages import text
 from messages.bus import orders
 from messages.bus.fencing import Fence
 from messages.bus.session import BusSettings
+from messages.bus.turning import Loop
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import MESSAGE_BYTES, Refusal
 from messages.contract.door import Door, device_of
@@ -35,6 +36,7 @@ log = logging.getLogger(__name__)
 
 DRAIN_S = 0.1  # a message waits at most this long before it is in the running chunk
 REPAIR_S = 2.0  # the end of a session waits so long for gaps that are being filled
+BEGIN_S, END_S = 15.0, 60.0  # that beginning and closing a session may take on a slow disk
 RETRY_S = 5.0  # an automatic start that the disk refused is tried again after this
 
 Order = orders.Order[pb.RecorderCommand, pb.RecorderStatus]
@@ -57,7 +59,7 @@ class Recorder:
         """
         self.settings = settings
         self.bus = bus
-        self.wake = threading.Event()
+        self.wake, self.loop = threading.Event(), Loop("recorder")
         self._configuration = configuration
         self._inbox: deque[tuple[int, str, bytes]] = deque()
         self._orders: deque[Order] = deque()
@@ -108,7 +110,7 @@ class Recorder:
         self.wake.set()
 
     def listen(self) -> None:
-        """Keep what comes from now on for the session that is about to begin."""
+        """Keep what comes from now on for the session that begins in a moment."""
         self._recording = True
 
     def resume(self, manifest: Manifest) -> None:
@@ -186,15 +188,16 @@ class Recorder:
         if self._fresh and not self._inbox:
             self._clock.begin()
         try:
-            store = start(
-                self.settings,
-                self._clock.now_ns(),
-                name=name,
-                note=note,
-                user=user,
-                continues=continues,
-                configuration=self._configuration,
-            )
+            with self.loop.during("beginning a session", BEGIN_S):
+                store = start(
+                    self.settings,
+                    self._clock.now_ns(),
+                    name=name,
+                    note=note,
+                    user=user,
+                    continues=continues,
+                    configuration=self._configuration,
+                )
         except OSError as error:
             text = (
                 f"{self.settings.root}: cannot record: {error.strerror}; "
@@ -222,14 +225,11 @@ class Recorder:
         return True
 
     def _rotate(self, store: SessionStore) -> None:
-        manifest = store.manifest
-        log.info("%s: %d bytes: continuing in a new session", manifest.id, store.size)
-        name = manifest.id[16:48]  # after the time
+        was = store.manifest
+        log.info("%s: %d bytes: continuing in a new session", was.id, store.size)
         self._end(keep_listening=True)
         self._fresh = False
-        if not self._begin(
-            name=name, note=manifest.note, user=manifest.user, continues=manifest.id
-        ):
+        if not self._begin(name=was.id[16:48], note=was.note, user=was.user, continues=was.id):
             self._retry_at = time.monotonic() + RETRY_S
 
     def _end(self, *, keep_listening: bool = False) -> None:
@@ -238,14 +238,15 @@ class Recorder:
             return
         self._recording = keep_listening
         self._drain()
-        if not keep_listening:
-            self._finish_repairs(store)
-        closed = store.close()
+        with self.loop.during("closing a session", END_S):
+            if not keep_listening:
+                self._finish_repairs(store)
+            closed = store.close()
         self._last = self._describe(store)
         self._store = None
         self._message = "" if closed else store.error
-        state = "closed" if closed else "left open"
-        log.info("%s: %s, %d messages", store.manifest.id, state, store.messages)
+        how = "closed" if closed else "left open"
+        log.info("%s: %s, %d messages", store.manifest.id, how, store.messages)
 
     def _finish_repairs(self, store: SessionStore) -> None:
         """Wait a little for answers that are under way; then what is held is written with its
@@ -281,8 +282,7 @@ class Recorder:
             if fault := text.check(command.note, lines=True) or text.check(command.user):
                 return f"note or user: {fault}"
             log.info("start ordered by %s", command.user or "an unnamed user")
-            name = slug(command.name)
-            if not self._begin(name=name, note=command.note, user=command.user):
+            if not self._begin(name=slug(command.name), note=command.note, user=command.user):
                 return self._message
             self._keep_title(command.name)
             return ""

@@ -97,13 +97,15 @@ def _serve(
     threading.Thread(target=_tend, args=(settings,), name="recovery", daemon=True).start()
     next_status, said = 0.0, None
     try:
-        while not (stop.is_set() or claimed.lost.is_set()):
-            recorder.step()
-            # at once where it begins or ends: who takes over goes on by what was heard last
-            if time.monotonic() >= next_status or recorder.recording != said:
-                next_status, said = time.monotonic() + STATUS_S, recorder.recording
-                publishers.put(STATUS, RECORDER, recorder.status())
-            recorder.wake.wait(DRAIN_S)
+        with recorder.loop:
+            while not (stop.is_set() or claimed.lost.is_set()):
+                recorder.loop.turn()
+                recorder.step()
+                # at once where it begins or ends: who takes over goes on by what was heard last
+                if time.monotonic() >= next_status or recorder.recording != said:
+                    next_status, said = time.monotonic() + STATUS_S, recorder.recording
+                    publishers.put(STATUS, RECORDER, recorder.status())
+                recorder.wake.wait(DRAIN_S)
     finally:
         samples.undeclare()
         control.undeclare()

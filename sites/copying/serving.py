@@ -9,12 +9,15 @@ from pathlib import Path
 
 import zenoh
 
+from messages.bus.turning import Loop
 from sites.copying.shelf import Shelf, ShelfError
 from sites.copying.since import SINCE, Told
 from sites.roles import SEGMENTS, segment_key
 
 MOST_WAITING = 256  # questions on one way; more are refused, and asked again
 CLOSE_S = 1.0
+WAKE_S = 1.0  # while nothing is asked, that much is said so often
+ANSWER_S = 60.0  # that an answer may take
 
 log = logging.getLogger(__name__)
 
@@ -72,7 +75,8 @@ class Serving:
 
         queryable = session.declare_queryable(f"{key}/**", on_query)
         self._ways.append(asked)
-        thread = threading.Thread(target=self._serve, args=(asked,), name="copies", daemon=True)
+        given = asked, f"copies {len(self._ways)}"
+        thread = threading.Thread(target=self._serve, args=given, name="copies", daemon=True)
         self._threads.append(thread)
         thread.start()
         return queryable
@@ -87,17 +91,29 @@ class Serving:
         for thread in self._threads:
             thread.join(max(0.0, end - time.monotonic()))
 
-    def _serve(self, asked: "queue.Queue[zenoh.Query | None]") -> None:
-        while (query := asked.get()) is not None:
-            key = str(query.key_expr)
-            try:
-                query.reply(key, self._answers(key.partition(SEGMENTS)[2].split("/")))
-            except (ShelfError, OSError) as error:
-                query.reply_err(str(error).encode())
-            except Exception:  # whatever a stranger asks, the service goes on
-                log.exception("a question about copies is refused: %s", key[:200])
-                query.reply_err(b"the question cannot be answered; home's log says why")
-            query.drop()
+    def _serve(self, asked: "queue.Queue[zenoh.Query | None]", name: str) -> None:
+        with Loop(name) as loop:
+            while True:
+                loop.turn()
+                try:
+                    query = asked.get(timeout=WAKE_S)
+                except queue.Empty:
+                    continue
+                if query is None:
+                    return
+                with loop.during("an answer", ANSWER_S):
+                    self._reply(query)
+
+    def _reply(self, query: zenoh.Query) -> None:
+        key = str(query.key_expr)
+        try:
+            query.reply(key, self._answers(key.partition(SEGMENTS)[2].split("/")))
+        except (ShelfError, OSError) as error:
+            query.reply_err(str(error).encode())
+        except Exception:  # whatever a stranger asks, the service goes on
+            log.exception("a question about copies is refused: %s", key[:200])
+            query.reply_err(b"the question cannot be answered; home's log says why")
+        query.drop()
 
 
 def _number(text: str) -> int:

@@ -7,11 +7,13 @@ read everything as viser's page does. Bytes are told apart by the kind of messag
 one core: of the dashboard without a browser, with one, with all of them.
 
 The delay of an update is from when an attitude is published on the bus, as a subscriber beside the
-browsers hears it, to when a browser has it: taken at TIMED of the browsers while all look.
+browsers hears it, to when a browser has it: taken at TIMED of the browsers while all look. The
+others are in a process of their own, lest those that are timed wait for them.
 """
 
 import json
 import math
+import multiprocessing
 import secrets
 import sys
 import tempfile
@@ -19,6 +21,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Sequence
+from multiprocessing.synchronize import Event
 from pathlib import Path
 
 import httpx
@@ -51,20 +54,18 @@ POSES = {"SetOrientationMessage", "SetPositionMessage", "SceneNodeUpdateMessage"
 class Browser:
     """One reader of the scene; `bytes` by kind of message while `counting`."""
 
-    def __init__(
-        self, demo: RunningDemo, users: Path, name: str, heard: "Heard | None" = None
-    ) -> None:
+    def __init__(self, url: str, users: Path, name: str, heard: "Heard | None" = None) -> None:
         self._heard, self.delays_s = heard, list[float]()
         self.bytes: Counter[str] = Counter()
         self.frames, self.counting = 0, False
-        with httpx.Client(base_url=demo.url, headers={"origin": demo.url}) as client:
+        with httpx.Client(base_url=url, headers={"origin": url}) as client:
             token = issue_link_token(users, name)
             client.post("/login/link", data={"token": token})
             cookies = "; ".join(f"{name}={value}" for name, value in client.cookies.items())
         self._socket = websockets.sync.client.connect(
-            demo.url.replace("http", "ws") + "/scene",
+            url.replace("http", "ws") + "/scene",
             additional_headers={"cookie": cookies},
-            origin=demo.url,
+            origin=url,
             subprotocols=[f"viser-v{viser.__version__}"],
             max_size=None,
             compression=None,
@@ -134,6 +135,32 @@ class Heard:
         self._session.close()
 
 
+class Crowd:
+    """Browsers in a process of their own."""
+
+    def __init__(self, url: str, users: Path, names: list[str]) -> None:
+        spawn = multiprocessing.get_context("spawn")
+        self._here, self._over = spawn.Event(), spawn.Event()
+        given = url, users, names, self._here, self._over
+        self._process = spawn.Process(target=_look, args=given, daemon=True)
+        self._process.start()
+        if not self._here.wait(60.0 + len(names)):
+            raise TimeoutError(f"{len(names)} browsers did not come in a minute")
+
+    def close(self) -> None:
+        """All go."""
+        self._over.set()
+        self._process.join(20.0)
+
+
+def _look(url: str, users: Path, names: list[str], here: Event, over: Event) -> None:
+    looking = [Browser(url, users, name) for name in names]
+    here.set()
+    over.wait()
+    for browser in looking:
+        browser.close()
+
+
 def _key(q: Sequence[float]) -> tuple[int, ...]:
     return tuple(round(float(value) * 1e6) for value in q)
 
@@ -177,7 +204,7 @@ def main(browsers: int = 20, seconds: float = 20.0) -> None:
         users = load(demo.config).dashboard.users
         for k in range(0, browsers, PER_USER):
             add_user(users, f"bench-{k}", secrets.token_urlsafe(24), "viewer")
-        looking = [Browser(demo, users, "bench-0")]
+        looking = [Browser(demo.url, users, "bench-0")]
         time.sleep(OPENING_S)
         looking[0].counting, began = True, time.monotonic()
         first = cpu(process, seconds)
@@ -186,15 +213,15 @@ def main(browsers: int = 20, seconds: float = 20.0) -> None:
             kind: round(size / span / 1e3, 1) for kind, size in looking[0].bytes.most_common()
         }
         heard = Heard(load(demo.config).bus)
-        while len(looking) < browsers:
-            name = f"bench-{len(looking) // PER_USER * PER_USER}"
-            timed = heard if browsers - len(looking) <= TIMED else None
-            looking.append(Browser(demo, users, name, timed))
+        names = [f"bench-{k // PER_USER * PER_USER}" for k in range(1, browsers)]
+        crowd = Crowd(demo.url, users, names[:-TIMED])
+        looking += [Browser(demo.url, users, name, heard) for name in names[-TIMED:]]
         time.sleep(OPENING_S + browsers / 10)
         heard.timing = True
         many = cpu(process, seconds)
         heard.timing = False
         heard.close()
+        crowd.close()
         delays = np.array([delay for browser in looking for delay in browser.delays_s])
         for browser in looking:
             browser.close()

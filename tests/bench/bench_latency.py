@@ -23,7 +23,7 @@ from firmware_protocol.codec import FLAG_SIMULATED, encode
 from firmware_protocol.frames import Acc12
 from gateway.virtual.board_link import PtyLink
 from gyrofree.config import load
-from gyrofree.running.demo import Plan, write_configuration
+from gyrofree.demo.bench import Plan, write_configuration
 from gyrofree.running.supervisor import Supervisor
 from messages.bus.session import open_client, subscribe
 from messages.contract import rates

@@ -20,13 +20,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from support.kill_stack import line  # noqa: E402
 from support.stack import free_port  # noqa: E402
+from support.waiting import until  # noqa: E402
 
 from messages.bus.session import open_client, subscribe  # noqa: E402
 from messages.contract import rates  # noqa: E402
 from messages.contract.topics import ACCEL, ESTIMATOR, LINK, RATE, STATUS, parse  # noqa: E402
 from sessions.library.catalogue import Catalogue  # noqa: E402
 from sessions.recording.mcap_log import read  # noqa: E402
-from tests.system.test_kill import Stack, until  # noqa: E402
+from tests.system.test_kill import Stack  # noqa: E402
 
 PATIENCE_S = 900.0  # for everything to be whole again
 CALM_S = 5.0

@@ -28,13 +28,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from support.kill_stack import line  # noqa: E402
 from support.stack import free_port  # noqa: E402
+from support.waiting import until  # noqa: E402
 
 from messages.contract import gyrofree_pb2 as pb  # noqa: E402
 from messages.contract.topics import ACCEL  # noqa: E402
 from messages.history.journal import Journal  # noqa: E402
 from sessions.library.catalogue import Catalogue  # noqa: E402
 from sessions.recording.mcap_log import read  # noqa: E402
-from tests.system.test_kill import Stack, until  # noqa: E402
+from tests.system.test_kill import Stack  # noqa: E402
 
 FICLONE = 0x40049409  # linux/fs.h
 OUTER_BYTES, INNER_BYTES = 3 << 30, 1 << 30  # sparse

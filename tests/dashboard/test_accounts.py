@@ -12,7 +12,8 @@ import pytest
 import websockets
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.front_door import PASSWORDS, Door, message, open_door, wait_for
+from support.front_door import PASSWORDS, Door, message, open_door
+from support.waiting import until
 from typer.testing import CliRunner
 
 from dashboard.data.store import Store
@@ -136,12 +137,12 @@ def test_whatever_ends_a_right_ends_what_is_open_under_it(door: Door, way):
             with door.client("vera") as vera:
                 mine, hers = Open(door, client), Open(door, vera)
                 way(door, client, anna)
-                wait_for(mine.ended, "the end of scene and stream")
+                until(mine.ended, "the end of scene and stream")
                 assert client.get("/api/me").status_code == 401
                 if way not in (by_idleness, by_age):
                     assert not hers.scene_ended() and hers._stream.is_alive()
                 vera.post("/logout", data=form(vera))
-                wait_for(hers.stream_ended, "the end of the other stream")
+                until(hers.stream_ended, "the end of the other stream")
     finally:
         door.settings.users.write_text(before)
         door.ahead = 0.0
@@ -152,7 +153,7 @@ def test_a_revoked_token_ends_its_stream(door: Door):
     with door.client("otto") as client, door.client("anna") as anna:
         mine = Open(door, client, secret)
         assert anna.post("/users/tokens", data=form(anna, revoke=entry.id)).status_code == 303
-        wait_for(mine.stream_ended, "the end of the stream")
+        until(mine.stream_ended, "the end of the stream")
         assert not mine.scene_ended()
         mine.scene.close()
     with pytest.raises(ValueError):

@@ -3,17 +3,24 @@ by a redirect and never without what keeps them safe.
 """
 
 import json
+import ssl
 import threading
+import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
-from support.front_door import wait_for
+from support.certificates import make_certificate
 from support.mail_server import mail_server
+from support.stack import free_port
+from support.waiting import until
 
 from dashboard.alarms import notices
 from dashboard.alarms.notices import DeliveryError, Notice, Sender
+from dashboard.alarms.own_place import told
 from dashboard.alarms.settings import AlarmSettings, MailSettings, WebhookSettings
+from dashboard.alarms.state_file import load
 from dashboard.alarms.ways import MOMENT, SIGNATURE, Mail, Webhook, signature
+from messages.bus.session import BusSettings, open_client, open_router
 
 NOTICE = Notice(
     "axis-a21",
@@ -85,12 +92,12 @@ def test_a_notice_waits_for_its_server_over_a_restart(hook, tmp_path, monkeypatc
     hook.status = 503
     sender = Sender(way, path)
     sender.offer(NOTICE)
-    wait_for(lambda: len(hook.got) >= 2, "a second attempt")
+    until(lambda: len(hook.got) >= 2, "a second attempt")
     assert sender.waiting == 1 and "503" in sender.fault
     sender.close()
     hook.status, before = 200, len(hook.got)
     again = Sender(way, path)
-    wait_for(lambda: again.sent == 1 and again.waiting == 0, "it was delivered")
+    until(lambda: again.sent == 1 and again.waiting == 0, "it was delivered")
     assert len(hook.got) == before + 1 and not again.fault
     again.close()
     last = Sender(way, path)
@@ -109,6 +116,28 @@ def test_less_than_the_level_is_not_told_and_a_flood_is_counted(hook, tmp_path, 
         sender.offer(NOTICE)
     assert sender.waiting == 5 and sender.given_up == 4
     sender.close()
+
+
+def test_an_office_tells_its_own_people_once_over_a_restart(hook, tmp_path):
+    """No service of alarms runs there: its site service tells."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    bus = BusSettings(prefix="t", router=endpoint, listen=[endpoint]).acting_as("authority")
+    settings = AlarmSettings(
+        state=tmp_path / "alarms.json",
+        disk_free_bytes=1 << 60,
+        webhook=WebhookSettings(url=f"http://127.0.0.1:{hook.server_port}/in"),
+    )
+    with open_router(bus), open_client(bus) as session:
+        with told(session, bus, "office", settings, tmp_path):
+            until(lambda: hook.got, "the notice")
+        said = json.loads(hook.got[0][2])
+        assert (said["id"], said["level"], said["site"]) == ("disk", "critical", "t")
+        again = settings.model_copy(update={"disk_free_bytes": 1 << 61})
+        with told(session, bus, "office", again, tmp_path):
+            book = load(settings.state)[0]
+            assert book.points["", "disk"].active
+            time.sleep(1.0)
+    assert len(hook.got) == 1
 
 
 def settings_of(server, **more):
@@ -140,6 +169,72 @@ def test_mail_is_never_sent_unprotected_where_it_is_to_be_protected():
         with pytest.raises(DeliveryError, match="STARTTLS"):
             Mail(settings_of(server, safety="starttls")).deliver(NOTICE)
         assert not server.mails
+
+
+@pytest.fixture
+def protected(tmp_path, monkeypatch):
+    """A mail server that offers STARTTLS and wants a sign-in, whose certificate is trusted."""
+    certificate, key = make_certificate(tmp_path)
+    context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+    context.load_cert_chain(certificate, key)
+    monkeypatch.setenv("SSL_CERT_FILE", str(certificate))
+    with mail_server(tls=context, login=("lab", "between us")) as server:
+        yield server
+
+
+def signed_in(tmp_path, server, password="between us", **more):
+    file = tmp_path / "password"
+    file.write_text(f"{password}\n")
+    safe = {"safety": "starttls", "user": "lab", "password_file": file} | more
+    settings = settings_of(server, **safe)
+    return Mail(settings.model_copy(update={"host": "localhost"}))
+
+
+def said_in_clear(server) -> set[str]:
+    return {line.split(" ")[0].upper() for line in server.clear}
+
+
+def test_a_mail_goes_encrypted_with_its_sign_in_after_the_handshake(protected, tmp_path):
+    signed_in(tmp_path, protected).deliver(NOTICE)
+    (mail,) = protected.mails
+    assert "axis a21 stuck" in mail["Subject"]
+    assert said_in_clear(protected) == {"EHLO", "STARTTLS"}
+    assert {"AUTH", "MAIL", "RCPT", "DATA"} <= {
+        one.split(" ")[0].upper() for one in protected.hidden
+    }
+
+
+def test_a_certificate_that_is_not_trusted_ends_it_and_nothing_is_said(
+    protected, tmp_path, monkeypatch
+):
+    monkeypatch.delenv("SSL_CERT_FILE")
+    with pytest.raises(DeliveryError, match="(?i)certificate"):
+        signed_in(tmp_path, protected).deliver(NOTICE)
+    assert not protected.mails and said_in_clear(protected) == {"EHLO", "STARTTLS"}
+
+
+def test_a_certificate_of_another_host_ends_it_and_nothing_is_said(protected, tmp_path):
+    login = ("lab", "between us")
+    with mail_server(tls=protected.tls, login=login, host="127.0.0.9") as server:
+        way = signed_in(tmp_path, server)
+        another = Mail(way._settings.model_copy(update={"host": server.host}))
+        with pytest.raises(DeliveryError, match="127.0.0.9"):
+            another.deliver(NOTICE)
+        assert not server.mails and said_in_clear(server) == {"EHLO", "STARTTLS"}
+
+
+def test_a_sign_in_that_is_refused_is_said_and_no_mail_is_given(protected, tmp_path):
+    with pytest.raises(DeliveryError, match="wrong name or password"):
+        signed_in(tmp_path, protected, "something else").deliver(NOTICE)
+    assert not protected.mails and said_in_clear(protected) == {"EHLO", "STARTTLS"}
+    assert not [line for line in protected.hidden if line.upper().startswith("MAIL")]
+
+
+def test_where_starttls_is_not_offered_neither_password_nor_mail_is_said(tmp_path):
+    with mail_server(login=("lab", "between us")) as server:
+        with pytest.raises(DeliveryError, match="STARTTLS"):
+            signed_in(tmp_path, server).deliver(NOTICE)
+        assert not server.mails and said_in_clear(server) <= {"EHLO", "STARTTLS", "QUIT"}
 
 
 @pytest.mark.parametrize("to", ["nobody", "a@b.org\r\nBcc: c@d.org", "A <a@b.org>", "a@b.org,c@d"])

@@ -2,6 +2,7 @@
 
 import datetime as dt
 import math
+import random
 import time
 from pathlib import Path
 
@@ -10,12 +11,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.front_door import open_door
 
+from dashboard.alarms.book import Book
 from dashboard.alarms.health import of_bench, of_device
+from dashboard.alarms.machine import Now
+from dashboard.alarms.own_place import OwnPlace
 from dashboard.alarms.places import Certificates
 from dashboard.alarms.settings import AlarmSettings, HealthSettings
+from dashboard.alarms.watch import Watch
 from dashboard.data.alarms import alarms, bench_alarms
 from dashboard.data.lateness import behind, clock, lateness
+from dashboard.data.places import places
 from dashboard.data.store import Store
+from messages.bus.beating import BEAT_S
 from messages.bus.presence import AGAIN_S, LOOK_S, SETTLE_S
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
@@ -85,6 +92,115 @@ def settle(bench: Bench, **office: object) -> None:
         everybody(bench, **office)
         bench.passes(0.5)
     everybody(bench, **office)
+
+
+# --- frozen: counted by beats and looks, not by a clock
+
+
+class Machine:
+    """Processes of the lab that beat by a machine's own time, and whoever watches them."""
+
+    ROLES = ("router", "gateway", "estimator", "recorder", "alarms")
+
+    def __init__(self, folder: Path, seed: int = 0) -> None:
+        self.random = random.Random(seed)
+        self.store, self.book = Store(), Book()
+        self.store.presence.own = "lab-alarms"
+        settings = AlarmSettings(state=folder / "alarms.json", disk_free_bytes=0)
+        self.watch = Watch(self.store, settings, folder, self.book)
+        self.beats = dict.fromkeys(self.ROLES, 0)
+        self.due = {role: 0.1 * k for k, role in enumerate(self.ROLES)}
+        self.s = self.machine_s = 0.0
+        for role in self.ROLES:
+            self.store.presence.token(tp.alive_key("lab", "lab", f"{role}-1"), True)
+
+    def step(self, passed_s: float, speed: float = 1.0, frozen: str = "") -> set[str]:
+        """So much time passes, of which the machine has a share; the alarms that are there."""
+        self.s, self.machine_s = self.s + passed_s, self.machine_s + passed_s * speed
+        for role in self.ROLES:
+            while self.due[role] <= self.machine_s:
+                self.due[role] += BEAT_S + self.random.uniform(0.0, 0.05)
+                if role != frozen:
+                    self.beats[role] += 1
+                    beat = pb.Beat(role=role, session=f"lab-{role}")
+                    beat.header.device, beat.header.sequence = "lab", self.beats[role]
+                    self.store.presence.beat("lab", f"{role}-1", beat)
+        self.store.presence.look(self.s)
+        self.watch.look(Now(self.s, int(self.s * 1e9)))
+        return {point.id for point in self.book.points.values() if point.active}
+
+
+@pytest.mark.parametrize("role", ["gateway", "recorder"])
+@pytest.mark.parametrize("phase", range(6))
+def test_a_frozen_service_is_an_alarm_before_the_others_have_beaten_for_two_seconds(
+    tmp_path, role, phase
+):
+    lab = Machine(tmp_path, phase)
+    while lab.beats[role] < 30 or lab.s % 0.6 < 0.1 * phase:
+        assert not lab.step(0.1)
+    at = dict(lab.beats)
+    while f"service-lab-{role}" not in lab.step(0.1, frozen=role):
+        others = [lab.beats[one] - at[one] for one in lab.ROLES if one != role]
+        assert max(others) < 2.0 / BEAT_S
+    assert lab.beats[role] == at[role]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_machine_without_time_is_not_taken_for_a_frozen_service(tmp_path, seed):
+    """It has a tenth to all of its time, changing, for all of its processes alike."""
+    lab, lottery = Machine(tmp_path, seed), random.Random(seed)
+    while lab.s < 120.0:
+        speed, end = 10.0 ** lottery.uniform(-1.0, 0.0), lab.s + lottery.uniform(0.3, 4.0)
+        while lab.s < end:
+            assert not lab.step(0.1, speed)
+
+
+def test_one_that_just_began_is_given_more_time(tmp_path):
+    lab = Machine(tmp_path)
+    while lab.beats["recorder"] < 30:
+        lab.step(0.1)
+    lab.beats["recorder"] = 3
+    lab.step(0.6)
+    at_s = lab.s
+    while "service-lab-recorder" not in lab.step(0.1, frozen="recorder"):
+        pass
+    assert 2.5 < lab.s - at_s < 3.5
+
+
+def test_a_service_whose_work_stands_is_an_alarm_that_says_which_and_for_how_long(bench):
+    settle(bench)
+    hung = {"loop": "link cube", "doing": "decoding the journal", "turn_most_s": 3.0}
+    bench.beats("lab", "gateway", turn_ago_s=2.9, **hung)
+    assert not bench.found()
+    bench.beats("lab", "gateway", turn_ago_s=3.4, **hung)
+    bench.passes(LOOK_S)
+    (found,) = bench.found().values()
+    assert found.title == "gateway at lab hung"
+    assert "link cube (decoding the journal), has stood for some seconds" in found.text
+    (gateway,) = (
+        one
+        for place in places(bench.store.presence)
+        for one in place["services"]
+        if (place["name"], one["role"]) == ("lab", "gateway")
+    )
+    assert gateway["state_said"] == "hung, 4 s: link cube (decoding the journal)"
+    bench.beats("lab", "gateway", turn_ago_s=0.0, **hung)
+    bench.passes(LOOK_S)
+    assert not bench.found()
+
+
+def test_who_is_spoken_for_is_not_blamed_for_the_one_that_speaks(bench):
+    settle(bench)
+    bench.beats("lab", "up", told_by="router-1", loop="services", turn_most_s=3.0, turn_ago_s=9.0)
+    bench.token("lab", "up")
+    bench.passes(LOOK_S)
+    assert bench.found()["service-lab-up"].title == "up at lab hung"
+    bench.beats("lab", "up", told_by="router-1", loop="services", turn_most_s=3.0)
+    for _ in range(8):  # the router says nothing, nor therefore of whoever started it
+        bench.passes(0.5)
+        for place, role in (("lab", "gateway"), ("office", "dashboard"), ("office", "router")):
+            bench.beats(place, role)
+    assert list(bench.found()) == ["service-lab-router"]
 
 
 def test_a_frozen_service_and_one_that_is_gone_are_alarms_on_the_page_and_in_the_service(bench):
@@ -213,6 +329,34 @@ def test_no_digit_is_said_that_is_not_known(age, bound):
         assert 10.0**-digits >= 0.4 * bound or bound > 1.0
         assert abs(number - age) <= 0.5 * 10.0**-digits + 1e-9
     assert "-" not in clock(-age, bound)
+
+
+# --- a place without a service of alarms
+
+
+def test_an_office_finds_its_own_disk_clock_certificates_and_a_place_out_of_reach(bench, tmp_path):
+    settings = AlarmSettings(state=tmp_path / "alarms.json", disk_free_bytes=1 << 60)
+    own = OwnPlace(bench.store.presence, settings, tmp_path, None)
+    for _ in range(3):  # the lab's gateway is frozen, too, which is told there
+        everybody(bench)
+        bench.passes(SETTLE_S)
+    ends = int((time.time() + DAY_S) * 1e9)
+    office = {"certificate_ends_utc_ns": ends, "certificate_life_s": 90 * DAY_S, "clock_s": 2.3}
+
+    def look() -> set[str]:
+        for _ in range(8):
+            for role in ("dashboard", "router"):
+                bench.beats("office", role, **office)
+            bench.passes(0.5)
+            own.look(Now(bench.s, int(bench.s * 1e9)))
+        return {one.id for one in own.faults()}
+
+    everybody(bench)
+    found = {"disk", "clock-office", "certificate-office-dashboard", "certificate-office-router"}
+    assert look() == found | {"place-lab"}
+    assert {one.level for one in own.faults()} >= {"critical", "warning", "watch"}
+    bench.store.own_faults = own.faults()
+    assert {one.id for one in bench_alarms(bench.store)} == found | {"place-lab"}
 
 
 # --- REST and the page

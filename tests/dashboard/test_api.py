@@ -11,7 +11,8 @@ import time
 import httpx
 import pytest
 import zenoh
-from support.front_door import Door, open_door, wait_for
+from support.front_door import Door, open_door
+from support.waiting import until
 
 from dashboard.data.feed import Feed
 from dashboard.data.store import Store
@@ -228,7 +229,7 @@ def test_record_download_and_replay_through_the_real_recorder(bus, tmp_path):
     }
     try:
         with open_door(tmp_path, scene=False, **services) as door, door.client("otto") as client:
-            device = wait_for(
+            device = until(
                 lambda: [d for d in client.get("/api/devices").json() if d["estimators"]],
                 "the device",
             )[0]
@@ -237,16 +238,12 @@ def test_record_download_and_replay_through_the_real_recorder(bus, tmp_path):
                 "simulated",
                 False,
             )
-            wait_for(
-                lambda: client.get("/api/recording").json()["available"], "the recorder's word"
-            )
+            until(lambda: client.get("/api/recording").json()["available"], "the recorder's word")
             started = client.post(
                 "/api/recording/start", json={"name": "bench", "note": "first <b>run</b>"}
             )
             assert started.status_code == 200 and started.json()["recording"], started.text
-            wait_for(
-                lambda: client.get("/api/recording").json()["messages"] > 10, "messages recorded"
-            )
+            until(lambda: client.get("/api/recording").json()["messages"] > 10, "messages recorded")
             running = f"/api/sessions/{started.json()['session']}"
             assert client.get(running).json()["state"] == "recording"
             assert client.get(running + "/download").status_code == 409
@@ -268,7 +265,7 @@ def test_record_download_and_replay_through_the_real_recorder(bus, tmp_path):
             assert f'data-replay="{row["id"]}"' in page and "first &lt;b&gt;run" in page
             answer = client.post(f"/api/sessions/{row['id']}/replay", json={"speed": 4})
             assert answer.json()["replaying"] == row["id"], answer.text
-            wait_for(lambda: seen.exists() and seen.read_text().endswith("]"), "the replay process")
+            until(lambda: seen.exists() and seen.read_text().endswith("]"), "the replay process")
             assert str(path) in seen.read_text() and "'--speed', '4'" in seen.read_text()
             assert client.post(f"/api/sessions/{row['id']}/replay", json={}).status_code == 409
             assert client.post("/api/replay/stop").json()["replaying"] == ""

@@ -126,11 +126,11 @@ def test_waiting_time_doubles_up_to_its_limit_and_counts_ipv6_networks():
     now = 0.0
     backoff = Backoff(2, 60.0, lambda: now)
     waits = []
-    backoff.attempt("2001:db8::1")
+    backoff.attempt("2001:db8::1", "otto")
     for host in range(12):
-        backoff.attempt(f"2001:db8::{host}")
+        backoff.attempt(f"2001:db8::{host}", f"{host}")
         with pytest.raises(WaitError) as wait:
-            backoff.attempt("2001:db8::ffff:2")  # another address of the same /64
+            backoff.attempt("2001:db8::ffff:2", "otto")  # another address of the same /64
         waits.append(wait.value.seconds)
         now += wait.value.seconds
     assert waits[:4] == [1.0, 2.0, 4.0, 8.0] and max(waits) == 60.0

@@ -7,8 +7,9 @@ import shutil
 import sys
 
 import pytest
-from support.front_door import ended, open_door, wait_for
+from support.front_door import ended, open_door
 from support.table_session import SESSION, table_root
+from support.waiting import until
 
 from dashboard.web.jobs import Jobs
 from sessions.library import curves
@@ -48,7 +49,7 @@ def drawn(client, **query):
         assert answer.status_code in (200, 202), answer.text
         return answer.json() if answer.json()["state"] == "done" else None
 
-    return wait_for(ask, "the curves", 120)
+    return until(ask, "the curves", 120)
 
 
 def test_two_sessions_come_aligned_with_few_points_and_their_notes(door):
@@ -136,7 +137,7 @@ def test_a_damaged_recording_says_why_it_cannot_be_drawn(door):
     (folder / "session.json").write_text(json.dumps(facts))
     (folder / "recording.mcap").write_bytes(b"nothing of the kind")
     with door.client("vera") as client:
-        answer = wait_for(
+        answer = until(
             lambda: (
                 (a := client.get("/api/compare", params={"ids": folder.name})).status_code == 409
                 and a

@@ -6,7 +6,8 @@ import time
 
 import httpx
 import pytest
-from support.front_door import message, open_door, wait_for
+from support.front_door import message, open_door
+from support.waiting import until
 
 from dashboard.web import connections
 from dashboard.web.connections import trusted
@@ -62,7 +63,7 @@ def test_people_get_in_while_700_connections_of_one_address_hang(patient, first)
     with patient.client("otto") as before, sockets(patient, 350, "127.0.0.2", first) as flood:
         assert before.get("/api/me").status_code == 200  # who was in stays in
         with sockets(patient, 350, "127.0.0.2", first) as more:
-            wait_for(lambda: still_open(flood + more) <= 40, "at most 40 of one address")
+            until(lambda: still_open(flood + more) <= 40, "at most 40 of one address")
             with patient.client("anna") as fresh:  # signs in, from another address
                 assert fresh.get("/").status_code == 200
                 with patient.scene(fresh) as scene:
@@ -79,7 +80,7 @@ def test_many_addresses_together_do_not_lock_anybody_out(patient):
         flood = []
         for k in range(2, 9):
             flood += stack.enter_context(sockets(patient, 35, f"127.0.0.{k}", HEAD))
-        wait_for(lambda: still_open(flood) <= 120, "at most 120 in all")
+        until(lambda: still_open(flood) <= 120, "at most 120 in all")
         with patient.client("anna") as fresh:
             for _ in range(5):
                 assert fresh.get("/sessions").status_code == 200
@@ -121,7 +122,7 @@ def test_what_asks_nothing_is_ended_and_what_works_is_not(tmp_path):
                         link.recv(65536)
                 return not still_open(silent + half + answered + bodies)
 
-            wait_for(dripped, "the end of all that hang")
+            until(dripped, "the end of all that hang")
             # a scene that only looks on is no idle connection
             scene.send(message("ViewerCameraMessage"))
             assert scene.recv(timeout=20.0)
@@ -151,7 +152,7 @@ def test_who_takes_nothing_of_an_answer_is_ended_and_who_takes_little_is_not(tmp
                     assert link.recv(2048), "it was ended, and took what it could"
             return door.front.ended["took nothing"] == len(silent)
 
-        wait_for(ended, "the end of all that take nothing")
+        until(ended, "the end of all that take nothing")
         for link in silent:
             with pytest.raises(ConnectionResetError):
                 while link.recv(65536):
@@ -182,7 +183,7 @@ def test_a_head_without_an_end_is_refused(patient):
         with contextlib.suppress(OSError):
             for _ in range(100):
                 link.sendall(b"X-Long: " + b"a" * 4000 + b"\r\n")
-        wait_for(lambda: b"" == _rest(link), "the end of it")
+        until(lambda: b"" == _rest(link), "the end of it")
 
 
 def _rest(link: socket.socket) -> bytes:
@@ -214,7 +215,7 @@ def test_scenes_of_one_user_and_of_all_are_counted(tmp_path):
             with pytest.raises(Exception, match="403"):
                 door.scene(vera)
             scene.close()
-            wait_for(lambda: _opens(door, vera), "room again")
+            until(lambda: _opens(door, vera), "room again")
 
 
 def _opens(door, client) -> bool:

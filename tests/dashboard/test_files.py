@@ -11,9 +11,10 @@ from urllib.parse import quote
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from support.front_door import ended, open_door, wait_for
+from support.front_door import ended, open_door
 from support.hostile import HOSTILE
 from support.table_session import SESSION, table_root
+from support.waiting import until
 
 from dashboard.web.jobs import Jobs
 from dashboard.web.uploads import UploadError, samples_and_fixes
@@ -223,10 +224,10 @@ def test_every_job_ends_with_a_reason(command, arguments, said):
     jobs = Jobs(command, longest_s=1.0 if "60" in str(arguments) else 60.0)
     try:
         job = jobs.start("export", "x", arguments, "otto")
-        wait_for(lambda: job.ended is not None, "the end of the job")
-        wait_for(lambda: job.state == "failed", "failed")
+        until(lambda: job.ended is not None, "the end of the job")
+        until(lambda: job.state == "failed", "failed")
         assert said in job.message and job.message.isprintable() and job.message
         after = jobs.start("export", "x", arguments, "otto")
-        wait_for(lambda: after.state == "failed", "the next one")
+        until(lambda: after.state == "failed", "the next one")
     finally:
         jobs.close()

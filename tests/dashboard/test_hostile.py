@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 import viser
-from support.browser import KNOWN, visit
+from support.browser import KNOWN, Rounds, visit
 from support.feeder import Feeder
 from support.front_door import open_door
 from support.hostile import HOSTILE
@@ -219,15 +219,19 @@ def test_a_browser_runs_nothing_that_came_over_the_bus(chromium, tmp_path):
     for word in HOSTILE:
         fill(store, word)
     desk = Desk(None, "gyrofree")
+    stack = contextlib.ExitStack()
+    rounds = stack.enter_context(Rounds.counted())
     handle = start(SimpleNamespace(viser_port=0), store, desk)
-    try:
+    stack.callback(handle.stop)
+    with stack:
         with open_door(tmp_path, scene=False, scene_at=handle.port, store=store) as door:
             with visit(chromium, door, "anna") as (page, said):
                 page.goto(f"{door.url}/scene/")
                 page.wait_for_selector(".gf-name", timeout=90_000)
                 for key in [one.key() for one in PAGES]:
                     page.locator("div:has(> .gf-state) + div input").fill(f"p={key}")
-                    page.wait_for_timeout(400)
+                    page.wait_for_function(STATED, arg=key)
+                    rounds.after(page)
                 assert "<script>" in page.inner_text("body")
                 assert page.evaluate("() => window.hit") is None
                 assert not [line for line in said if not any(k in line for k in KNOWN)], said
@@ -236,8 +240,9 @@ def test_a_browser_runs_nothing_that_came_over_the_bus(chromium, tmp_path):
                 assert page.evaluate("() => window.hit") is None
                 refused = [line for line in said if "inline" in line]
                 assert len(refused) >= 4, said
-    finally:
-        handle.stop()
+
+
+STATED = "(key) => JSON.parse(document.querySelector('.gf-state').dataset.state).page === key"
 
 
 def hostile_sessions(root) -> list[str]:

@@ -8,6 +8,7 @@ import time
 import numpy as np
 import pytest
 import zenoh
+from support.waiting import until
 
 from dashboard.data.device import HISTORY_S
 from dashboard.data.feed import MESSAGE_BYTES, Feed
@@ -48,13 +49,6 @@ def feed(bus):
     feed = Feed(bus, "t", Store(), watched)
     yield feed
     feed.stop()
-
-
-def until(condition, what: str) -> None:
-    end = time.monotonic() + 60.0
-    while not condition():
-        assert time.monotonic() < end, f"waited 60 s for {what}"
-        time.sleep(0.02)
 
 
 def test_a_good_board_on_a_real_bus_full_of_nonsense(bus, feed):

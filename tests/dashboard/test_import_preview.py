@@ -3,7 +3,8 @@
 import sys
 
 import pytest
-from support.front_door import open_door, wait_for
+from support.front_door import open_door
+from support.waiting import until
 
 from dashboard.web.jobs import Jobs
 from gyrofree.running import simulate_csv
@@ -67,7 +68,7 @@ def test_a_foreign_log_is_shown_mapped_and_made_a_session(door, foreign):
             state = client.get(f"/api/jobs/{job['number']}").json()
             return state if state["state"] in ("done", "failed") else None
 
-        end = wait_for(ended, "the import ends", 120.0)
+        end = until(ended, "the import ends", 120.0)
         assert end["state"] == "done", end
         assert end["made"].startswith("20261128-093000-foreign")
 

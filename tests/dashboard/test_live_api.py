@@ -10,7 +10,8 @@ from pathlib import Path
 
 import httpx
 import pytest
-from support.front_door import open_door, wait_for
+from support.front_door import open_door
+from support.waiting import until
 from typer.testing import CliRunner
 
 from dashboard.data.store import Store
@@ -19,7 +20,7 @@ from dashboard.web.programs.tokens import Token, issue_token, load_tokens, revok
 from dashboard.web.users import UsersError, remove_user, write_private
 from gyrofree.commands.main import app
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import NAV, RATE
+from messages.contract.topics import NAV, RATE, STATUS
 
 
 def rate(k, sight=(0, 1, 2), estimator="products-ekf"):
@@ -76,6 +77,63 @@ def test_the_newest_values_say_unknown_as_null(door):
         assert nav["latitude_deg"] is None and nav["v_n_mps"] is None
         for path in ("none/rate", "cube/rate?estimator=other"):
             assert client.get(f"/api/devices/{path}").status_code == 404
+
+
+def clocks(store, here_s, gateway_s, bound_s=0.02, recorder_s=float("nan")):
+    """What this dashboard, the gateway and the recorder say of their clocks."""
+    store.presence.own = "dashboard"
+    store.presence.look(0.0)
+    for role, ahead_s in (("dashboard", here_s), ("gateway", gateway_s), ("recorder", recorder_s)):
+        beat = pb.Beat(role=role, session=role, clock_ahead_s=ahead_s, clock_bound_s=bound_s)
+        beat.devices.extend(["cube"] if role == "gateway" else [])
+        store.presence.beat("lab", f"{role}-1", beat)
+
+
+def test_values_say_how_old_they_are_by_the_clock_of_the_site(door):
+    secret, _ = token_of(door)
+    store, ages = door.front.store, ("site_age_s", "site_age_bound_s")
+
+    def two_seconds_old(k):
+        m = rate(k)
+        m.header.utc_ns, m.header.utc_sigma_s = time.time_ns() - 2_000_000_000, 0.01
+        store.put(RATE, "cube", "products-ekf", m)
+
+    with bearer(door, secret) as client:
+        said = client.get("/api/devices/cube/rate").json()
+        assert [said[name] for name in ages] == [None, None]
+        assert "this clock" in said["site_age_why"]
+        clocks(store, here_s=5.0, gateway_s=float("nan"))
+        said = client.get("/api/devices/cube/rate").json()
+        assert said["site_age_s"] is None and "gateway's clock" in said["site_age_why"]
+        clocks(store, here_s=500.0, gateway_s=-100.0)
+        for k in (3, 4):  # another time is believed when a second message agrees
+            two_seconds_old(k)
+        before = time.time()
+        said = client.get("/api/devices/cube/rate").json()
+        # ours is ahead by 500 s, its gateway's behind by 100 s; the newest row is 0.01 s younger
+        age_s = said["site_age_s"] + 600.0 - 1.99
+        assert 0.0 <= age_s + 1e-3 and age_s <= time.time() - before + 5.0
+        assert said["site_age_bound_s"] == pytest.approx(0.02 + 0.02 + 3 * 0.01)
+        assert said["site_age_why"] == ""
+        with client.stream("GET", "/api/devices/cube/stream") as stream:
+            line = next(line for line in stream.iter_lines() if line.startswith("data: "))
+            assert json.loads(line[6:])["site_age_s"] == pytest.approx(said["site_age_s"], abs=5.0)
+        where = client.get("/api/devices/cube/map").json()
+        assert where["site_age_s"] == pytest.approx(said["site_age_s"], abs=5.0)
+        assert "not been heard" in client.get("/api/recording").json()["site_age_why"]
+        status = pb.RecorderStatus(recording=True, clock_offset_s=1.0)
+        status.header.utc_ns = time.time_ns()
+        store.put(STATUS, "", "", status)
+        assert "recorder's clock" in client.get("/api/recording").json()["site_age_why"]
+        clocks(store, here_s=0.0, gateway_s=0.0, recorder_s=4.0)
+        assert client.get("/api/recording").json()["site_age_s"] == pytest.approx(3.0, abs=5.0)
+        assert client.get("/api/recording").json()["site_age_bound_s"] == pytest.approx(0.04)
+        store.put(RATE, "cube-replay", "products-ekf", rate(4))
+        said = client.get("/api/devices/cube-replay/rate").json()
+        assert said["site_age_s"] is None and "replay" in said["site_age_why"]
+        schemas = client.get("/api/openapi.json").json()["components"]["schemas"]
+        for name in ("RateOut", "AttitudeOut", "NavOut", "RecordingOut"):
+            assert set(ages) <= schemas[name]["properties"].keys()
 
 
 def test_a_token_gives_what_its_role_gives_and_no_page(door):
@@ -217,7 +275,7 @@ def test_streams_are_limited_and_freed(door):
             with client.stream("GET", "/api/devices/cube/stream") as answer:
                 return answer.status_code == 200
 
-        wait_for(opens, "streams that ended make room")
+        until(opens, "streams that ended make room")
 
 
 def test_tokens_from_the_command_line(door, tmp_path):

@@ -20,7 +20,8 @@ from playwright.sync_api import expect
 from support import tiles
 from support.browser import visit
 from support.feeder import ORIGIN, Feeder
-from support.front_door import open_door, wait_for
+from support.front_door import open_door
+from support.waiting import until
 
 import dashboard
 from dashboard.data.store import Store
@@ -328,11 +329,11 @@ def test_the_map_in_a_browser_with_vector_tiles_raster_tiles_and_none(tmp_path, 
         tiles.raster(path, (200, 40, 40))
         page.goto(door.url + MAP)
         page.locator("#map[data-tiles=raster]").wait_for()
-        wait_for(lambda: (at := colour_at(page, 30, 400))[0] > at[1] + 60, "raster tiles")
+        until(lambda: (at := colour_at(page, 30, 400))[0] > at[1] + 60, "raster tiles")
         path.unlink()
         page.goto(door.url + MAP)
         page.locator(".map-note", has_text="is not there").wait_for()
-        wait_for(lambda: "50,150,216" in page.evaluate(DRAWN), "a way on the grid")
+        until(lambda: "50,150,216" in page.evaluate(DRAWN), "a way on the grid")
         loaded = page.evaluate("performance.getEntriesByType('resource').map((r) => r.name)")
         assert not any("maplibre" in name for name in loaded)
         # without WebGL there is no scene: the page says why, and the way is drawn all the same
@@ -342,7 +343,7 @@ def test_the_map_in_a_browser_with_vector_tiles_raster_tiles_and_none(tmp_path, 
         expect(page.locator("#plain dl")).to_contain_text("speed, km/h")
         expect(page.locator("#pages [aria-selected=true]")).to_have_text("Map")
         page.locator(".map-canvas").wait_for()
-        wait_for(lambda: "50,150,216" in page.evaluate(DRAWN), "a way without WebGL")
+        until(lambda: "50,150,216" in page.evaluate(DRAWN), "a way without WebGL")
         assert not serious(page, "#stage")
         assert not others and not said
 
@@ -355,7 +356,7 @@ def elsewhere(url, door):
 def _vector(page):
     page.locator("#map[data-tiles=vector]").wait_for()
     page.locator(".map-legend li", has_text="INS/GNSS filter").wait_for()
-    wait_for(lambda: (at := colour_at(page, 30, 400)) != GROUND and at[2] > at[0] + 15, "tiles")
+    until(lambda: (at := colour_at(page, 30, 400)) != GROUND and at[2] > at[0] + 15, "tiles")
     text = page.locator(".map-legend").inner_text()
     assert "(2σ)" in text and "heading" in text and "RTK fixed, 14 satellites" in text
     assert page.locator(".map-scale").inner_text().split()[1] in ("m", "cm", "km")

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import httpx
 import pytest
-from support.front_door import Door, open_door, wait_for
+from support.front_door import Door, open_door
+from support.waiting import until
 
 import dashboard
 from dashboard import service
@@ -196,7 +197,7 @@ def test_whole_process_serves_the_scene_and_ends_on_sigterm(tmp_path, free_port)
             cwd=FOLDER.parent,
         )
         try:
-            wait_for(lambda: healthy(settings.url), "the dashboard answers", 90.0)
+            until(lambda: healthy(settings.url), "the dashboard answers", 90.0)
             with httpx.Client(base_url=settings.url, timeout=30.0) as client:
                 client.post("/login/link", data={"token": link.split("token=")[1]})
                 assert "<title>Viser</title>" in client.get("/scene/").text

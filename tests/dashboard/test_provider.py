@@ -1,5 +1,6 @@
 """Sign-in by a lab's identity provider: a real one on the loopback, right and lying."""
 
+import html
 import re
 import time
 from urllib.parse import parse_qs, urlsplit
@@ -79,6 +80,45 @@ def test_a_person_of_the_lab_signs_in_with_the_role_of_his_groups(door: Door, la
     assert asked["code_challenge_method"] == "S256" and asked["scope"] == "openid profile"
     with door.client("otto") as client:  # local users stay beside it
         assert client.get("/api/me").json()["user"] == "otto"
+
+
+def sign_out(client: httpx.Client) -> httpx.Response:
+    form = {"csrf": client.get("/api/me").json()["csrf"]}
+    answer = client.post("/logout", data=form)
+    assert client.get("/api/me").status_code == 401
+    return answer
+
+
+def test_who_signs_out_here_is_led_to_sign_out_at_the_provider_too(door: Door, lab: Lab):
+    with door.client() as client:
+        client.get(way(door, client))
+        page = sign_out(client)
+        assert page.status_code == 200 and "max-age=0" in page.headers["set-cookie"].lower()
+        there = html.unescape(re.search(r'content="0;url=([^"]+)"', page.text)[1])
+        assert there.startswith(f"{lab.issuer}/leave?of=lab&")
+        back = httpx.get(there)
+        assert back.status_code == 302 and back.headers["location"] == "http://localhost/login"
+        assert lab.left[-1] == "lena"
+    with door.client("otto") as client:  # who came with a password has nothing to end there
+        assert sign_out(client).headers["location"] == "/login"
+
+
+@pytest.mark.parametrize("said", [None, "http://example.org/leave", "javascript:alert(1)", 7])
+def test_a_provider_without_a_page_to_sign_out_is_not_asked(tmp_path, lab: Lab, said):
+    options = {
+        "oidc_issuer": lab.issuer,
+        "oidc_client": "bench",
+        "oidc_address": "http://localhost",
+    }
+    before = lab.about
+    lab.about = {"end_session_endpoint": said}
+    try:
+        with open_door(tmp_path, scene=False, **options, **GROUPS) as door, door.client() as client:
+            client.get(way(door, client))
+            answer = sign_out(client)
+            assert answer.status_code == 303 and answer.headers["location"] == "/login"
+    finally:
+        lab.about = before
 
 
 OTHER = RSAKey.generate_key(2048, {"kid": "one"})

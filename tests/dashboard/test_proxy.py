@@ -12,7 +12,8 @@ import viser._messages
 import zstandard
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from support.front_door import CAMERA, Door, message, open_door, wait_for
+from support.front_door import CAMERA, Door, message, open_door
+from support.waiting import until
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from dashboard.web.auth import Role
@@ -59,11 +60,11 @@ def answers(port: int) -> bool:
 def driven(scene, handle) -> None:
     """Tick a box until the relay, which has to have heard of it first, lets that pass."""
     update = message("GuiUpdateMessage", uuid=handle._impl.uuid, updates={"value": True})
-    wait_for(lambda: scene.send(update) or handle.value, "the box is ticked")
+    until(lambda: scene.send(update) or handle.value, "the box is ticked")
 
 
 def only_client(door: Door):
-    return wait_for(lambda: list(door.viser.get_clients().values()), "viser has a client")[-1]
+    return until(lambda: list(door.viser.get_clients().values()), "viser has a client")[-1]
 
 
 def test_page_is_for_signed_in_people_and_talks_to_this_server_only(door: Door):
@@ -109,7 +110,7 @@ def test_viewer_moves_the_camera_but_no_widget(door: Door, checkbox):
         scene.send(message("GuiUpdateMessage", uuid=checkbox._impl.uuid, updates={"value": True}))
         scene.send(message("ViewerCameraMessage", **CAMERA))
         viewer = only_client(door)
-        wait_for(lambda: np.allclose(viewer.camera.position, (1, 2, 3)), "the camera moved")
+        until(lambda: np.allclose(viewer.camera.position, (1, 2, 3)), "the camera moved")
         assert checkbox.value is False  # sent before the camera and in order, so it was dropped
 
 
@@ -126,7 +127,7 @@ def test_viewer_uses_a_widget_of_his_own_view_by_its_label(door: Door, checkbox)
             scene.send(message("GuiUpdateMessage", **update))
             scene.send(message("ViewerCameraMessage", **CAMERA | {"position": (4.0, 5.0, 6.0)}))
             viewer = only_client(door)
-            wait_for(lambda: np.allclose(viewer.camera.position, (4, 5, 6)), "the camera moved")
+            until(lambda: np.allclose(viewer.camera.position, (4, 5, 6)), "the camera moved")
             assert checkbox.value is False
     finally:
         mine.remove()
@@ -154,7 +155,7 @@ def test_operator_drives_a_widget_but_only_its_value(door: Door, checkbox):
         for updates in ({"label": "Mine", "value": False}, {"visible": False}, {"value": "no"}):
             scene.send(message("GuiUpdateMessage", uuid=uuid, updates=updates))
         scene.send(message("GuiUpdateMessage", uuid=uuid, updates={"value": False}))
-        wait_for(lambda: not checkbox.value, "the good one arrived")
+        until(lambda: not checkbox.value, "the good one arrived")
         assert checkbox.label == "Sw" and checkbox.visible
 
 
@@ -366,7 +367,7 @@ def test_browser_that_takes_nothing_is_dropped_and_does_not_fill_the_memory(tmp_
         colors = np.zeros((300_000, 3), np.uint8)
         for i in range(12):  # far more than the kernel's buffers take
             door.viser.scene.add_point_cloud(f"/p{i}", points, colors, precision="float32")
-        wait_for(lambda: not door.viser.get_clients(), "the slow browser is gone", 120.0)
+        until(lambda: not door.viser.get_clients(), "the slow browser is gone", 120.0)
         with pytest.raises(ConnectionClosed):
             while True:
                 slow.recv(timeout=20.0)
@@ -376,7 +377,7 @@ def test_scene_that_is_gone_is_said_and_does_not_hang(tmp_path):
     with open_door(tmp_path) as door, door.client("vera") as client:
         port, server, door.viser = door.viser.get_port(), door.viser, None
         server.stop()
-        wait_for(lambda: not answers(port), "viser ended")
+        until(lambda: not answers(port), "viser ended")
         with pytest.raises(InvalidStatus):
             door.scene(client)
         assert client.get("/api/me").status_code == 200
@@ -413,7 +414,7 @@ def test_no_message_ends_the_scene(door: Door, kind, more, value, other):
                 scene.send(message(kind, **{k: v for k, v in fields.items() if k != "type"}))
             update = {"uuid": box._impl.uuid, "updates": {"value": not box.value}}
             was = box.value
-            wait_for(
+            until(
                 lambda: scene.send(message("GuiUpdateMessage", **update)) or box.value != was,
                 "the good message arrived",
             )

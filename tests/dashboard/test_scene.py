@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import viser
 from support.feeder import UTC0_NS, Feeder, cube_attitude
+from support.waiting import until
 
 from dashboard.data.feed import Feed
 from dashboard.data.pose import ned_from_geodetic
@@ -37,14 +38,6 @@ from messages.contract import gyrofree_pb2 as pb
 from messages.contract import topics as tp
 
 PAIR = Table(1.0, (Column("up", "m"), Column("both", "m", 2))).dtype()
-
-# Chromium without a GPU: WebGL is drawn in software.
-FLAGS = [
-    "--no-sandbox",
-    "--disable-background-networking",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]
 
 
 class Direct:
@@ -88,13 +81,6 @@ def bus(free_port) -> BusSettings:
 def nobody() -> Desk:
     """A desk without a router."""
     return Desk(None, "gyrofree")
-
-
-def wait_for(condition, seconds: float = 30.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "did not come about in time"
-        time.sleep(0.02)
 
 
 # --- ring and decimation
@@ -240,10 +226,15 @@ def test_geodetic_differences_agree_with_the_length_of_a_degree():
 
 
 @pytest.mark.parametrize("view", [camera.CUBE, camera.VEHICLE])
-@pytest.mark.parametrize("aspect, height", [(1.6, 0.5), (0.75, 0.5), (0.46, camera.PHONE_CENTRE)])
-def test_camera_shows_the_centre_where_it_is_not_covered_and_the_whole_width(view, aspect, height):
+@pytest.mark.parametrize(
+    "aspect, sheet, height",
+    [(1.6, False, 0.5), (0.45, False, 0.5), (0.46, True, camera.PHONE_CENTRE)],
+)
+def test_camera_shows_the_centre_where_it_is_not_covered_and_the_whole_width(
+    view, aspect, sheet, height
+):
     fov = np.radians(75.0)
-    position, look_at = camera.aim(view, fov, aspect)
+    position, look_at = camera.aim(view, fov, aspect, sheet)
     ahead = (look_at - position) / np.linalg.norm(look_at - position)
     right = np.cross(ahead, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
@@ -462,13 +453,11 @@ def test_feed_takes_messages_from_the_bus(bus, store):
             assert desk.connected
             feeder = Feeder(Publishers(session, bus.prefix))
             feeder.cube(0.0)
-            wait_for(
-                lambda: not feeder.cube(feeder._k * 0.01) and store.device("cube-01") is not None
-            )
+            until(lambda: not feeder.cube(feeder._k * 0.01) and store.device("cube-01") is not None)
             for topic, estimator in (("accel", ""), ("truth", ""), ("rate", "least-squares")):
-                wait_for(lambda key=(topic, estimator): key in store.device("cube-01").latest)
+                until(lambda key=(topic, estimator): key in store.device("cube-01").latest)
             feeder.recorder(1.0)
-            wait_for(lambda: store.recorder is not None)
+            until(lambda: store.recorder is not None)
             with pytest.raises(OrderError, match="gyrofree record"):
                 desk.recorder(pb.RecorderCommand(), timeout_s=0.5)
         finally:
@@ -519,51 +508,46 @@ def test_the_scene_opens_no_public_tunnel(store, nobody):
 
 
 @pytest.mark.browser
-def test_browser_shows_the_cube_as_the_truth_has_it(store, nobody):
-    from playwright import sync_api  # here: only this test needs it
-
+def test_browser_shows_the_cube_as_the_truth_has_it(store, nobody, chromium):
     feeder = Feeder(Direct(store))
     for k in range(700):
         feeder.cube(k * 0.01)
     handle = start(SimpleNamespace(viser_port=0), store, nobody)
     try:
-        with sync_api.sync_playwright() as playwright:
-            browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=FLAGS)
-            page = browser.new_page(viewport={"width": 800, "height": 500})
-            errors = []
-            page.on(
-                "console",
-                lambda message: errors.append(message.text) if message.type == "error" else None,
-            )
-            page.goto(f"http://127.0.0.1:{handle.port}/")
-            script = """names => names.map(name => {
-                const node = window.__viserMutable?.nodeRefFromName[name];
-                return node ? node.quaternion.toArray() : null; })"""
-            names = [
-                "/world/truth",
-                "/world/estimate/products-ekf/body",
-                "/world/estimate/least-squares/body",
-            ]
-            device = store.device("cube-01")
-            wanted = [device.get("truth").message.q_nb]
-            wanted += [
-                device.get("rate", name).message.q_nb for name in ("products-ekf", "least-squares")
-            ]
+        page = chromium.new_page(viewport={"width": 800, "height": 500})
+        errors = []
+        page.on(
+            "console",
+            lambda message: errors.append(message.text) if message.type == "error" else None,
+        )
+        page.goto(f"http://127.0.0.1:{handle.port}/")
+        script = """names => names.map(name => {
+            const node = window.__viserMutable?.nodeRefFromName[name];
+            return node ? node.quaternion.toArray() : null; })"""
+        names = [
+            "/world/truth",
+            "/world/estimate/products-ekf/body",
+            "/world/estimate/least-squares/body",
+        ]
+        device = store.device("cube-01")
+        wanted = [device.get("truth").message.q_nb]
+        wanted += [
+            device.get("rate", name).message.q_nb for name in ("products-ekf", "least-squares")
+        ]
 
-            def near() -> bool:
-                found = page.evaluate(script, names)
-                if None in found:
-                    return False
-                dots = [
-                    abs(np.dot([w, x, y, z], q))
-                    for (x, y, z, w), q in zip(found, wanted, strict=True)
-                ]
-                return min(dots) > 0.99999
+        def near() -> bool:
+            found = page.evaluate(script, names)
+            if None in found:
+                return False
+            dots = [
+                abs(np.dot([w, x, y, z], q)) for (x, y, z, w), q in zip(found, wanted, strict=True)
+            ]
+            return min(dots) > 0.99999
 
-            wait_for(near, 60.0)
-            assert page.get_by_text("SIMULATED").first.is_visible()
-            assert not errors, json.dumps(errors)
-            browser.close()
+        until(near, "the attitudes of the store")
+        assert page.get_by_text("SIMULATED").first.is_visible()
+        assert not errors, json.dumps(errors)
+        page.close()
     finally:
         handle.stop()
 

@@ -7,6 +7,7 @@ import json
 import shutil
 import sys
 import zipfile
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from support.table_session import SESSION, table_root
 
 from dashboard.web.jobs import Jobs
 from sessions.library.annotations import SessionNote, add_note
+from sessions.library.copied import FILE, Copied, Hashes, write_copied
 from sessions.recording.manifest import SessionError
 
 ROOM = Path(__file__).resolve().parents[2]
@@ -140,6 +142,23 @@ def test_a_viewer_changes_nothing_and_only_an_admin_deletes(door):
         assert "Completeness" in page and 'id="report"' not in page and 'id="delete"' not in page
     with door.client("otto") as client:
         assert client.post(f"/api/sessions/{SESSION}/delete", json={}).status_code == 403
+
+
+def test_a_copy_shows_the_hashes_of_both_places(door):
+    folder, same, other = door.settings.sessions_root / SESSION, "a" * 64, "b" * 64
+    try:
+        with door.client("vera") as client:
+            for here, said in ((same, "proven equal"), (other, "different from it")):
+                hashes = {"recording.mcap": Hashes(home_sha256=same, here_sha256=here)}
+                at = datetime(2026, 11, 29, 12, tzinfo=UTC)
+                copied = Copied(home="lab", here="office", equal_since=at, files=hashes)
+                write_copied(folder, copied)
+                page = client.get(f"/sessions/{SESSION}").text
+                assert said in page and "recording at lab" in page and same in page and here in page
+            (folder / FILE).write_text("{")
+            assert "recording at lab" not in client.get(f"/sessions/{SESSION}").text
+    finally:
+        (folder / FILE).unlink()
 
 
 @pytest.mark.parametrize("name", ["20990101-000000", "..%2f..%2fetc", "20240101-000000-table%00"])

@@ -8,7 +8,8 @@ import ssl
 import pytest
 from cryptography.hazmat.primitives import serialization
 from support.certificates import make_certificate
-from support.front_door import PASSWORDS, Door, message, open_door, wait_for
+from support.front_door import PASSWORDS, Door, message, open_door
+from support.waiting import until
 
 from dashboard.settings import DashboardSettings
 from dashboard.web.tls.certificate import CertificateError, open_certificate
@@ -121,14 +122,14 @@ def test_http_on_the_port_of_tls_is_told_so(door: Door, first):
             while part := link.recv(4096):
                 answer += part
     assert answer.startswith(b"HTTP/1.1 400 ") and b"https://" in answer
-    wait_for(lambda: door.front.ended["http where TLS is spoken"] > before, "it is counted")
+    until(lambda: door.front.ended["http where TLS is spoken"] > before, "it is counted")
 
 
 @pytest.mark.parametrize("first", [b"", HELLO], ids=["silent", "half a handshake"])
 def test_people_get_in_while_connections_hang_before_their_handshake(door: Door, first):
     with door.client("otto") as before, linked(door, 300, first) as flood:
         assert before.get("/api/me").status_code == 200
-        wait_for(lambda: sum(not ended(one) for one in flood) <= 40, "at most 40 of one address")
+        until(lambda: sum(not ended(one) for one in flood) <= 40, "at most 40 of one address")
         with door.client("anna") as fresh, door.scene(fresh) as scene:
             assert scene.recv(timeout=60.0)
         assert before.get("/api/me").status_code == 200
@@ -155,10 +156,8 @@ def test_what_hangs_in_or_after_its_handshake_or_takes_nothing_is_ended(tmp_path
             tls.sendall(ASK.replace(b"/login", b"/static/vendor/maplibre/maplibre-gl.mjs"))
             tls.sendall(b"Connection: close\r\n\r\n")
             takes_nothing.append(tls)
-        wait_for(
-            lambda: all(map(ended, [*silent, *half, *hold, *asked])), "the end of all that hang"
-        )
-        wait_for(lambda: door.front.ended["took nothing"] == 2, "the end of who takes nothing")
+        until(lambda: all(map(ended, [*silent, *half, *hold, *asked])), "the end of all that hang")
+        until(lambda: door.front.ended["took nothing"] == 2, "the end of who takes nothing")
         assert sum(door.front.ended[why] for why in ("asked nothing", "no TLS handshake")) >= 8
         scene.send(message("ViewerCameraMessage"))
         assert scene.recv(timeout=60.0)
@@ -171,10 +170,10 @@ def test_a_new_certificate_is_taken_and_ends_nothing(tmp_path):
         served, first = door.front.certificate, peer(door)
         others = make_certificate(tmp_path / "others")
         shutil.copy(others[1], door.settings.tls_key)  # for a moment they do not fit together
-        wait_for(lambda: served.fault, "the fault is seen")
+        until(lambda: served.fault, "the fault is seen")
         assert "not the key" in served.fault and peer(door) == first
         shutil.copy(others[0], door.settings.tls_certificate)
-        wait_for(lambda: served.renewed == 1, "the new pair is taken")
+        until(lambda: served.renewed == 1, "the new pair is taken")
         assert peer(door) != first and served.fault == ""
         scene.send(message("ViewerCameraMessage"))
         assert scene.recv(timeout=60.0)

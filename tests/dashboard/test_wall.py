@@ -8,7 +8,9 @@ import time
 
 import httpx
 import pytest
-from support.front_door import open_door, wait_for
+from playwright.sync_api import expect
+from support.front_door import open_door
+from support.waiting import until
 
 from dashboard.data.store import Store
 from dashboard.web.wall import routes
@@ -141,6 +143,16 @@ def test_it_is_not_ended_by_time_and_at_once_by_an_admin(door):
     assert answer.status_code == 403
 
 
+def test_a_wall_that_looks_on_is_no_use_of_a_persons_sign_in(door):
+    with door.client("vera") as client, client.stream("GET", "/wall/stream") as answer:
+        lines = answer.iter_lines()
+        next(lines)
+        door.ahead += 2.01 * 3600  # idle_hours
+        assert any(line == "event: end" for line in lines)
+        assert client.get("/wall/stream").status_code == 401
+    door.ahead = 0.0
+
+
 def test_only_an_admin_makes_one_and_a_program_gets_in_nowhere_by_it(door):
     with door.client("otto") as client:
         form = {"csrf": csrf_of(client), "name": "mine", "days": "1"}
@@ -211,7 +223,7 @@ def test_nothing_grows_on_a_wall_and_it_comes_back_by_itself(tmp_path, chromium,
 
         def driven(number):
             end = page.evaluate("window.count") + number
-            wait_for(lambda: page.evaluate("window.count") >= end, "updates", 60)
+            until(lambda: page.evaluate("window.count") >= end, "updates", 60)
             return measured()
 
         driven(500)
@@ -227,3 +239,36 @@ def test_nothing_grows_on_a_wall_and_it_comes_back_by_itself(tmp_path, chromium,
         page.wait_for_selector("body.old")
         assert "NO DATA FOR 6" in page.locator("#banner").inner_text()
         page.close()
+
+
+@pytest.mark.browser
+def test_a_wall_survives_a_restart_and_takes_another_version_by_itself(
+    tmp_path, chromium, monkeypatch
+):
+    """The server is gone and comes back, then comes back as another version that dies while the
+    page loads: nobody touches the display.
+    """
+    first, second = "1" * 16, "2" * 16
+    monkeypatch.setattr(routes, "BUILD", first)
+    page = chromium.new_page(viewport={"width": 1920, "height": 1080})
+    fresh, banner = page.locator("body:not(.old)"), page.locator("#banner")
+    with spoken() as (store, _):
+        with open_door(tmp_path, scene=False, store=store) as door, door.client("anna") as admin:
+            page.goto(f"{door.url}/wall/open#{link_of(door, admin)}")
+            page.wait_for_url(f"{door.url}/wall")
+            fresh.wait_for()
+            page.evaluate("window.mine = true")
+        expect(banner).to_contain_text("NO DATA FOR", timeout=10_000)
+        expect(fresh).to_have_count(0)
+        with open_door(tmp_path, at=door.settings.port, scene=False, store=store):
+            fresh.wait_for()
+            assert page.evaluate("window.mine"), "it was loaded anew for no reason"
+        expect(banner).to_be_visible()
+        # the files of the next version do not come at first: its server dies as it begins
+        page.route("**/static/wall/cube.js", lambda route: route.abort(), times=1)
+        monkeypatch.setattr(routes, "BUILD", second)
+        with open_door(tmp_path, at=door.settings.port, scene=False, store=store):
+            page.locator(f"body[data-build='{second}']").wait_for()
+            fresh.wait_for()
+            assert page.evaluate("window.mine === undefined")
+    page.close()

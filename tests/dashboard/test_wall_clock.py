@@ -31,7 +31,7 @@ for line in sys.stdin:
         said = [gate._clock() - one.created for one in gate._sessions.values()]
     elif what == "guess":
         try:
-            gate.backoff.attempt("10.0.0.2")
+            gate.backoff.attempt("10.0.0.2", "anna")
             said = 0.0
         except WaitError as error:
             said = error.seconds

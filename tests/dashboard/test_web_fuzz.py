@@ -7,8 +7,9 @@ import shutil
 import msgspec
 import pytest
 import viser._messages
-from support.front_door import CAMERA, Door, message, open_door, wait_for
+from support.front_door import CAMERA, Door, message, open_door
 from support.table_session import SESSION, table_root
+from support.waiting import until
 from support.web_fuzz import fuzz
 
 from dashboard.data.store import Store
@@ -112,11 +113,11 @@ def test_ten_thousand_messages_of_a_viewer_change_nothing(tmp_path, seed):
                     scene.recv(timeout=0.0)
             # it is still there, and what it sent has arrived: a good message comes behind
             scene.send(message("ViewerCameraMessage", **CAMERA | {"position": (7.0, 7.0, 7.0)}))
-            wait_for(lambda: arrived(door), "the last message arrived", 60.0)
+            until(lambda: arrived(door), "the last message arrived", 60.0)
             assert changes.state() == before
         with door.client("otto") as client, door.scene(client) as scene:  # whom the scene obeys
             update = message("GuiUpdateMessage", uuid=changes.uuids[0], updates={"value": True})
-            wait_for(
+            until(
                 lambda: scene.send(update) or changes.state() != before,
                 "an operator's message changes it",
             )

@@ -182,6 +182,11 @@ class Bench:
         """By service its process; of the gateway, which is guarded, the one that serves."""
         return {name: found[-1] for name, found in self._all().items()}
 
+    @property
+    def supervisor(self) -> psutil.Process:
+        """`gyrofree up`."""
+        return psutil.Process(self._up.pid)
+
     def processes(self, service: str) -> list[psutil.Process]:
         """All of a service, the guardian first."""
         return self._all().get(service, [])

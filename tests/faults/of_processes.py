@@ -3,9 +3,11 @@
 import signal
 import time
 
+from support.one_thread import held
+
 from faults.account import Account
 from faults.bench import Bench
-from faults.scenario import Alarmed, Certified, Line, Loss, Scenario, Status
+from faults.scenario import Alarmed, Certified, Line, Loss, Scenario, Status, Word
 
 RESTARTED = "{} ended by signal SIGKILL: starting it again"
 
@@ -33,6 +35,29 @@ def frozen(service: str, seconds: float, *said, **more) -> Scenario:
     )
 
 
+def alarm(role: str) -> Alarmed:
+    """That of a service of the bench."""
+    return Alarmed(f"service-here-{role}")
+
+
+def hold(bench: Bench, service: str, thread: str, role: str) -> None:
+    """Stop one thread of a service until its alarm is there, as a debugger does."""
+    with held(bench.children()[service].pid, thread):
+        about = f"service-here-{role}"
+        bench.until(lambda: about in bench.watch.alarms, f"alarm {about}")
+
+
+def stands(service: str, role: str, thread: str = "", *said: Word, **more) -> Scenario:
+    """The thread that works hangs while the one that beats lives on."""
+    return Scenario(
+        f"{service} hangs",
+        f"the thread of {service} that works is stopped, as by a debugger, until that is said",
+        lambda bench: hold(bench, service, thread, role),
+        said=(alarm(role), *said),
+        **more,
+    )
+
+
 def away(bench: Bench, seconds: float) -> None:
     """No router for so long."""
     bench.stop_router()
@@ -54,6 +79,14 @@ def guardian_killed(bench: Bench) -> None:
     run = bench.watch.newest("link").header.run
     bench.processes("gateway")[0].send_signal(signal.SIGKILL)
     bench.until(lambda: bench.watch.newest("link").header.run != run, "another gateway")
+
+
+def stop_supervisor(bench: Bench) -> None:
+    """It has no session on the bus; one of its children beats for it."""
+    up = bench.supervisor
+    up.suspend()
+    time.sleep(5.0)
+    up.resume()
 
 
 def up_killed(bench: Bench) -> None:
@@ -94,12 +127,23 @@ PROCESSES = (
         1.8,
         Status("`stops` of the link", "links", lambda link: link.stops > 0),
     ),
-    frozen("record", 5.0),
-    frozen("estimator", 5.0, Alarmed("estimator-products-ekf")),
-    frozen("procedures", 5.0),
+    frozen("record", 5.0, alarm("recorder")),
+    frozen("estimator", 5.0, alarm("estimator"), Alarmed("estimator-products-ekf")),
+    frozen("procedures", 5.0, alarm("procedures")),
     frozen("alarms", 5.0),
-    frozen("dashboard", 5.0),
+    frozen("dashboard", 5.0, alarm("dashboard")),
     frozen("router", 8.0),
+    stands("gateway", "gateway", "link cube"),
+    stands("record", "recorder"),
+    stands("estimator", "estimator", "estimator", Alarmed("estimator-products-ekf")),
+    stands("procedures", "procedures"),
+    stands("dashboard", "dashboard"),
+    Scenario(
+        "up stopped for 5 s",
+        "SIGSTOP of the supervisor, SIGCONT after 5 s",
+        stop_supervisor,
+        said=(alarm("up"),),
+    ),
     Scenario(
         "router killed",
         "`kill -9` of the router, started again at once",

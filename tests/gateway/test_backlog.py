@@ -5,6 +5,7 @@ import socket
 import threading
 
 import pytest
+from support.waiting import until
 
 from gateway.board.device import DeviceLink
 from gateway.ports.backlog import MOST_BYTES, Backlog, Pace
@@ -13,7 +14,6 @@ from gateway.ports.ports import READ_BYTES
 from gateway.ports.reader import Chunk, Reader
 from gateway.settings import DeviceSettings, GatewaySettings
 from messages.history.journal_file import BOARD, GNSS
-from tests.gateway.test_service import wait_for
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def test_what_waits_is_bounded_and_the_status_says_that_reading_waits(link):
         link.device.port, 0, BOARD, link.journal, link.queue, Keeper(), time_scale=1000.0
     )
     try:
-        assert wait_for(lambda: reader.held > 3)
+        assert until(lambda: reader.held > 3)
         assert MOST_BYTES <= link.queue.waiting(BOARD) <= MOST_BYTES + READ_BYTES
         assert not link.queue.full(GNSS)  # the receiver of the same board goes on
         status = link.report.message([reader], link.queue.qsize())
@@ -84,7 +84,7 @@ def test_a_line_ten_times_as_fast_as_any_board_is_read_at_the_pace_of_one(link):
     thread = threading.Thread(target=drain)
     thread.start()
     try:
-        assert wait_for(lambda: reader.held > 0)
+        assert until(lambda: reader.held > 0)
     finally:
         stop.set()
         thread.join()

@@ -6,6 +6,7 @@ import time
 from types import SimpleNamespace
 
 import pytest
+from support.waiting import until
 
 from firmware_protocol.codec import encode
 from firmware_protocol.frames import Acc12, Adc, Hello, Imu6, SensorInfo, Tacho
@@ -17,7 +18,7 @@ from gateway.virtual.board_link import PtyLink
 from messages.contract.checks import check
 from messages.contract.topics import ACCEL, LINK, TACHO
 from messages.history.journal_file import BOARD
-from tests.gateway.test_service import bench, dark_bench, wait_for  # noqa: F401
+from tests.gateway.test_service import bench, dark_bench  # noqa: F401
 from tests.support import hostile_frames
 from tests.support.hostile_frames import good
 
@@ -216,7 +217,7 @@ def test_a_board_whose_thread_fails_begins_anew_and_the_other_notices_nothing(
         if {m.header.device for m in list(bench.seen["accel"])} == set(links):
             break
         time.sleep(0.02)
-    assert wait_for(lambda: {m.header.device for m in list(bench.seen["accel"])} == set(links))
+    assert until(lambda: {m.header.device for m in list(bench.seen["accel"])} == set(links))
     stop.set()
     thread.join(20)
     for link in links.values():

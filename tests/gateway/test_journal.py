@@ -4,9 +4,9 @@ import random
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
+from support.waiting import until
 from support.wall_clock import YEAR_S, WallClock
 
 from messages.history.journal import Journal
@@ -23,13 +23,6 @@ def all_records(folder) -> list:
     return [
         r for name in sorted(folder.glob("*.gfj")) for _, _, r in scan(name.read_bytes()).records
     ]
-
-
-def wait_for(condition, seconds: float = 20.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 def test_every_read_is_there_after_close_and_the_sequence_goes_on(tmp_path):
@@ -54,7 +47,7 @@ def test_every_read_is_there_after_close_and_the_sequence_goes_on(tmp_path):
 def test_durable_follows_by_itself(tmp_path):
     journal = Journal(tmp_path, sync_s=0.02)
     fill(journal, 5)
-    wait_for(lambda: journal.durable_seq == 5)
+    until(lambda: journal.durable_seq == 5)
     journal.close()
 
 
@@ -139,7 +132,7 @@ def test_a_folder_that_can_be_used_late_is_continued_not_overwritten(tmp_path):
     assert journal.append(0, b"lost", 1, 1) == 0 and "NOT KEPT" in journal.message
     folder.unlink()
     (tmp_path / "elsewhere").rename(folder)
-    wait_for(lambda: journal.append(0, b"kept", 1, 1))
+    until(lambda: journal.append(0, b"kept", 1, 1))
     assert not journal.message
     journal.close()
     assert [r.sequence for r in all_records(folder)] == list(range(1, 12))
@@ -150,7 +143,7 @@ def test_message_of_a_failed_sync_clears_with_the_next_good_one(tmp_path, caplog
     journal = Journal(tmp_path, segment_bytes=2_000, sync_s=0.01)
     (tmp_path / f"{1:020d}.gfj").symlink_to("/dev/null")
     fill(journal, 3)
-    wait_for(lambda: "fdatasync" in journal.message and "NOT SAFE" in journal.message)
+    until(lambda: "fdatasync" in journal.message and "NOT SAFE" in journal.message)
     assert journal.durable_seq == 0
     fill(journal, 20)  # on into the next segment, a real one
 
@@ -158,8 +151,8 @@ def test_message_of_a_failed_sync_clears_with_the_next_good_one(tmp_path, caplog
         fill(journal, 1)  # a good sync needs something to sync
         return not journal.message
 
-    wait_for(cleared)
-    wait_for(lambda: journal.durable_seq == journal.last_seq)
+    until(cleared)
+    until(lambda: journal.durable_seq == journal.last_seq)
     journal.close()
     assert "records 1 to" in caplog.text and "may have holes" in caplog.text
 
@@ -203,7 +196,7 @@ def test_killed_while_writing(tmp_path):
     )
     child = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE)
     assert child.stdout.readline() == b"go\n"
-    wait_for(lambda: sum(p.stat().st_size for p in tmp_path.glob("*.gfj")) > 100_000)
+    until(lambda: sum(p.stat().st_size for p in tmp_path.glob("*.gfj")) > 100_000)
     child.send_signal(signal.SIGKILL)
     child.wait(10)
     child.stdout.close()

@@ -9,10 +9,11 @@ import time
 
 import pytest
 from support.receivers import at, frame, gga, mutated, nav_pvt, random_message, rmc, sentence
+from support.waiting import until
 
 from gateway.virtual.board_link import PtyLink
 from messages.contract.checks import check
-from tests.gateway.test_service import bench, dark_bench, wait_for  # noqa: F401
+from tests.gateway.test_service import bench, dark_bench  # noqa: F401
 from tests.support.hostile_frames import good
 
 T0 = 1718366400
@@ -56,7 +57,7 @@ class Receiver:
         self._stop, self._sent = threading.Event(), 0
         self._running = threading.Thread(target=self._board)
         self._running.start()
-        wait_for(lambda: bench.seen["accel"])
+        until(lambda: bench.seen["accel"])
 
     def _board(self) -> None:
         while not self._stop.is_set():
@@ -88,7 +89,7 @@ def receiver(bench):  # noqa: F811
 
 def test_absurd_fields_are_counted_by_name_and_the_next_fix_is_whole(receiver):
     receiver.say(*REFUSED.values(), gga(at(5), talker="GA"), gga(at(6), talker="GB"))
-    whole = wait_for(lambda: receiver.fixes("GA"))[0]
+    whole = until(lambda: receiver.fixes("GA"))[0]
     assert whole.latitude_deg == pytest.approx(49.44033333) and whole.quality == 1
     wanted = {f"receiver: {name}" for name in REFUSED}
     status = receiver.bench.status(lambda s: wanted <= set(s.refused))
@@ -99,12 +100,12 @@ def test_absurd_fields_are_counted_by_name_and_the_next_fix_is_whole(receiver):
 
 def test_what_a_receiver_does_not_know_is_never_0(receiver):
     receiver.say(EMPTY, EMPTY.replace("120009", "120010"))
-    wait_for(lambda: receiver.fixes("GP"))
+    until(lambda: receiver.fixes("GP"))
     flat = {"fix": 2, "v_acc": 0xFFFFFFFF}
     receiver.say(*NO_FIX.values(), *(nav_pvt(T0 + k, **flat) for k in (9, 10)))
-    flying = wait_for(lambda: [m for m in receiver.fixes("UBX") if m.quality])[0]
+    flying = until(lambda: [m for m in receiver.fixes("UBX") if m.quality])[0]
     assert math.isnan(flying.height_m) and math.isnan(flying.v_n_mps[2])
-    place = wait_for(lambda: receiver.bench.seen["location"])[0]
+    place = until(lambda: receiver.bench.seen["location"])[0]
     assert place.latitude == flying.latitude_deg and math.isnan(place.altitude)
     silent = [m for m in list(receiver.bench.seen["gnss"]) if not m.quality]
     assert len(silent) >= 1 + len(NO_FIX)
@@ -121,9 +122,9 @@ def test_a_receiver_is_never_exact(receiver):
         frame(1, 0x36, b"\x00" * 4 + b"\x00\x01\x01" + b"\x00" * 57),
         *(nav_pvt(T0 + 3, v_acc=0), nav_pvt(T0 + 4)),
     )
-    by_nmea = wait_for(lambda: receiver.fixes("GA"))[0]
+    by_nmea = until(lambda: receiver.fixes("GA"))[0]
     assert list(by_nmea.position_sigma_ned_m) == pytest.approx([1.6, 1.6, 3.2])
-    exact, _, half = wait_for(lambda: len(f := receiver.fixes("UBX")) >= 3 and f)[:3]
+    exact, _, half = until(lambda: len(f := receiver.fixes("UBX")) >= 3 and f)[:3]
     assert exact.quality and not exact.position_sigma_ned_m
     assert list(exact.v_n_mps) == pytest.approx([0.2, 6.3, 0.0])
     assert not exact.velocity_sigma_ned_mps
@@ -134,9 +135,9 @@ def test_anything_at_all_ends_nothing(receiver):
     draw = random.Random(11)
     receiver.say(*(random_message(draw) if k % 2 else mutated(draw) for k in range(1500)))
     receiver.say(b"\r\n", *(gga(at(3000 + k), talker="QZ") for k in range(9)))
-    wait_for(lambda: receiver.fixes("QZ"))
+    until(lambda: receiver.fixes("QZ"))
     before = len(receiver.bench.seen["accel"])
-    wait_for(lambda: len(receiver.bench.seen["accel"]) > before)
+    until(lambda: len(receiver.bench.seen["accel"]) > before)
     status = receiver.bench.status(lambda s: sum("receiver" in n for n in s.refused) > 20)
     assert status.connected and check(status) == []
     assert all(check(m) == [] for m in list(receiver.bench.seen["gnss"]))

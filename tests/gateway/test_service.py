@@ -10,6 +10,7 @@ from itertools import accumulate
 from pathlib import Path
 
 import pytest
+from support.waiting import until
 
 from firmware_protocol.codec import FLAG_SIMULATED, Deframer, Frame, encode
 from firmware_protocol.frames import Acc12
@@ -34,17 +35,6 @@ from messages.history.answers import ask
 from messages.history.journal_file import records, scan
 
 PERIOD_S = 0.002  # 500 Hz with n = 1: also exercises joining
-
-
-def wait_for(condition, seconds: float = 30.0):
-    """The condition's value once it is true; fails after a generous time."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.01)
-    raise AssertionError(f"still false after {seconds} s: {condition.__doc__ or condition}")
 
 
 def samples(n: int, first: int = 0, period_s: float = PERIOD_S) -> list[BoardAccel]:
@@ -100,9 +90,7 @@ class Bench:
 
     def status(self, condition) -> pb.LinkStatus:
         """The next link status that meets the condition."""
-        return wait_for(
-            lambda: next((s for s in reversed(self.seen["link"]) if condition(s)), None)
-        )
+        return until(lambda: next((s for s in reversed(self.seen["link"]) if condition(s)), None))
 
     def close(self) -> None:
         for _, stop in self.running:
@@ -158,7 +146,7 @@ def test_every_sample_arrives_in_order_and_the_ledger_balances(bench):
     board = VirtualBoard(link, SIMULATED, epoch=3, sample_period_s=PERIOD_S)
     sent = samples(1000)
     board.run(sent, threading.Event(), wait_for_reader=True)
-    got = wait_for(
+    got = until(
         lambda: (
             (m := list(bench.seen["accel"]))
             and sum(len(b.counts) for b in m) >= 12 * len(sent)
@@ -204,7 +192,7 @@ def test_utc_of_samples_follows_the_host_clock(bench):
     VirtualBoard(link, SIMULATED, sample_period_s=0.01).run(
         samples(50, period_s=0.01), threading.Event(), wait_for_reader=True
     )
-    got = wait_for(lambda: len(bench.seen["accel"]) >= 50 and list(bench.seen["accel"]))
+    got = until(lambda: len(bench.seen["accel"]) >= 50 and list(bench.seen["accel"]))
     times = [m.header.utc_ns for m in got]
     assert times == sorted(times) and before < times[0] < times[-1] < time.time_ns()
     assert 0.4e9 < times[-1] - times[0] < 0.6e9
@@ -226,7 +214,7 @@ def test_unplugged_port_reconnects_and_the_gap_is_counted(bench, tmp_path):
     board.link = link = PtyLink(
         name
     )  # the same boot of the board, plugged in again 20 samples later
-    wait_for(lambda: link.connected)
+    until(lambda: link.connected)
     board.run(samples(100, first=120), threading.Event())
     status = bench.status(lambda s: s.connected and s.lost_samples)
     assert status.lost_samples == 20 and status.reconnects == 1 and status.reboots == 0
@@ -238,7 +226,7 @@ def test_garbage_is_counted_and_costs_no_frame(bench):
     link = TcpLink()
     bench.gateway(link.path)
     board = VirtualBoard(link, SIMULATED, sample_period_s=PERIOD_S)
-    wait_for(lambda: link.connected)
+    until(lambda: link.connected)
     noise = bytes(range(1, 256)) * 4
     link.write(noise)
     for i, item in enumerate(samples(50)):
@@ -259,13 +247,13 @@ def test_garbage_is_counted_and_costs_no_frame(bench):
 def test_wrong_baud_says_so(bench):
     link = TcpLink()
     bench.gateway(link.path, baud=115200)
-    wait_for(lambda: link.connected)
+    until(lambda: link.connected)
 
     def noisy():
         link.write(os.urandom(400))
         return next((s for s in bench.seen["link"] if "speed is wrong" in s.message), None)
 
-    status = wait_for(noisy)
+    status = until(noisy)
     assert "115200" in status.message and status.connected and status.good_frames == 0
     link.close()
 
@@ -278,7 +266,7 @@ def test_reboot_is_no_loss(bench):
         board.run(samples(100), threading.Event(), wait_for_reader=True)
     status = bench.status(lambda s: s.reboots)
     assert status.reboots == 1 and status.lost_frames == 0 and status.lost_samples == 0
-    got = wait_for(
+    got = until(
         lambda: (
             sum(len(b.counts) for b in bench.seen["accel"]) >= 2400 and list(bench.seen["accel"])
         )
@@ -296,7 +284,7 @@ def test_tacho_rate_and_declared_standstill(bench):
     VirtualBoard(link, SIMULATED, sample_period_s=0.001).run(
         items, threading.Event(), wait_for_reader=True
     )
-    got = wait_for(
+    got = until(
         lambda: (
             [m for m in bench.seen["tacho"] if m.omega_radps == 0][5:] and list(bench.seen["tacho"])
         )
@@ -315,12 +303,12 @@ def test_tacho_rate_and_declared_standstill(bench):
 def test_second_gateway_with_the_same_name_is_refused_and_takes_over(bench, caplog):
     first, second = PtyLink(), PtyLink()
     stop = bench.gateway(first.path)
-    wait_for(lambda: first.connected)
+    until(lambda: first.connected)
     bench.gateway(second.path, journal="other", live=False)
-    wait_for(lambda: "another gateway serves this device name" in caplog.text)
-    wait_for(lambda: not second.connected and not locked(bench.folder / "other" / "cube"))
+    until(lambda: "another gateway serves this device name" in caplog.text)
+    until(lambda: not second.connected and not locked(bench.folder / "other" / "cube"))
     stop.set()
-    wait_for(lambda: second.connected)
+    until(lambda: second.connected)
     bench.status(lambda s: s.port == second.path)
     assert locked(bench.folder / "other" / "cube")
     first.close()
@@ -330,12 +318,12 @@ def test_second_gateway_with_the_same_name_is_refused_and_takes_over(bench, capl
 def test_second_gateway_with_the_same_journal_is_refused_also_without_a_bus(dark_bench, caplog):
     bench, first, second = dark_bench, TcpLink(), TcpLink()
     stop = bench.gateway(first.path, live=False)
-    wait_for(lambda: first.connected)
+    until(lambda: first.connected)
     bench.gateway(second.path, live=False)
-    wait_for(lambda: "another gateway writes it; stop the other one" in caplog.text)
+    until(lambda: "another gateway writes it; stop the other one" in caplog.text)
     assert not second.connected
     stop.set()
-    wait_for(lambda: second.connected)
+    until(lambda: second.connected)
     first.close()
     second.close()
 
@@ -345,14 +333,14 @@ def test_without_a_router_all_is_journalled_and_counted_and_not_published_later(
     bench.gateway(link.path, live=False)
     board = VirtualBoard(link, SIMULATED, epoch=3, sample_period_s=PERIOD_S)
     board.run(samples(100), threading.Event(), wait_for_reader=True)
-    wait_for(lambda: frames(journalled(bench.folder / "journal" / "cube")) == board.built)
+    until(lambda: frames(journalled(bench.folder / "journal" / "cube")) == board.built)
     early = board.built
 
     bench.start_router()
     status = bench.status(lambda s: s.good_frames == early)
     assert status.journal_sequence and status.lost_frames == 0 and not bench.seen["accel"]
     board.run(samples(100, first=100), threading.Event())
-    got = wait_for(
+    got = until(
         lambda: (m := list(bench.seen["accel"])) and sum(len(b.counts) for b in m) >= 1200 and m
     )
     assert got[0].first_index == 100 and got[0].header.epoch == 3
@@ -388,24 +376,24 @@ def test_without_a_router_all_is_journalled_and_counted_and_not_published_later(
 def test_before_hello_the_source_is_what_the_flag_says(bench, flags, source):
     link = TcpLink()
     bench.gateway(link.path)
-    wait_for(lambda: link.connected)
+    until(lambda: link.connected)
     for seq in range(5):
         counts = tuple(tuple(range(12)) for _ in range(10))
         frame = Acc12(seq * 10, 2_000_000, 0xF, 0, counts)
         link.write(encode(frame, epoch=1, seq=seq, t_us=seq * 20_000, flags=flags))
-    got = wait_for(lambda: len(bench.seen["accel"]) >= 5 and list(bench.seen["accel"]))
+    got = until(lambda: len(bench.seen["accel"]) >= 5 and list(bench.seen["accel"]))
     assert {m.header.source for m in got} == {source} and not bench.seen["board"]
     # the board says what it is; the next boot, which has not said so yet, is not taken for the same
     # one
     board = VirtualBoard(link, PLAYED, epoch=2, sample_period_s=PERIOD_S)
     board.run(samples(10), threading.Event())
-    wait_for(
+    until(
         lambda: any(
             m.header.epoch == 2 and m.header.source == pb.SOURCE_PLAYED for m in bench.seen["accel"]
         )
     )
     link.write(encode(Acc12(0, 2_000_000, 0xF, 0, counts), epoch=3, seq=0, t_us=0, flags=flags))
-    again = wait_for(lambda: [m for m in list(bench.seen["accel"]) if m.header.epoch == 3])
+    again = until(lambda: [m for m in list(bench.seen["accel"]) if m.header.epoch == 3])
     assert again[0].header.source == source
     link.close()
 
@@ -414,7 +402,7 @@ def test_message_of_a_failed_sync_leaves_the_status_once_a_sync_succeeds(bench):
     """The first segment is /dev/null: it takes writes, and fdatasync on it fails."""
     link = TcpLink()
     bench.gateway(link.path)
-    wait_for(
+    until(
         lambda: link.connected
     )  # the journal is open, its first segment comes with the first read
     (bench.folder / "journal" / "cube" / f"{1:020d}.gfj").symlink_to("/dev/null")
@@ -427,7 +415,7 @@ def test_message_of_a_failed_sync_leaves_the_status_once_a_sync_succeeds(bench):
         last = bench.seen["link"][-1]
         return last.durable_sequence and "NOT SAFE" not in last.message
 
-    wait_for(cleared)
+    until(cleared)
     link.close()
 
 
@@ -440,7 +428,7 @@ def test_unwritable_journal_is_said_and_data_go_on(bench):
     )
     status = bench.status(lambda s: s.good_frames >= 50)
     assert "NOT KEPT" in status.message and status.journal_sequence == 0
-    wait_for(lambda: sum(len(b.counts) for b in bench.seen["accel"]) == 600)
+    until(lambda: sum(len(b.counts) for b in bench.seen["accel"]) == 600)
     link.close()
 
 
@@ -499,7 +487,7 @@ def test_gnss_in_frames_of_the_board(bench):
     VirtualBoard(link, SIMULATED, sample_period_s=0.01).run(
         items, threading.Event(), wait_for_reader=True
     )
-    got = wait_for(lambda: len(bench.seen["gnss"]) >= 6 and list(bench.seen["gnss"]))
+    got = until(lambda: len(bench.seen["gnss"]) >= 6 and list(bench.seen["gnss"]))
     for k, fix in enumerate(got, start=1):
         assert fix.fix_utc_ns == LOG_EPOCH_S * 10**9 + k * 250_000_000
         assert fix.device_time_s == pytest.approx(k / 4, abs=1e-5)
@@ -521,18 +509,18 @@ def test_gnss_in_frames_of_the_board(bench):
 def test_gnss_on_its_own_port(bench):
     link, receiver = TcpLink(), TcpLink()
     bench.gateway(link.path, gnss_port=receiver.path)
-    wait_for(lambda: receiver.connected)
+    until(lambda: receiver.connected)
     stop = threading.Event()
     board = VirtualBoard(link, SIMULATED, sample_period_s=0.01)
     running = threading.Thread(
         target=board.run, args=(samples(100_000, period_s=0.01), stop, 1.0, True)
     )
     running.start()
-    wait_for(lambda: bench.seen["accel"])
+    until(lambda: bench.seen["accel"])
     for k in range(1, 5):
         receiver.write(epoch_bytes(float(k)))
         receiver.write(b"$GPGGA,damaged*00\r\n")
-    got = wait_for(lambda: len(bench.seen["gnss"]) >= 3 and list(bench.seen["gnss"]))
+    got = until(lambda: len(bench.seen["gnss"]) >= 3 and list(bench.seen["gnss"]))
     assert got[0].header.device_us > 0 and abs(got[0].header.utc_ns - time.time_ns()) < 30e9
     assert bench.status(lambda s: s.gnss_bad == 4).gnss_good == 8
     stop.set()

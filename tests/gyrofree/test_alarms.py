@@ -11,8 +11,8 @@ from collections.abc import Callable
 from contextlib import closing
 
 import httpx
-from support.front_door import wait_for
 from support.stack import RunningDemo
+from support.waiting import until
 
 from messages.bus.session import BusSettings, open_client, subscribe
 from messages.contract import gyrofree_pb2 as pb
@@ -42,7 +42,7 @@ def point(client: httpx.Client, id: str, test: Callable[[dict], bool], seconds: 
         found = answer.json()["alarms"] if answer.status_code == 200 else []
         return next((one for one in found if one["id"] == id and test(one)), None)
 
-    return wait_for(find, f"{id}: {client.get('/api/alarms').text[:2000]}", seconds)
+    return until(find, f"{id}: {client.get('/api/alarms').text[:2000]}", seconds)
 
 
 def test_a_spoilt_axis_is_an_alarm_that_survives_its_service_and_stands_in_the_report(tmp_path):
@@ -56,7 +56,7 @@ def test_a_spoilt_axis_is_an_alarm_that_survives_its_service_and_stands_in_the_r
             heard.undeclare()
         assert found["active"] and found["level"] == "warning" and found["page"] == "health"
         shown = client.get("/api/devices").json()[0]["alarms"]
-        wait_for(
+        until(
             lambda: any(
                 a["id"] == "axis-a21" and a["state"] == "unacknowledged"
                 for a in client.get("/api/devices").json()[0]["alarms"]
@@ -78,8 +78,8 @@ def test_a_spoilt_axis_is_an_alarm_that_survives_its_service_and_stands_in_the_r
 
         killed = demo.children()["alarms"].pid
         os.kill(killed, signal.SIGKILL)
-        wait_for(lambda: demo.children().get("alarms", None) is not None, "it is started again")
-        wait_for(lambda: demo.children()["alarms"].pid != killed, "by another process")
+        until(lambda: demo.children().get("alarms", None) is not None, "it is started again")
+        until(lambda: demo.children()["alarms"].pid != killed, "by another process")
         again = point(client, "axis-a21", lambda one: not one["unknown"])
         assert (again["state"], again["acknowledged_by"], again["note"]) == (
             "acknowledged",

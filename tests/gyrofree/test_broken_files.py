@@ -91,7 +91,7 @@ def no_services(monkeypatch):
         loaded = importlib.import_module(f"gyrofree.commands.{module.name}")
         if hasattr(loaded, "run_service"):
             monkeypatch.setattr(loaded, "run_service", lambda *_: None)
-    monkeypatch.setattr("gyrofree.running.demo.run", lambda plan: None)
+    monkeypatch.setattr("gyrofree.demo.bench.run", lambda plan: None)
     monkeypatch.setattr("gyrofree.running.up.run", lambda plan: None)
 
 

@@ -4,12 +4,12 @@ import io
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 from rich.console import Console
 from support.table_session import table_recording
+from support.waiting import until
 
 from dashboard.web import readings
 from dashboard.web.control import ProcessReplay
@@ -32,13 +32,6 @@ def hostile(tmp_path, monkeypatch):
     monkeypatch.chdir(folder)
     yield folder
     assert not (folder / "executed").exists(), (folder / "executed").read_text()
-
-
-def until(condition, what):
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < end, f"waited {PATIENCE:g} s for {what()}"
-        time.sleep(0.05)
 
 
 def test_the_folder_is_hostile_without_protection(tmp_path):

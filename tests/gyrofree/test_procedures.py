@@ -19,8 +19,8 @@ from messages.bus import orders
 from messages.bus.session import open_client, subscribe
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import PROCEDURE, TRUTH
-from tests.support.front_door import wait_for
 from tests.support.stack import RunningDemo
+from tests.support.waiting import until
 
 M = pb.ProcedureStatus
 SHORT = """
@@ -189,11 +189,11 @@ def test_killed_recorder_and_service_spoil_what_ran_and_the_report_is_whole(benc
 def test_a_table_stops_by_itself_when_its_driver_hangs_and_the_step_is_repeated(bench):
     bench.start("longer")
     bench.until(lambda m: m.step == 1 and m.steps[1].state == M.Step.STATE_DWELL)
-    service, until = bench.demo.children()["procedures"].pid, time.monotonic() + 30.0
+    service, end = bench.demo.children()["procedures"].pid, time.monotonic() + 30.0
     os.kill(service, signal.SIGSTOP)
     try:
         while abs(bench.truth.omega_ib_b_radps[2]) > 0.02:
-            assert time.monotonic() < until, "it turns, and nobody holds it"
+            assert time.monotonic() < end, "it turns, and nobody holds it"
             time.sleep(0.05)
     finally:
         os.kill(service, signal.SIGCONT)
@@ -212,7 +212,7 @@ def test_an_emergency_stop_stands_the_table_and_ends_the_run(bench):
         assert [one["device"] for one in page.get("/api/tables").json()] == ["cube"]
         assert page.post("/api/devices/cube/stop", json={}).json() == {"message": "stopped"}
         m = bench.ended()
-        wait_for(lambda: page.get("/api/tables").json() == [], "the table is let go")
+        until(lambda: page.get("/api/tables").json() == [], "the table is let go")
     assert m.state == M.STATE_STOPPED and "by demo" in m.message
     assert abs(bench.truth.omega_ib_b_radps[2]) < 0.02 or bench.truth.profile_time_s < 5.0
     said = json.loads(bench.report(m.session)[".json"])

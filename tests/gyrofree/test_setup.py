@@ -23,8 +23,8 @@ from serial import rfc2217
 from firmware_protocol.codec import encode
 from firmware_protocol.frames import Acc12, Adc, Hello, Imu6, Tacho
 from gateway.virtual.board_link import PtyLink
-from gyrofree.config import Settings, load
 from gateway.virtual.receiver import sentences
+from gyrofree.config import Settings, load
 from gyrofree.setup.answers import Answers, free_name, settings_with, write
 from gyrofree.setup.ear import Ear
 from gyrofree.setup.ports import listen, names

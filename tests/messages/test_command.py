@@ -2,11 +2,11 @@
 
 import contextlib
 import threading
-import time
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.waiting import until
 
 from dashboard.desk import Desk
 from messages.bus import orders
@@ -122,13 +122,6 @@ class Site:
 
     def holder(self):
         return [page.status.holder.user for page in self.pages]
-
-
-def until(condition, what, seconds=30.0):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, f"not within {seconds:g} s: {what}"
-        time.sleep(0.02)
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.one_thread import held
 from support.stack import free_port
 
 from messages.bus.beating import BEAT_S, HERE, Beating, tell_time
@@ -29,13 +30,25 @@ from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import BEAT, claim_key
 
 BEATS = """
-import sys
+import sys, threading
 from messages.bus.beating import Beating
 from messages.bus.session import BusSettings, open_client
+from messages.bus.turning import Loop
 bus = BusSettings(prefix="t", router=sys.argv[1], listen=[]).acting_as("gateway")
+stop = threading.Event()
+
+def work():
+    with Loop("link cube", 1.0) as loop:
+        while not stop.wait(0.05):
+            loop.turn()
+
+thread = threading.Thread(target=work)
+thread.start()
 with open_client(bus) as session, Beating(session, bus, ["cube"]):
     print("ready", flush=True)
     sys.stdin.readline()
+    stop.set()
+    thread.join()
 """
 
 
@@ -121,6 +134,22 @@ def test_a_frozen_process_is_seen_goes_on_and_is_told_from_one_that_is_gone(bus)
             other.stdin.write(b"\n")
             other.stdin.flush()
             w.until(lambda: w.role("gateway").state is State.ENDED)
+
+
+def test_a_process_whose_thread_that_works_is_stopped_hangs_while_it_beats(bus):
+    with open_router(bus), watching(bus) as w, beating(bus) as process:
+        w.until(lambda: (one := w.role("gateway")) and one.beats > 2)
+        one = w.role("gateway")
+        assert one.state is State.RUNNING and one.beat.loop == "link cube"
+        with held(process.pid, "link cube"):
+            beats = one.beats
+            w.until(lambda: one.state is State.HUNG)
+            # counted by beats, of which each adds half a second at most
+            assert (one.beats - beats) * BEAT_S > one.beat.turn_most_s == 1.0
+            beats = one.beats
+            w.until(lambda: one.beats > beats + 1)
+            assert one.state is State.HUNG and one.beat.turn_ago_s > 1.5
+        w.until(lambda: one.state is State.RUNNING)
 
 
 def test_without_a_router_nothing_is_known_and_nobody_is_blamed_when_it_comes_back(bus):

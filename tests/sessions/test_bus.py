@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
+from support.waiting import until
 
 from messages.bus import orders
 from messages.bus.session import BusSettings, Publishers, open_client, open_router
@@ -39,14 +40,6 @@ from tests.sessions.test_store import accel
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE = 30.0  # s; generous, the tests wait for states
-
-
-def until(condition, what: str):
-    end = time.monotonic() + PATIENCE
-    while not (value := condition()):
-        assert time.monotonic() < end, f"waited {PATIENCE:g} s for {what}"
-        time.sleep(0.02)
-    return value
 
 
 @pytest.fixture

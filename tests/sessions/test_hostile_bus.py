@@ -9,6 +9,7 @@ import pytest
 import zenoh
 from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
 from mcap.reader import make_reader
+from support.waiting import until
 
 from messages.bus.session import BusSettings
 from messages.contract import gyrofree_pb2 as pb
@@ -23,7 +24,7 @@ from sessions.recording.mcap_append import descriptor_set
 from sessions.recording.mcap_log import Damage, read
 from sessions.recording.recorder import Recorder
 from sessions.recording.settings import RecorderSettings
-from tests.sessions.test_bus import START, STOP, bus, client, order, recording, until  # noqa: F401
+from tests.sessions.test_bus import START, STOP, bus, client, order, recording  # noqa: F401
 from tests.sessions.test_store import T0, accel
 from tests.support import hostile_bus
 

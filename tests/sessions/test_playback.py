@@ -7,6 +7,7 @@ import time
 
 import pytest
 from support.table_session import table_recording
+from support.waiting import until
 
 from estimator.pipeline import Pipeline
 from estimator.settings import EstimatorSettings
@@ -18,14 +19,6 @@ from sessions.replay.reproduce import ESTIMATES
 
 PATIENCE = 60.0  # s; generous, the tests wait for states
 KIND = pb.ReplayCommand
-
-
-def until(condition, what: str):
-    end = time.monotonic() + PATIENCE
-    while not (value := condition()):
-        assert time.monotonic() < end, f"waited {PATIENCE:g} s for {what}"
-        time.sleep(0.02)
-    return value
 
 
 def pipeline() -> Pipeline:

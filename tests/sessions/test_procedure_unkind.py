@@ -16,12 +16,12 @@ from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import check
 from sessions.procedure import library
 from sessions.procedure.conductor import Conductor
+from sessions.procedure.desk import late
 from sessions.procedure.driven.description import TableError, described
 from sessions.procedure.driven.table import TextTable
 from sessions.procedure.library import of_text
 from sessions.procedure.model import DEG
 from sessions.procedure.run import HELD, STOPPED, Journal, unfinished
-from sessions.procedure.service import late
 from sessions.procedure.status import status_of
 
 TURN = """

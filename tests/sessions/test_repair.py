@@ -9,6 +9,7 @@ import time
 
 import pytest
 from support.bus_cut import Cable
+from support.waiting import until
 
 from messages.bus.session import BusSettings, Publishers, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
@@ -31,14 +32,6 @@ T0 = 0
 @pytest.fixture(autouse=True)
 def t0(monkeypatch):
     monkeypatch.setattr(sys.modules[__name__], "T0", time.time_ns() - 3_500_000_000)
-
-
-def until(condition, what: str):
-    end = time.monotonic() + PATIENCE
-    while not (value := condition()):
-        assert time.monotonic() < end, f"waited {PATIENCE:g} s for {what}"
-        time.sleep(0.02)
-    return value
 
 
 def publish(publishers: Publishers, n: int, run: int = 5, first: int = 0) -> None:

@@ -7,6 +7,7 @@ import threading
 import time
 
 import pytest
+from support.waiting import until
 
 from estimator import service
 from estimator.pipeline import Pipeline
@@ -24,7 +25,7 @@ from sessions.recording.mcap_log import read
 from sessions.recording.samples import samples
 from sessions.replay import replay
 from sessions.replay.reproduce import compare, reproduce
-from tests.sessions.test_bus import PATIENCE, bus, client, order, recording, until
+from tests.sessions.test_bus import PATIENCE, bus, client, order, recording
 
 SETTINGS = EstimatorSettings(rate=list(ESTIMATORS))
 BATCH, BATCHES = 10, 150  # 15 s of the published test: still, then turning

@@ -3,13 +3,14 @@
 import datetime as dt
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
 import zenoh
 from support.stack import free_port
+from support.waiting import until
 
 from messages.bus import orders
 from messages.bus.beating import Beating, tell_time
@@ -42,14 +43,6 @@ def router(folder: Path, address: str, mesh: tuple[str, ...] = ()) -> Iterator[z
     rules = rules_of(place, standing, {f"gateway.{place.place}": [BOARD]})
     with open_router(bus(folder, address, "router"), rules, mesh) as session:
         yield session
-
-
-def until(condition: Callable[[], bool], seconds: float, what: str) -> None:
-    """Wait for it; a busy machine is given time."""
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, f"not within {seconds} s: {what}"
-        time.sleep(0.05)
 
 
 def bus(folder: Path | None, address: str, role: str) -> BusSettings:
@@ -124,7 +117,7 @@ def test_without_a_certificate_of_the_site_nothing_is_accepted(home: Path, tmp_p
                 viewer.put(f"lab/{BOARD}/accel", f"{number}")
             with open_client(bus(home, address, "gateway"), timeout_s=10.0) as gateway:
                 gateway.put(f"lab/{BOARD}/accel", b"mine")
-                until(lambda: bool(heard), 10.0, "the gateway is heard")
+                until(lambda: bool(heard), "the gateway is heard", 10.0)
         assert [sample.payload.to_bytes() for sample in heard] == [b"mine"]
 
 
@@ -183,7 +176,7 @@ def test_an_office_joins_hears_everything_may_order_nothing_and_can_be_sent_away
             state["sent"] += 1
             return key in heard
 
-        until(arrives, 30.0, "the office hears the lab's board")
+        until(arrives, "the office hears the lab's board", 30.0)
         page.put(key, b"forged")
         with pytest.raises(orders.OrderError):
             orders.give(page, "lab", orders.BOARD, pb.BoardCommand(), BOARD, 2.0)
@@ -197,15 +190,13 @@ def test_an_office_joins_hears_everything_may_order_nothing_and_can_be_sent_away
         people = running.enter_context(
             Beating(page, bus(office, at_office, "dashboard"), viewers=lambda: {"viewer": 3})
         )
-        until(lambda: "office" in presence.places(), 30.0, "home sees the office")
-        until(lambda: viewers(presence.all()) == {"viewer": 3}, 30.0, "home sees its people")
-        until(lambda: people.clock_ahead()[1] < 1.0, 30.0, "the office's clock is compared")
+        until(lambda: "office" in presence.places(), "home sees the office", 30.0)
+        until(lambda: viewers(presence.all()) == {"viewer": 3}, "home sees its people", 30.0)
+        until(lambda: people.clock_ahead()[1] < 1.0, "the office's clock is compared", 30.0)
         assert abs(people.clock_ahead()[0]) <= people.clock_ahead()[1]
         page.put(tp.BEAT.key("lab", "lab", "dashboard-1"), forged_beat("lab"))
         page.put(tp.BEAT.key("lab", "office", "dashboard-2"), forged_beat("office"))
-        until(
-            lambda: ("office", "dashboard-2") in presence.processes, 30.0, "its own name is let in"
-        )
+        until(lambda: ("office", "dashboard-2") in presence.processes, "its own name is let in")
         assert ("lab", "dashboard-1") not in presence.processes
         clock.undeclare()
     assert remove(home, "office") >= 4
@@ -224,7 +215,7 @@ def test_an_office_joins_hears_everything_may_order_nothing_and_can_be_sent_away
             gateway.put(key, b"sample")
             return len(mine) > 50
 
-        until(known_at_home, 30.0, "home hears its own board")
+        until(known_at_home, "home hears its own board", 30.0)
         assert not heard
 
 
@@ -244,5 +235,5 @@ def test_a_gateway_of_another_machine_has_its_own_boards_alone(home: Path, tmp_p
         session.declare_subscriber("lab/**", lambda sample: heard.append(str(sample.key_expr)))
         gateway.put(tp.ACCEL.key("lab", BOARD), b"of another")
         gateway.put(tp.ACCEL.key("lab", "cube2"), b"its own")
-        until(lambda: bool(heard), 10.0, "its own board is heard")
+        until(lambda: bool(heard), "its own board is heard", 10.0)
         assert heard == [tp.ACCEL.key("lab", "cube2")]

@@ -6,13 +6,14 @@ import math
 import random
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.stack import free_port
+from support.waiting import until
 
 from dashboard.data.feed import Feed
 from dashboard.data.pace import FULL, Pace
@@ -36,13 +37,6 @@ def accel(number: int, samples: int = 10) -> pb.AccelBatch:
     made.f_mps2.extend(float(number) + 1e-9 * k for k in range(12 * samples))
     made.counts.extend([number % 100] * 12 * samples)
     return made
-
-
-def until(condition: Callable[[], object], what: str) -> None:
-    end = time.monotonic() + 60.0
-    while not condition():
-        assert time.monotonic() < end, what
-        time.sleep(0.02)
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Real Chromium for the tests: one for a module, a page for a visitor, what its console said."""
+"""Real Chromium for the tests: one for all, a page for a visitor, what its console said."""
 
 import contextlib
 from collections.abc import Iterator
@@ -27,15 +27,50 @@ DESKTOP, PHONE = {"width": 1440, "height": 900}, {"width": 390, "height": 844}
 PATIENCE = 90_000  # ms; the scene is drawn in software here
 
 
-@pytest.fixture(scope="module")
+def _shared(fixture_name: str, config: pytest.Config) -> str:
+    """How long a browser is kept: its event loop would be in the way of tests without one."""
+    return "session" if config.option.markexpr == "browser" else "module"
+
+
+@pytest.fixture(scope=_shared)
 def chromium() -> "Iterator[Browser]":
-    """A browser that draws in software."""
+    """A browser that draws in software; one for all, each visitor has a context of his own."""
     from playwright.sync_api import sync_playwright  # most tests need none
 
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         yield browser
         browser.close()
+
+
+class Rounds:
+    """Counts the rounds in which the scene's panels are drawn, of the process of the test."""
+
+    def __init__(self) -> None:
+        self.drawn = 0
+
+    @classmethod
+    @contextlib.contextmanager
+    def counted(cls) -> "Iterator[Rounds]":
+        """To be entered before a scene is started."""
+        from dashboard.scene.view import View  # most tests need none
+
+        rounds, tick = cls(), View.tick_panels
+
+        def counting(view: View) -> None:
+            tick(view)
+            rounds.drawn += 1
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(View, "tick_panels", counting)
+            yield rounds
+
+    def after(self, page: "Page") -> None:
+        """Until what is open now was drawn, and has come to the browser."""
+        end = self.drawn + 1
+        while self.drawn < end:
+            page.wait_for_timeout(20)
+        page.wait_for_timeout(80)
 
 
 @contextlib.contextmanager

@@ -9,7 +9,7 @@ import ssl
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,21 +25,11 @@ from dashboard.web.tls.certificate import open_certificate
 from dashboard.web.users import issue_link_token, write_private
 from sessions.library.catalogue import Catalogue
 from support.scene_socket import SceneSocket
+from support.waiting import until
 
 PASSWORDS = {"vera": "looks only 1", "otto": "operates 222", "anna": "administers 3"}
 SERVICES = ("store", "desk", "replay", "jobs", "first_run", "open_labels")
 ROLES = {"vera": "viewer", "otto": "operator", "anna": "admin"}
-
-
-def wait_for(condition: Callable[[], Any], what: str, seconds: float = 20.0) -> Any:
-    """The first true value of condition()."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.02)
-    raise AssertionError(f"not within {seconds:g} s: {what}")
 
 
 @functools.cache
@@ -48,7 +38,7 @@ def ended(client: httpx.Client, answer: httpx.Response) -> dict[str, Any]:
     assert answer.status_code == 200, answer.text
     number = answer.json()["number"]
     states = ("done", "failed")
-    return wait_for(
+    return until(
         lambda: (job := client.get(f"/api/jobs/{number}").json())["state"] in states and job,
         "job",
         240,
@@ -79,7 +69,8 @@ class Door:
         )
         self.ahead = 0.0
         self.frozen = 0.0  # s since 1970; when set, time only moves by `ahead`
-        write_private(self.settings.users, _users())
+        if not self.settings.users.exists():  # else those of the server that was here before
+            write_private(self.settings.users, _users())
         self.viser = viser.ViserServer(host="127.0.0.1", port=0, verbose=False) if scene else None
         self.front = Front(
             settings=self.settings,
@@ -136,15 +127,15 @@ def trust_in(certificate: Path | None) -> ssl.SSLContext:
 
 
 @contextlib.contextmanager
-def open_door(folder: Path, **options: Any) -> Iterator[Door]:
-    """Serve until the block ends."""
-    with listen("127.0.0.1", 0) as bound:
+def open_door(folder: Path, at: int = 0, **options: Any) -> Iterator[Door]:
+    """Serve until the block ends. at: the port; 0: one that is free."""
+    with listen("127.0.0.1", at) as bound:
         door = Door(folder, bound.getsockname()[1], **options)
         stop = threading.Event()
         thread = threading.Thread(target=serve, args=(door.front, bound, stop))
         thread.start()
         try:
-            wait_for(
+            until(
                 lambda: httpx.get(door.url + "/api/health", verify=door.trust).status_code == 200,
                 "the door answers",
             )

@@ -30,6 +30,7 @@ class Lab:
         self.about: dict[str, Any] = {}
         self.header: dict[str, Any] = {}
         self.asked: list[dict[str, str]] = []
+        self.left: list[str] = []  # who signed out
         self._codes: dict[str, dict[str, str]] = {}
         self.app = FastAPI()
         self._serve()
@@ -42,6 +43,7 @@ class Lab:
                 "authorization_endpoint": f"{self.issuer}/authorize",
                 "token_endpoint": f"{self.issuer}/token",
                 "jwks_uri": f"{self.issuer}/keys",
+                "end_session_endpoint": f"{self.issuer}/leave?of=lab",
             } | self.about
 
         @self.app.get("/lab/keys")
@@ -56,6 +58,17 @@ class Lab:
             self._codes[code] = asked
             answer = {"code": code, "state": asked["state"], "iss": self.issuer}
             return RedirectResponse(f"{asked['redirect_uri']}?{urlencode(answer)}", 302)
+
+        @self.app.get("/lab/leave", response_model=None)
+        def leave(
+            of: str, id_token_hint: str, client_id: str, post_logout_redirect_uri: str
+        ) -> RedirectResponse | JSONResponse:
+            # raises where it is not of ours
+            said = jwt.decode(id_token_hint, self.published, algorithms=["RS256"])
+            if of != "lab" or said.claims["aud"] != client_id:
+                return JSONResponse({"error": "invalid_request"}, 400)
+            self.left.append(str(said.claims["preferred_username"]))
+            return RedirectResponse(post_logout_redirect_uri, 302)
 
         @self.app.post("/lab/token")
         def token(

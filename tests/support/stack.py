@@ -31,10 +31,13 @@ class RunningDemo:
         command: str = "demo",
         python: str | Path = sys.executable,
         environment: dict[str, str] | None = None,
+        ports: tuple[int, int] | None = None,
     ) -> None:
-        """`python`: of the installation to run; `environment`: all of it, None for this one's."""
+        """`python`: of the installation to run; `environment`: all of it, None for this one's;
+        `ports`: of page and bus, None for free ones.
+        """
         self.folder = folder
-        self.port, self.bus_port = free_port(), free_port()
+        self.port, self.bus_port = ports or (free_port(), free_port())
         folder.mkdir(parents=True, exist_ok=True)
         self.log = folder / "demo.log"
         self._environment = environment

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+from support.waiting import until
 
 from gateway.virtual.board_link import PtyLink
 from gateway.virtual.virtual_board import SIMULATED, BoardAccel, VirtualBoard
@@ -27,14 +28,6 @@ from sessions.recording.mcap_log import read
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE = 60.0  # s; generous, the tests wait for states
 PERIOD_S = 0.01
-
-
-def until(condition, what: str, patience: float = PATIENCE):
-    end = time.monotonic() + patience
-    while not (value := condition()):
-        assert time.monotonic() < end, f"waited {patience:g} s for {what}"
-        time.sleep(0.05)
-    return value
 
 
 class Stack:

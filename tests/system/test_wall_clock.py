@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 from support.stack import RunningDemo
+from support.waiting import until
 from support.wall_clock import YEAR_S, WallClock
 
 from messages.bus.session import BusSettings, open_client, subscribe
@@ -14,13 +15,6 @@ from messages.contract.topics import ACCEL, BOARD, LINK, STATUS
 from sessions.export.table import Selection, tables
 
 STOPPED_S = 4.0  # shorter than a lease: nobody takes its place
-
-
-def until(condition, what: str, seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, f"no {what}"
-        time.sleep(0.1)
 
 
 def test_a_session_over_a_clock_that_is_set_and_a_gateway_that_is_stopped(tmp_path):

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# width over height below which the page has a sheet over its lower part instead of panels beside
-PHONE_ASPECT = 0.6
-PHONE_CENTRE = 0.28  # where the middle of the picture is then, as a part of the height from the top
+# where the middle is above the sheet of a phone, as a part of the height from the top
+PHONE_CENTRE = 0.28
 
 
 @dataclass(frozen=True)
@@ -29,18 +28,18 @@ VEHICLE = Aim(
 )  # m; the last 200 m of a way that is not all straight
 
 
-def aim(view: Aim, fov: float, aspect: float) -> tuple[np.ndarray, np.ndarray]:
+def aim(view: Aim, fov: float, aspect: float, sheet: bool) -> tuple[np.ndarray, np.ndarray]:
     """Position and look_at of a camera, (3,) each, for a vertical field of view (rad) and a width
-    over height.
+    over height. sheet: panels lie over the lower part, as on a phone.
 
-    The camera goes back from the centre until half_width fits. On a phone it is moved down across
-    its line of sight, so that the centre rises to PHONE_CENTRE.
+    The camera goes back from the centre until half_width fits. Above a sheet it is moved down
+    across its line of sight, so that the centre rises to PHONE_CENTRE.
     """
     centre, offset = np.array(view.centre), np.array(view.offset)
     half_height = math.tan(fov / 2)  # of the picture, at distance 1
     distance = max(float(np.linalg.norm(offset)), view.half_width / (half_height * aspect))
     back = offset / np.linalg.norm(offset)
-    if aspect < PHONE_ASPECT:
+    if sheet:
         right = np.cross([0.0, 0.0, 1.0], back)
         up = np.cross(back, right / np.linalg.norm(right))
         centre = centre - (1.0 - 2.0 * PHONE_CENTRE) * half_height * distance * up

@@ -14,7 +14,7 @@ a vertical line, made the same way.
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -122,7 +122,8 @@ def drawn(
         "ranges": [[one.t0, one.t1, one.text, one.kind] for one in inside],
         "measured": _measured(curves, *cursors) if cursors else None,
         "shades": [piece for shade in shades for piece in _pieces(shade, t0, t1)],
-        "holes": {str(c.label): holes for c in curves if (holes := _holes(c, t0, t1))},
+        "holes": _all_holes(curves, t0, t1),
+        "faint": {str(c.label): faint for c in curves if (faint := _faint(c, t0, t1))},
         "unsure": {str(c.label): said for c in curves if (said := worst(c.sight))},
     }
     heading = _heading(name, curves, shades, told)
@@ -185,6 +186,24 @@ def _holes(curve: Curve, t0: float, t1: float) -> list[list[float]]:
     ends = np.concatenate([[t0], t, [t1]]).clip(t0, t1)
     wide = np.flatnonzero(np.diff(ends) > gap_limit(t))[-MOST_RANGES:]
     return np.column_stack([ends[wide], ends[wide + 1]]).round(3).tolist()
+
+
+def _all_holes(curves: Sequence[Curve], t0: float, t1: float) -> dict[str, list[list[float]]]:
+    """Of each curve, and of its band where that is not known."""
+    found = {str(c.label): _holes(c, t0, t1) for c in curves}
+    for c in curves:
+        if c.half is not None and len(c.t):
+            band = _holes(replace(c, y=c.half), t0, t1)
+            found |= {f"{c.label} +3σ": band, f"{c.label} −3σ": band}
+    return {label: holes for label, holes in found.items() if holes}
+
+
+def _faint(curve: Curve, t0: float, t1: float) -> list[list[float]]:
+    """Where within [t0, t1] an estimator does not vouch for its line, which is dotted there."""
+    if not worst(curve.sight):
+        return []
+    shade = Shade("", "", curve.t, curve.sight > 0)
+    return [[begin, end] for begin, end, *_ in _pieces(shade, t0, t1)]
 
 
 def _pieces(shade: Shade, t0: float, t1: float) -> list[tuple[float, float, str, str]]:

@@ -12,6 +12,7 @@ import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from dashboard.web.accounts.backoff import ADDRESSES, Backoff
 from messages.text import plain
 
 log = logging.getLogger("dashboard.audit")
@@ -19,6 +20,7 @@ log = logging.getLogger("dashboard.audit")
 LARGEST = 8 << 20  # bytes of one file
 TAIL = 2 << 20  # bytes that are read to show the newest
 TEXT = 300  # characters of one entry's text
+EACH, SPAN_S = 60, 600.0  # refusals from one network that are all written down, within so long
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,7 @@ class Audit:
     def __init__(self, users_file: Path) -> None:
         self.path = users_file.with_name(users_file.name + ".audit")
         self._lock = threading.Lock()
+        self._refusals: dict[str, tuple[float, int]] = {}  # network -> since when, how many
         self.lost = 0  # entries that could not be written
         self.damaged = 0  # lines of the last look that are no entries
 
@@ -47,8 +50,27 @@ class Audit:
         self._write(Entry(time.time(), who, address, what, "done", detail))
 
     def refused(self, what: str, who: str, address: str = "", detail: str = "") -> None:
-        """Write down what was wished and not done."""
+        """Write down what was wished and not done. Of very many from one network the 64th, the
+        128th ... with their number: a flood of them must not wash the rest out of the file.
+        """
+        many = self._count(Backoff.network(address))
+        if many > EACH:
+            if many & (many - 1):
+                return
+            detail = f"the {many}th refusal from there within {SPAN_S / 60:.0f} min; {detail}"
         self._write(Entry(time.time(), who, address, what, "refused", detail))
+
+    def _count(self, network: str) -> int:
+        """Refusals of a network within SPAN_S of the first of them."""
+        now = time.monotonic()
+        with self._lock:
+            since, count = self._refusals.pop(network, (now, 0))
+            if now - since > SPAN_S:
+                since, count = now, 0
+            self._refusals[network] = since, count + 1
+            while len(self._refusals) > ADDRESSES:
+                self._refusals.pop(next(iter(self._refusals)))
+        return count + 1
 
     def newest(self, number: int, text: str = "") -> list[Entry]:
         """The newest entries that contain every word of `text`, newest first."""

@@ -10,7 +10,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from dashboard.web.auth import Role, WaitError
 from dashboard.web.front import Asker, check_role, front_of
 from dashboard.web.pages import SignedIn, caller, enter, render, signed_form
-from dashboard.web.users import UsersError, add_user
+from dashboard.web.users import UsersError, set_password
 from messages.clock import Moment
 
 routes = APIRouter(include_in_schema=False)
@@ -74,7 +74,7 @@ async def change_password(request: Request) -> Response:
         if fields.get("new") == fields.get("old"):
             return _account(request, who, "The new password is the old one.", 422)
         new = fields.get("new", "")
-        await asyncio.to_thread(add_user, gate.settings.users, who.name, new, who.role)
+        await asyncio.to_thread(set_password, gate.settings.users, who.name, new)
     except WaitError as wait:
         seconds = max(1, round(wait.seconds))
         raise HTTPException(429, str(wait), {"retry-after": str(seconds)}) from None

@@ -5,14 +5,16 @@ signature. Of the answers of the provider nothing is believed that is not signed
 issuer that the settings name, and is for us, fresh, and of this very attempt.
 """
 
+import logging
 import secrets
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 from urllib.parse import urlsplit
 
 import httpx
+from authlib.common.urls import add_params_to_uri
 from authlib.oauth2.rfc6749.parameters import prepare_grant_uri
 from authlib.oauth2.rfc7636 import create_s256_code_challenge
 from authlib.oidc.core import CodeIDToken
@@ -31,6 +33,8 @@ WAIT_S = 10.0
 LARGEST = 1 << 20  # bytes of an answer
 LOCAL = ("127.0.0.1", "::1", "localhost")  # may be reached without TLS
 
+log = logging.getLogger(__name__)
+
 
 class ProviderError(Exception):
     """Nobody is signed in; the text is for the person who wanted to be."""
@@ -41,6 +45,7 @@ class Attempt:
     """One way to the provider and back, of one browser."""
 
     wanted: str  # page to go to
+    network: str = ""  # that it comes from
     state: str = field(default_factory=lambda: secrets.token_urlsafe(32))
     nonce: str = field(default_factory=lambda: secrets.token_urlsafe(32))
     verifier: str = field(default_factory=lambda: secrets.token_urlsafe(64))
@@ -53,6 +58,7 @@ class Person:
 
     name: str
     role: Role
+    token: str = field(default="", repr=False)  # the identity itself
 
 
 class Provider:
@@ -101,7 +107,28 @@ class Provider:
         token = answer.get("id_token")
         if not isinstance(token, str):
             raise ProviderError("the identity provider's answer has no identity in it")
-        return self._of(await self._verified(token, attempt, answer.get("access_token")))
+        claims = await self._verified(token, attempt, answer.get("access_token"))
+        return replace(self._of(claims), token=token)
+
+    async def farewell(self, token: str) -> str:
+        """The provider's page that ends the sign-in there, for an identity of its own; empty where
+        it names none, or does not answer: here it has ended already.
+        """
+        try:
+            about = await self._described()
+            url = about.get("end_session_endpoint")
+            if url is None:
+                return ""
+            _check_address("end_session_endpoint", url)
+        except ProviderError as error:
+            log.warning("signed out here only: %s", error)
+            return ""
+        said = {
+            "id_token_hint": token,
+            "client_id": self._settings.oidc_client,
+            "post_logout_redirect_uri": f"{self._settings.oidc_address.rstrip('/')}/login",
+        }
+        return add_params_to_uri(url, list(said.items()))
 
     async def _verified(self, token: str, attempt: Attempt, access: object) -> CodeIDToken:
         settings = self._settings

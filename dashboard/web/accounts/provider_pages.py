@@ -11,12 +11,14 @@ from fastapi import APIRouter, HTTPException, Query, Request
 from fastapi.responses import RedirectResponse, Response
 
 from dashboard.web.accounts.provider import Attempt, Provider, ProviderError
-from dashboard.web.auth import Gate
+from dashboard.web.auth import Backoff, Gate
 from dashboard.web.front import address_of
 from dashboard.web.pages import caller, give_cookie, own_path, render, set_cookie
 
 ATTEMPTS = 1000  # at a time; the oldest gives way
+ATTEMPTS_EACH = 50  # of one network: a flood of them pushes nobody else out
 LIFE_S = 600.0
+SIGN_INS = 1000  # of which the identity is kept, to end them at the provider, too
 
 
 def router(gate: Gate) -> APIRouter:
@@ -26,19 +28,24 @@ def router(gate: Gate) -> APIRouter:
         return routes
     provider, attempts = Provider(gate.settings), dict[str, Attempt]()
     cookie = gate.settings.cookie + "-attempt"
+    identities: dict[str, str] = {}  # by the key of a sign-in, for as long as this process runs
+
+    async def farewell(key: str) -> str:
+        token = identities.pop(key, "")
+        return await provider.farewell(token) if token else ""
+
+    gate.farewell = farewell
 
     @routes.get("/login/provider")
     async def go(
         request: Request, wanted: Annotated[str, Query(alias="next", max_length=1600)] = "/"
     ) -> Response:
-        attempt = Attempt(own_path(wanted))
+        attempt = Attempt(own_path(wanted), Backoff.network(address_of(request)))
         try:
             answer = RedirectResponse(await provider.address(attempt), 303)
         except ProviderError as error:
             raise _no(gate, request, error, 503) from None
-        attempts[_digest(attempt.state)] = attempt
-        while len(attempts) > ATTEMPTS:
-            attempts.pop(next(iter(attempts)))
+        _remember(attempts, attempt)
         # lax: the way back begins at the provider's page, which is another site
         give_cookie(gate.settings, answer, cookie, attempt.state, LIFE_S, "lax")
         return answer
@@ -63,6 +70,9 @@ def router(gate: Gate) -> APIRouter:
         except ProviderError as fault:
             raise _no(gate, request, fault, 403) from None
         token = gate.begin(person.name, *_named(caller, request), role=person.role)
+        identities[_digest(token)] = person.token
+        while len(identities) > SIGN_INS:
+            identities.pop(next(iter(identities)))
         # a page, and not a redirect: what follows from a page of ours gets the strict cookie
         page = render(request, "entered.html", None, wanted=attempt.wanted)
         page.delete_cookie(cookie, path="/", secure=gate.settings.secure, httponly=True)
@@ -75,6 +85,15 @@ def router(gate: Gate) -> APIRouter:
 def _named(of: Callable[[Request], tuple[str, str]], request: Request) -> tuple[str, str, str]:
     address, agent = of(request)
     return address, "identity provider", agent
+
+
+def _remember(attempts: dict[str, Attempt], new: Attempt) -> None:
+    attempts[_digest(new.state)] = new
+    same = [key for key, one in attempts.items() if one.network == new.network]
+    for key in same[:-ATTEMPTS_EACH]:
+        del attempts[key]
+    while len(attempts) > ATTEMPTS:
+        attempts.pop(next(iter(attempts)))
 
 
 def _of_this_browser(attempts: dict[str, Attempt], held: str, state: str) -> Attempt:

@@ -9,6 +9,8 @@ from fastapi import APIRouter, Depends, HTTPException, Query, Request
 from fastapi.responses import JSONResponse, Response
 from pydantic import BaseModel, Field
 
+from dashboard.data.lateness import Age, lateness
+from dashboard.data.live import aged
 from dashboard.data.whereabouts import Known, whereabouts
 from dashboard.web.api import file_of, reading_of
 from dashboard.web.front import Asker, asker, front_of
@@ -21,6 +23,7 @@ SignedIn = Annotated[Asker, Depends(asker)]
 RANGE = re.compile(r"bytes=(\d{1,18})-(\d{1,18})")
 MOST_BYTES = 8 << 20  # of one range: a directory or a tile, never more than a part of the file
 ANOTHER = "the map file is another one now: load the page again"
+UNHEARD = Age(float("nan"), float("nan"), "a replay, or nothing is heard")
 NO_FILE = "no map file: [dashboard] map in gyrofree.toml names one"
 
 
@@ -132,7 +135,9 @@ def places(
         found = store.device(device)
         if found is None:
             raise HTTPException(404, "nothing has been heard of such a device")
-        return whereabouts(found, _known(have), since)
+        late = lateness(store, found)
+        old = UNHEARD if late is None else Age(late.age_s, late.bound_s, late.why)
+        return whereabouts(found, _known(have), since) | aged(old)
 
 
 def _known(text: str) -> dict[str, Known]:

@@ -21,9 +21,14 @@ SignedIn = Annotated[Asker, Depends(asker)]
 class ServiceOut(BaseModel):
     role: str
     name: str = Field(description="among those of its place")
-    state: str = Field(description="running, frozen, gone, ended, or not known")
+    state: str = Field(description="running, hung, frozen, gone, ended, or not known")
+    state_said: str = Field(description="the same, and for how long, where that is a fault")
     since_s: float | None = Field(description="that it began, s since 1970; null: not said")
     silent_s: float = Field(description="since its last beat, of two a second")
+    loop: str = Field(description="its loop that stands longest, for what it may; empty: unknown")
+    doing: str = Field(description="what that loop's turn is for, where it says so")
+    turn_ago_s: float | None = Field(description="since the last turn of it; null: unknown")
+    turn_most_s: float | None = Field(description="what a turn may take; beyond it is hung")
     devices: list[str] = Field(description="boards that it has")
     waits: list[str] = Field(description="of these, those that another gateway publishes")
     clock_ahead_s: float | None = Field(description="its clock minus the site's; null: unknown")
@@ -68,7 +73,7 @@ def all_places(request: Request, who: SignedIn) -> PlacesOut:
         raise HTTPException(503, "this dashboard has no connection to the bus")
     with store.lock:
         found = [
-            PlaceOut(**one, people_said=people_said(one["people"]))
+            PlaceOut(**one, people_said=people_said(one["people"], one["state"]))
             for one in places(store.presence)
         ]
         return PlacesOut(sees=store.presence.sees, places=found, boards=_boards(store))

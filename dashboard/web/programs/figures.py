@@ -38,13 +38,25 @@ OF_SERVICE = ("place", "service")
 RUNNING = (
     "gyrofree_service_running",
     "gauge",
-    "1 for a process that runs, 0 for one that is frozen, gone or not known",
+    "1 for a process that runs, 0 for one that hangs, is frozen, gone or not known",
     OF_SERVICE,
 )
 SILENT = (
     "gyrofree_service_silent_seconds",
     "gauge",
     "since its last sign of life, of which there are two a second",
+    OF_SERVICE,
+)
+TURN = (
+    "gyrofree_service_turn_age_seconds",
+    "gauge",
+    "since the last turn of its loop that stands longest, measured by what a turn may take",
+    OF_SERVICE,
+)
+TURN_MOST = (
+    "gyrofree_service_turn_limit_seconds",
+    "gauge",
+    "what a turn of that loop may take; a process beyond it hangs",
     OF_SERVICE,
 )
 CLOCK = (
@@ -59,7 +71,19 @@ CERTIFICATE = (
     "when its certificate ends, since 1970",
     OF_SERVICE,
 )
-OWN = (ENDED, REFUSED, DROPPED, STREAMS, DEVICES, RUNNING, SILENT, CLOCK, CERTIFICATE)
+OWN = (
+    ENDED,
+    REFUSED,
+    DROPPED,
+    STREAMS,
+    DEVICES,
+    RUNNING,
+    SILENT,
+    TURN,
+    TURN_MOST,
+    CLOCK,
+    CERTIFICATE,
+)
 
 
 class Page:
@@ -90,7 +114,13 @@ def _presence(store: Store) -> Iterator[Metric]:
         for place in places(store.presence)
         for one in place["services"]
     }
-    fields = ((SILENT, "silent_s"), (CLOCK, "clock_ahead_s"), (CERTIFICATE, "certificate_ends_s"))
+    fields = (
+        (SILENT, "silent_s"),
+        (TURN, "turn_ago_s"),
+        (TURN_MOST, "turn_most_s"),
+        (CLOCK, "clock_ahead_s"),
+        (CERTIFICATE, "certificate_ends_s"),
+    )
     running = {key: float(one["state"] == "running") for key, one in services.items()}
     yield family_of(*RUNNING, running)
     for figure, field in fields:

@@ -8,12 +8,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, HTTPException, Query, Request
 from fastapi.responses import StreamingResponse
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from dashboard.data.live import ESTIMATED, Live, live
+from dashboard.data.live import ESTIMATED, Live, live_aged
 from dashboard.data.store import Store
-from dashboard.web.front import Asker, asker, front_of
-from dashboard.web.users import UsersError
+from dashboard.web.front import Asker, asker, front_of, still_may
+from dashboard.web.schemas import AgedOut
 
 routes = APIRouter(prefix="/api/devices/{device}")
 
@@ -25,10 +25,10 @@ QUIET_S = 10.0  # without an event after which a comment says that the line stil
 RIGHTS_S = 1.0  # between two looks at rights that another process may have changed
 
 
-class _Said(BaseModel):
+class _Said(AgedOut):
     device: str
     estimator: str
-    utc_s: float = Field(description="of the sample, s since 1970")
+    utc_s: float = Field(description="of the sample by its gateway's clock, s since 1970")
     age_s: float = Field(description="since it arrived, s")
     stale: bool = Field(description="too old to be the present")
     simulated: bool
@@ -137,13 +137,13 @@ async def _events(
             now, rung = time.monotonic(), bell.rung
             if now - looked > RIGHTS_S or rung != seen:
                 looked, seen = now, rung
-                if not _still_may(request, who):
+                if not still_may(request, who):
                     yield 'event: end\ndata: {"why": "signed out, revoked or past its end"}\n\n'
                     return
             for topic in topics if now >= due else ():
                 with store.lock:
                     found = store.device(device)
-                    said = live(found, topic, estimator) if found else None
+                    said = live_aged(store, found, topic, estimator) if found else None
                 if said is not None and sent.get(topic) != said["utc_s"]:
                     sent[topic], spoke = said["utc_s"], now
                     yield f"event: {topic}\ndata: {json.dumps(said, allow_nan=False)}\n\n"
@@ -156,17 +156,6 @@ async def _events(
         listeners[who.name] -= 1
         if not listeners[who.name]:
             del listeners[who.name]
-
-
-def _still_may(request: Request, who: Asker) -> bool:
-    gate = front_of(request).gate
-    try:
-        if who.token:
-            secret = request.headers["authorization"].partition(" ")[2].strip()
-            return gate.tokens.find(secret) is not None
-        return gate.session_of(request) is not None
-    except UsersError:
-        return False
 
 
 def _store(request: Request) -> Store:
@@ -182,7 +171,7 @@ def _newest(request: Request, device: str, topic: str, estimator: str) -> Live:
         found = store.device(device)
         if found is None:
             raise HTTPException(404, "nothing has been heard of such a device")
-        said = live(found, topic, estimator)
+        said = live_aged(store, found, topic, estimator)
         if said is not None:
             return said
         names = ", ".join(found.estimators(topic))

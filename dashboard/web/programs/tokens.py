@@ -14,7 +14,14 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from dashboard.web.users import Role, User, UsersError, load_users, write_private
+from dashboard.web.users import (
+    Role,
+    User,
+    UsersError,
+    changing,
+    load_users,
+    write_private,
+)
 from messages.clock import Moment
 from messages.text import check as fault_in
 
@@ -102,9 +109,6 @@ def issue_token(
         raise UsersError(f"{days:g} days: want more than 0, at most {DAYS_MAX:g}")
     if not name.strip() or len(name) > 60 or fault_in(name):
         raise UsersError("say in up to 60 characters what the token is for")
-    tokens = {key: one for key, one in load_tokens(users_file).items() if not one.over}
-    if len(tokens) >= MOST:
-        raise UsersError(f"{MOST} tokens are there already: revoke some")
     secret, now = PREFIX + secrets.token_urlsafe(32), time.time()
     entry = Token(
         secrets.token_hex(4),
@@ -117,17 +121,22 @@ def issue_token(
         list(Moment.now()),
         kind,
     )
-    _save(users_file, tokens | {entry.id: entry})
+    with changing(users_file):
+        tokens = {key: one for key, one in load_tokens(users_file).items() if not one.over}
+        if len(tokens) >= MOST:
+            raise UsersError(f"{MOST} tokens are there already: revoke some")
+        _save(users_file, tokens | {entry.id: entry})
     return secret, entry
 
 
 def revoke_token(users_file: Path, token_id: str) -> Token:
     """Take a token back, at once; raises UsersError when there is none of that id."""
-    tokens = load_tokens(users_file)
-    gone = tokens.pop(token_id, None)
-    if gone is None:
-        raise UsersError(f"no token {token_id!r}; there are {', '.join(tokens) or 'none'}")
-    _save(users_file, tokens)
+    with changing(users_file):
+        tokens = load_tokens(users_file)
+        gone = tokens.pop(token_id, None)
+        if gone is None:
+            raise UsersError(f"no token {token_id!r}; there are {', '.join(tokens) or 'none'}")
+        _save(users_file, tokens)
     return gone
 
 

@@ -128,7 +128,10 @@ function show(now) {
   trouble.textContent = now.trouble;
   const there = now.alarms.filter((one) => one.state !== "normal");
   const steady = there.map((one) => ({ ...one, shelved_s: Math.ceil(one.shelved_s / 60) }));
-  put(byId("points"), table(["Level", "Device", "What", "State", "Since (UTC)", "Orders"], there.map(pointRow), "Nothing is wrong, and nothing waits to be acknowledged."), steady);
+  byId("kept").hidden = Boolean(now.part);
+  byId("part").hidden = !now.part;
+  byId("part").textContent = now.part ? now.message : "";
+  put(byId("points"), now.trouble && now.part ? node("p", "Not known now.", "dim") : table(["Level", "Device", "What", "State", "Since (UTC)", "Orders"], there.map(pointRow), "Nothing is wrong, and nothing waits to be acknowledged."), steady);
   put(byId("limits"), table(["Name", "Field", "Limit", "Level", "Now", "Orders"], limits.map(limitRow), "No limit is set."), limits);
   const ways = now.ways.map((way) => ({ cells: [way.name, String(way.sent), String(way.waiting), String(way.given_up), node("span", way.fault || "well", way.fault ? "fault" : "dim")] }));
   put(byId("ways"), table(["Way", "Sent", "Waiting", "Given up", "Last attempt"], ways, "No way out is set: [alarms.webhook] or [alarms.mail] in gyrofree.toml."), now.ways);

@@ -4,7 +4,7 @@
 
 import { Cursors } from "/static/cursors.js";
 import { keyed, selectable } from "/static/drag.js";
-import { dress } from "/static/figure.js";
+import { dress, inPixels } from "/static/figure.js";
 
 const { uPlot } = window; // vendor/uplot, a classic script before this module
 const FONT = "12px system-ui, 'DejaVu Sans', sans-serif";
@@ -43,10 +43,12 @@ function table(lines) {
   }), lines.map(({ low, high }) => (high === low ? [0, UNTOLD] : [0, UNTOLD, UNTOLD])));
 }
 
-function seriesOf(lines) {
+// unsureOf(n): stretches in which the nth line is not vouched for, which are dotted by figure.js.
+function seriesOf(lines, unsureOf) {
   const series = [{}], bands = [];
-  for (const line of lines) {
+  for (const [n, line] of lines.entries()) {
     const look = {
+      gaps: (u, ...found) => [...(found.at(-1) ?? []), ...inPixels(u, unsureOf(n))],
       label: line.short, stroke: faded(line.color, line.alpha ?? 1), width: line.width ?? 1.4,
       dash: line.dash?.length ? line.dash : undefined, points: { show: false },
     };
@@ -99,7 +101,7 @@ export class Plot {
     const { clientWidth: width, clientHeight: height } = this.root;
     if (!width || !height) return; // hidden: built when there is room
     this.chart = new uPlot({
-      width, height, ...seriesOf(this.lines), legend: { show: false }, padding: [8, 18, 0, 0],
+      width, height, ...seriesOf(this.lines, (n) => this.lines[n]?.unsure ?? []), legend: { show: false }, padding: [8, 18, 0, 0],
       scales: { x: { time: false, auto: false, range: (_, a, b) => [a, b] }, y: { range } },
       axes: [axis(" s", { space: 60, size: 42 }), axis("", { space: 22, size: 58 })],
       cursor: {
@@ -133,7 +135,7 @@ export class Plot {
   described() {
     const lines = this.lines.map((line) => {
       const x = Array.from(line.low, (_, k) => line.t0 + k * line.dt);
-      return { label: line.short, color: line.color, dash: line.dash, width: line.width, x, low: line.low, high: line.high, unsure: (line.unsure ?? []).map(([, , word]) => word).sort().at(-1) };
+      return { label: line.short, color: line.color, dash: line.dash, width: line.width, x, low: line.low, high: line.high, unsure: (line.unsure ?? []).map(([, , word]) => word).sort().at(-1), faint: line.unsure ?? [] };
     });
     const fresh = this.lines.every((line) => line.measured && line.asked === this.group.asked);
     return {

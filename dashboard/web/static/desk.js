@@ -137,6 +137,7 @@ byId("remark").addEventListener("submit", (event) => {
 byId("mark").addEventListener("click", () => remark(true));
 if (!mayOperate) {
   for (const part of byId("remark").elements) Object.assign(part, { disabled: true, title: BARRED });
+  if (innerWidth < 720) note.placeholder = BARRED; // a phone shows no title
 }
 
 const toggleTheme = () => document.querySelector("[data-theme-toggle]").click();
@@ -149,8 +150,8 @@ listen({
 }, byId("scene"));
 moveByArrows(rooms);
 moveByArrows(pages);
-// The scene's panels fit the page: of a phone, a tablet, a desk.
-const sizeOf = () => (innerWidth < 600 ? "s" : innerWidth < 1200 ? "m" : "l");
+// The scene's panels fit the page: of a phone, a tablet held upright, one held across, a desk.
+const sizeOf = () => (innerWidth < 600 ? "s" : innerWidth < 1000 ? "n" : innerWidth < 1200 ? "m" : "l");
 const fit = () => choose({ size: sizeOf() });
 addEventListener("resize", () => sizeOf() !== size && fit(size = sizeOf()));
 let size = sizeOf();

@@ -1,12 +1,13 @@
 // What every chart gets, live and of a session: what happened as ranges with names, one outlier that does not flatten
 // the rest, and the figure as SVG or PNG for a paper. `figure` describes a chart:
-// {title, unit, origin, ranges: [[t0, t1, text, kind]], lines: () => [{label, color, dash, width, x, low, high, half, unsure}]};
-// `shades` are ranges that the chart itself draws already; `unsure` is what an estimator says where it does not vouch.
+// {title, unit, origin, ranges: [[t0, t1, text, kind]], lines: () => [{label, color, dash, width, x, low, high, half, unsure, faint}]};
+// `shades` are ranges that the chart itself draws already; `unsure` is what an estimator says where it does not vouch,
+// `faint` are the stretches of that, [[from, until]]: the line is dotted there.
 const FAR = 4; // widths of the bulk that a point is away from it before it counts as an outlier
 const FEW = 4; // of them at one side; more are a signal
 const FRESH = 0.04; // newest share of the window, in which a jump may be the beginning of something
 export const SHADES = { blind: "#d55e00", ambiguous: "#c9b400" }; // what a filter does not vouch for: no lines, few names
-const TINT = { ...SHADES, mark: "#c564a0", step: "#3296d8", late: "#b08000", alarm: "#d6404e" };
+const TINT = { ...SHADES, mark: "#c564a0", coarse: "#7f93a6", step: "#3296d8", late: "#b08000", alarm: "#d6404e" };
 const FACE = "system-ui, 'DejaVu Sans', sans-serif";
 
 const number = (v) => (v === 0 ? "0" : Math.abs(v) >= 1e5 || Math.abs(v) < 1e-3 ? v.toExponential(2) : String(Number(v.toPrecision(4))));
@@ -54,7 +55,7 @@ export function dress(u, describe) {
   };
   for (const axis of u.axes) axis.values = spelt(axis.values);
   (u.hooks.drawAxes ??= []).push(() => drawRanges(u, describe()));
-  (u.hooks.draw ??= []).push(() => { drawOdd(u); drawOrigin(u, describe()); });
+  (u.hooks.draw ??= []).push(() => { const figure = describe(); drawFaint(u, figure); drawOdd(u); drawOrigin(u, figure); });
   u.redraw(true);
 }
 
@@ -113,6 +114,36 @@ function drawRanges(u, { ranges }) {
   });
 }
 
+const within = (stretches, x) => stretches.some(([from, until]) => x >= from && x <= until);
+
+// For the gaps of a series of uPlot: stretches of time in px.
+export const inPixels = (u, stretches) => stretches.map((ends) => ends.slice(0, 2).map((t) => u.valToPos(t, "x", true)));
+
+// What an estimator does not vouch for is dotted; the chart's own line has a gap there.
+function drawFaint(u, figure) {
+  const { min, max } = u.scales.x;
+  for (const line of figure.lines()) {
+    const faint = (line.faint ?? []).filter(([from, until]) => from <= max && until >= min);
+    if (!faint.length) continue;
+    pen(u, (c, _, px) => {
+      Object.assign(c, { strokeStyle: line.color, lineWidth: (line.width ?? 1.4) * px, lineCap: "round" });
+      c.setLineDash([0.5 * px, 3.5 * px]);
+      c.beginPath();
+      let down = false;
+      line.x.forEach((t, k) => {
+        const low = line.low[k], high = line.high[k];
+        if (!within(faint, t) || !Number.isFinite(low)) { down = false; return; }
+        for (const y of high === low ? [low] : [low, high]) {
+          const at = [u.valToPos(t, "x", true), u.valToPos(y, figure.high ?? "y", true)];
+          if (down) c.lineTo(...at); else c.moveTo(...at);
+          down = true;
+        }
+      });
+      c.stroke();
+    });
+  }
+}
+
 function drawOdd(u) {
   if (!u.odd) return;
   pen(u, (c, box, px) => {
@@ -160,10 +191,11 @@ function steps(low, high, most) {
     .map((v) => [v, v.toFixed(digits).replace("-", "−")]);
 }
 
-function trace(line, a, b, X, Y) {
+function trace(line, a, b, X, Y, keep = () => true) {
   let down = false, path = "";
   for (let k = 0; k < line.x.length; k++) {
     const x = line.x[k], low = line.low[k], high = line.high[k];
+    if (!keep(x)) { down = false; continue; }
     if (x < a || x > b || low === null || low === undefined || !Number.isFinite(low)) { down = down && (x < a || x > b); continue; }
     path += `${down ? "L" : "M"}${X(x).toFixed(2)} ${Y(low).toFixed(2)}`;
     if (high !== low) path += `L${X(x).toFixed(2)} ${Y(high).toFixed(2)}`;
@@ -209,7 +241,9 @@ export function svg(u, figure) {
       }
       if (ahead.length) out.push(`<path d="M${[...ahead, ...back].join("L")}Z" fill="${line.color}" fill-opacity="0.18"/>`);
     }
-    out.push(`<path d="${trace(line, a, b, X, Y)}" fill="none" stroke="${line.color}" stroke-width="${line.width ?? 1.3}" stroke-linejoin="round"${line.dash?.length ? ` stroke-dasharray="${line.dash.join(" ")}"` : ""}/>`);
+    const faint = line.faint ?? [], dotted = faint.length ? trace(line, a, b, X, Y, (x) => within(faint, x)) : "";
+    if (dotted) out.push(`<path d="${dotted}" fill="none" stroke="${line.color}" stroke-width="${line.width ?? 1.3}" stroke-linecap="round" stroke-dasharray="0.5 3"/>`);
+    out.push(`<path d="${trace(line, a, b, X, Y, (x) => !within(faint, x))}" fill="none" stroke="${line.color}" stroke-width="${line.width ?? 1.3}" stroke-linejoin="round"${line.dash?.length ? ` stroke-dasharray="${line.dash.join(" ")}"` : ""}/>`);
   }
   for (const { x, y, line } of u.odd?.odd ?? []) {
     const up = y > high;

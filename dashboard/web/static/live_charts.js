@@ -2,7 +2,7 @@
 // they show stands in the heading above each (data-chart); see dashboard/scene/drawing/chart.py.
 import { Cursors, pictures } from "/static/cursors.js";
 import { keyed, selectable } from "/static/drag.js";
-import { dress } from "/static/figure.js";
+import { dress, inPixels } from "/static/figure.js";
 import { ask, choose, state, whenStated, zoomed } from "/static/view.js";
 
 const LOOK_MS = 250;
@@ -47,18 +47,22 @@ const upright = (chart) => (overTime(chart) ? "y" : "level");
 function holed(chart) {
   chart.series.forEach((series, k) => {
     if (!k) return;
-    const mine = EDGE.test(series.label ?? "") ? series.label.replace(EDGE, "").trim() : series.label;
-    series.gaps = (u, ...found) => [...(found.at(-1) ?? []), ...(told(u).holes?.[mine] ?? []).map((ends) => ends.map((t) => u.valToPos(t, "x", true)))];
+    const { label = "" } = series, mine = label.replace(EDGE, "").trim();
+    series.gaps = (u, ...found) => {
+      const { holes = {}, faint = {} } = told(u);
+      const own = mine === label ? (faint[label] ?? []) : (holes[label] ?? []); // a band where it is not known
+      return [...(found.at(-1) ?? []), ...inPixels(u, [...(holes[mine] ?? []), ...own])];
+    };
   });
 }
 
 function describe(chart) {
-  const { title = "", unit = "", origin = "", across = "", ranges = [], shades = [], unsure = {}, measured = null } = told(chart), high = upright(chart);
+  const { title = "", unit = "", origin = "", across = "", ranges = [], shades = [], unsure = {}, faint = {}, measured = null } = told(chart), high = upright(chart);
   const [x, ...data] = chart.data;
   const lines = () => chart.series.slice(1).map((series, k) => ({ series, k })).filter(({ series }) => series.scale === high && series.show && series.label && series.label !== NAMELESS && !EDGE.test(series.label))
     .map(({ series, k }) => ({
       label: overTime(chart) ? series.label : "", color: series._stroke ?? series.stroke, dash: series.dash, width: 1.4, x, low: data[k], high: data[k],
-      unsure: unsure[series.label],
+      unsure: unsure[series.label], faint: faint[series.label] ?? [],
       half: EDGE.test(chart.series[k + 2]?.label ?? "") ? [data[k + 1], data[k + 2]] : null,
     })).map((line) => ({ ...line, color: typeof line.color === "function" ? line.color(chart, 0) : line.color }));
   return { title, unit, origin, across, ranges, shades, lines, high, measured: measured && asked(measured) ? measured : null };

@@ -6,6 +6,7 @@ does not end it. The page itself is the same for everybody, so that one that was
 dashboard is down, says so and comes back by itself.
 """
 
+import base64
 import hashlib
 import json
 import time
@@ -18,6 +19,7 @@ from fastapi.responses import JSONResponse, Response, StreamingResponse
 
 from dashboard.web.auth import Role, SignIn, WaitError
 from dashboard.web.front import Asker, Front, address_of, check_role, front_of
+from dashboard.web.guard import PAGE_CSP
 from dashboard.web.pages import SignedIn, give_cookie, render, signed_form, version
 from dashboard.web.programs.tokens import WALL, issue_token, revoke_token
 from dashboard.web.programs.users_page import users_with
@@ -29,15 +31,34 @@ from messages.text import plain
 routes = APIRouter(include_in_schema=False)
 
 FILES = Path(__file__).parents[1] / "static" / "wall"
+PAGE = Path(__file__).parents[1] / "templates" / "wall.html"
 POSES_S, STATE_S = 0.1, 1.0  # between two poses, two states
 MOST = 64  # displays at a time
 DAY_S = 86_400.0
 
 
+# Part of the page itself, as the files beside it may not come where a dashboard is just ending or
+# beginning: where one of them failed, or wall.js ceased to beat, the page is loaded once more, and
+# only when it is there.
+GUARD = """
+let failed = false;
+addEventListener("error", (event) => { failed ||= event.target !== window; }, true);
+setInterval(async () => {
+  if (!failed && performance.now() - (window.wallBeat ?? 0) < 30000) return;
+  try {
+    const answer = await fetch(location.href, { cache: "no-store" });
+    if (answer.ok && (await answer.text()).includes("data-build")) location.reload();
+  } catch { /* not yet */ }
+}, 3000);
+"""
+GUARD_HASH = base64.b64encode(hashlib.sha256(GUARD.encode()).digest()).decode()
+WALL_CSP = PAGE_CSP.replace("script-src 'self'", f"script-src 'self' 'sha256-{GUARD_HASH}'")
+
+
 def build() -> str:
     """Changes with what a display has loaded: then it loads anew."""
-    digest = hashlib.sha256(version().encode())
-    for path in sorted(FILES.iterdir()):
+    digest = hashlib.sha256(version().encode() + GUARD.encode())
+    for path in (PAGE, *sorted(FILES.iterdir())):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -70,13 +91,15 @@ def onlooker(request: Request) -> Asker:
 
 @routes.get("/wall")
 def wall(request: Request) -> Response:
-    return render(request, "wall.html", None, build=BUILD)
+    page = render(request, "wall.html", None, build=BUILD, guard=GUARD)
+    page.headers["content-security-policy"] = WALL_CSP
+    return page
 
 
 @routes.get("/wall/open")
 def door(request: Request) -> Response:
     """What a display's link opens: the token stands behind the #, which no log ever sees."""
-    return render(request, "wall.html", None, build=BUILD)
+    return wall(request)
 
 
 @routes.post("/wall/open")
@@ -84,14 +107,14 @@ def enter(request: Request, body: Token) -> JSONResponse:
     """Keep the token as a cookie; HTTP 403 for one that is none."""
     front = front_of(request)
     try:
-        front.gate.backoff.attempt(address_of(request))
+        front.gate.backoff.attempt(address_of(request), "wall display")
     except WaitError as wait:
         raise HTTPException(429, str(wait), {"retry-after": str(round(wait.seconds) + 1)}) from None
     found = front.gate.tokens.find(body.token, WALL)
     if found is None:
         front.gate.audit.refused("wall display", "", address_of(request), "unknown or revoked")
         raise HTTPException(403, "this link is unknown, revoked or past its end")
-    front.gate.backoff.forgive(address_of(request))
+    front.gate.backoff.forgive(address_of(request), "wall display")
     token, user = found
     front.gate.audit.done("wall display", user.name, address_of(request), token.name)
     answer = JSONResponse({"display": token.name})

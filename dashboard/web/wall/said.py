@@ -134,7 +134,8 @@ def _row(name: str, value: float | None, unit: str, note: str, half: float | Non
 def _fixed(value: float, half: float | None) -> str:
     """No more digits than the half width lets stand, and none that cannot be read from afar."""
     places = 1 if half is None or half <= 0 else 0 if half >= 1.0 else 1 if half >= 0.1 else 2
-    return f"{value:.{places}f}".replace("-", "\u2212")
+    text = f"{value:.{places}f}"
+    return (text if float(text) else text.lstrip("-")).replace("-", "\u2212")
 
 
 def _tilt(said: Told | None) -> list[Told]:

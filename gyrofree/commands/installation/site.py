@@ -64,11 +64,12 @@ def site_init(
     config: File = DEFAULT_PATH,
 ) -> None:
     """Make a site whose home is here: its authority, certificates, and the configuration."""
+    from gyrofree.setup.site import write_place
     from sites.joining import make_site
 
     try:
         place = make_site(folder, name, ("simulator",) if simulator else ())
-        _configure(config, place.site, folder, f"tls/127.0.0.1:{port}", port)
+        write_place(config, place.site, folder, f"tls/127.0.0.1:{port}", port)
     except (SiteError, ConfigError, OSError) as error:
         raise fail(error, EXIT_CONFIG) from None
     if as_json:
@@ -122,6 +123,7 @@ def site_join(
     config: File = DEFAULT_PATH,
 ) -> None:
     """Join a site by an invitation: waits for its home to call, then writes the configuration."""
+    from gyrofree.setup.site import write_place
     from sites.invitation import read_invitation
     from sites.joining import join
 
@@ -134,7 +136,7 @@ def site_join(
         place = join(
             folder, read_invitation(line), endpoint, stop, lambda text: say(text, file=sys.stderr)
         )
-        _configure(config, place.site, folder, endpoint, int(endpoint.rpartition(":")[2]))
+        write_place(config, place.site, folder, endpoint, int(endpoint.rpartition(":")[2]))
     except (SiteError, ConfigError, OSError) as error:
         raise fail(error, EXIT_CONFIG) from None
     except zenoh.ZError as error:
@@ -247,12 +249,13 @@ def site_serve(config: Config = None, verbose: Verbose = False) -> None:
     folder = _folder(settings)
 
     def body(stop: threading.Event) -> None:
+        from gyrofree.setup.site import own_alarms
         from sites import service
 
         try:
-            sessions = Path(settings.recorder.root)
+            sessions, beside = Path(settings.recorder.root), own_alarms(settings)
             bus = settings.bus.acting_as("authority")
-            service.run(folder, sessions, bus, stop, settings.site)
+            service.run(folder, sessions, bus, stop, settings.site, beside)
         except SiteError as error:
             raise ConfigError(str(error)) from None
 
@@ -278,25 +281,6 @@ def _endpoint(text: str) -> str:
     if not host or any(character in host for character in " /#?,\n") or not 0 < int(port) < 65536:
         raise typer.BadParameter(f"{text[:60]!r}: want HOST, or HOST:PORT")
     return f"tls/{host}:{port}"
-
-
-def _configure(config: Path, site: str, folder: Path, listen: str, port: int) -> None:
-    """Write the place into the configuration; everything else stays as it was."""
-    from gyrofree.config import load
-    from gyrofree.setup.written import as_toml
-    from sites.place import write
-
-    settings = load(config) if config.exists() else Settings()
-    bus = settings.bus.model_copy(
-        update={
-            "prefix": site,
-            "router": f"tls/127.0.0.1:{port}",
-            "listen": [listen],
-            "tls": folder,
-        }
-    )
-    text = as_toml(settings.model_copy(update={"bus": bus}), "Written by `gyrofree site`.")
-    write(config, text.encode(), 0o644)
 
 
 def _with_board(settings: Settings, name: str) -> Settings:

@@ -32,9 +32,10 @@ def site_status(
     as_json: AsJson = False,
     config: Config = None,
 ) -> None:
-    """Which services of which places run, are frozen or gone, whose clock is off, how many look.
+    """Which services of which places run, hang, are frozen or gone, whose clock is off, how many
+    look.
 
-    Ends with 1 where something is frozen or gone.
+    Ends with 1 where something hangs, is frozen or gone.
     """
     settings = settings_of(config)
     try:
@@ -111,12 +112,10 @@ def _show(found: list[dict[str, Any]], as_json: bool) -> None:
     if not found:
         return say("nobody is there: does `gyrofree up` run?")
     for place in found:
-        say(f"{place['name']}: {place['state']}, {people_said(place['people'])}")
+        say(f"{place['name']}: {place['state']}, {people_said(place['people'], place['state'])}")
         table = Table("service", "state", "boards", "clock against the site's", box=None)
         for one in place["services"]:
-            silent = one["state"] in (State.FROZEN.value, State.GONE.value)
-            state = f"{one['state']}, {one['silent_s']:.0f} s" if silent else one["state"]
             waits = ", ".join(one["waits"])
             boards = ", ".join(one["devices"]) + (f" (waits for {waits})" if waits else "")
-            table.add_row(one["name"], state, boards, one["clock"])
+            table.add_row(one["name"], one["state_said"], boards, one["clock"])
         show_table(table)

@@ -8,6 +8,7 @@ import time
 import numpy as np
 
 from dashboard.data.alarms import TURNS_RADPS, alarms, bench_alarms, counts, waits
+from dashboard.data.device import PREVIEW_PAUSES
 from dashboard.data.lateness import lateness
 from dashboard.data.pose import roll_pitch
 from dashboard.data.whereabouts import QUALITIES
@@ -77,7 +78,7 @@ class Devices(Panel):
             return bad("■ replay ended")
         if replay == "paused":
             return tag("b", "❚❚ replay paused", class_="gf-replay")
-        if old >= 1.0:
+        if old >= max(1.0, PREVIEW_PAUSES * s.device.thinned_s):
             return bad(f"■ stale, {age(old)}")
         if replay:
             return tag("b", "▶ replay", class_="gf-replay")

@@ -14,6 +14,7 @@ from dashboard.data.device import Device
 from dashboard.scene.drawing.page import EMPTY, Markup, alert, html, joined, note, rows, tag
 from dashboard.scene.drawing.palette import GREEN, VERMILLION, number
 from dashboard.scene.panels.base import DEG, Input, Snapshot
+from dashboard.scene.panels.guided import confirm
 from dashboard.scene.panels.guided.calibration import picture
 from dashboard.scene.panels.guided.guided import Guided, guidance, silent
 from logs.figures.numbers import with_half_width
@@ -67,6 +68,7 @@ class ProcedurePanel(Guided):
         super().__init__(client, folder)
         self._names: tuple[str, ...] = ()
         self._seen = ("", 0)  # run and step on the screen
+        self._said, self._confirm = M(), confirm.Confirm(client)
         with folder:
             gui = client.gui
             self._choice = gui.add_dropdown("Procedure", ("–",), order=0.2, visible=False)
@@ -90,6 +92,8 @@ class ProcedurePanel(Guided):
         return "no word from `gyrofree procedures`: it runs the tests"
 
     def update(self, s: Snapshot) -> None:
+        if self._device != s.device.name:
+            self._confirm.close()
         self._device = s.device.name
         latest = s.device.get("procedure")
         if latest is None:
@@ -98,6 +102,9 @@ class ProcedurePanel(Guided):
             return
         m = latest.message
         active = m.state in ACTIVE
+        self._said = m
+        if active:
+            self._confirm.close()
         self._seen = m.run, m.step + 1
         self._offer(tuple(m.offered))
         step = m.steps[m.step] if m.step < len(m.steps) else STEP()
@@ -134,23 +141,35 @@ class ProcedurePanel(Guided):
         if self._read.visible != to_read:
             self._read.visible = to_read
 
+    def hide(self) -> None:
+        """What was asked belongs to this page."""
+        self._confirm.close()
+
     def _order(self, action: int) -> None:
         command = ACTION(action=action, device=self._device, user=self.user)
         if action == ACTION.ACTION_START:
             command.procedure = self._choice.value
             command.unit = self._unit.value.strip()
             command.own_session = True
+            title = f"Start {command.procedure} on {self._device}?"
+            told = confirm.content(self._said, command.procedure, command.unit)
+            self._confirm.ask(title, told, lambda: self._give(command))
+            return
         if action in (ACTION.ACTION_NEXT, ACTION.ACTION_REPEAT):
             command.run, command.step = self._seen  # another may have answered it meanwhile
         if action == ACTION.ACTION_NEXT:
             command.text = self._read.value.strip()
+        self._give(command)
+
+    def _give(self, command: ACTION) -> None:
+        """Give the order and show what came of it."""
         try:
             reply = self.desk.procedure(command)
             text, good = reply.message, reply.ok
         except (OrderError, ValueError) as error:  # shown to the person who pressed the button
             log.warning("procedure: %s", error)
             text, good = str(error), False
-        if good and action == ACTION.ACTION_NEXT:
+        if good and command.action == ACTION.ACTION_NEXT:
             self._read.value = ""
         title = "Test" if good else "The order was not carried out"
         self.client.add_notification(

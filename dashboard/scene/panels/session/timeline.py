@@ -119,7 +119,7 @@ class Timeline:
     def _live_html(self, now: float) -> Markup:
         latest = self._store.recorder
         if latest is None or latest.age(now) > 3.0:
-            return note(tag("b", "Live"), " · the recorder is not running")
+            return note(tag("b", "Live"), " · nothing is heard of the recorder")
         if self._live[0] is not latest:  # it speaks once a second
             self._live = latest, self._recorded_html(latest.message)
         return self._live[1]

@@ -3,7 +3,7 @@ import { call } from "/static/rest.js";
 
 const byId = (id) => document.getElementById(id);
 const EVERY_MS = 1000;
-const KINDS = { running: "running", frozen: "frozen", gone: "gone", ended: "ended", "out of reach": "reach" };
+const KINDS = { running: "running", hung: "frozen", frozen: "frozen", gone: "gone", ended: "ended", "out of reach": "reach" };
 
 function node(name, text = "", className = "") {
   const made = document.createElement(name);
@@ -43,16 +43,18 @@ function put(place, drawn, key) {
 }
 
 function service(one) {
-  const silent = one.state === "frozen" || one.state === "gone" ? `, ${Math.floor(one.silent_s)} s` : "";
+  const more = one.state_said.slice(one.state.length);
   const boards = [one.devices.join(", ")];
   if (one.waits.length) boards.push(node("span", `waits: another gateway has ${one.waits.join(", ")}`, "dim"));
-  return [node("strong", one.role), state(one.state, silent), when(one.since_s), boards, one.clock, one.certificate_ends_s ? when(one.certificate_ends_s).slice(0, 10) : ""];
+  return [node("strong", one.role), state(one.state, more), when(one.since_s), boards, one.state === "running" || one.clock_bound_s === null ? one.clock : node("span", `was ${one.clock}`, "dim"), one.certificate_ends_s ? when(one.certificate_ends_s).slice(0, 10) : ""];
 }
 
 function section(place) {
   const made = node("section"), title = node("h2", place.name);
   if (place.own) title.append(node("span", "this place", "tag"));
-  title.append(state(place.state), node("span", place.people_said, "dim"));
+  const off = place.services.filter((one) => one.state === place.state).length;
+  const part = ["frozen", "gone"].includes(place.state) && off < place.services.length; // a place is more than one of its services
+  title.append(part ? node("span", `${off} of ${place.services.length} services ${place.state}`, `alive ${KINDS[place.state]}`) : state(place.state), node("span", place.people_said, "dim"));
   const heads = ["Service", "State", "Since (UTC)", "Boards", "Clock against the site's", "Certificate until"];
   made.append(title, table(heads, place.services.map(service), "No service is there."));
   return made;
@@ -72,7 +74,7 @@ function show(now) {
   const trouble = byId("trouble");
   trouble.hidden = now.sees;
   trouble.textContent = now.sees ? "" : "Who is there is not known now: this dashboard just began, or its router does not answer.";
-  const steady = now.places.map((place) => ({ ...place, services: place.services.map((one) => ({ ...one, silent_s: one.state === "running" ? 0 : Math.floor(one.silent_s), clock_ahead_s: 0, clock_bound_s: 0 })) }));
+  const steady = now.places.map((place) => ({ ...place, services: place.services.map((one) => ({ ...one, silent_s: 0, turn_ago_s: 0, turn_most_s: 0, loop: "", doing: "", clock_ahead_s: 0, clock_bound_s: 0 })) }));
   put(byId("places"), () => now.places.map(section), steady);
   put(byId("boards"), () => table(["Board", "Gateway at", "Picture"], now.boards.map(board), "No board is heard."), now.boards);
 }

@@ -4,6 +4,7 @@ import { Cube } from "/static/wall/cube.js";
 const byId = (id) => document.getElementById(id);
 const SILENT_MS = 3000; // without a word of the dashboard: what is seen is old
 const AGAIN_MS = 4000; // between two tries to be connected
+const REFUSED_MS = 15000; // the same, for one that is not let in
 const BUILD = document.body.dataset.build;
 const device = new URLSearchParams(location.search).get("device") ?? "";
 const cube = new Cube(byId("cube"));
@@ -23,7 +24,7 @@ function connect() {
     heard();
     now = JSON.parse(event.data);
     why = "";
-    if (now.build !== BUILD) reload();
+    if (now.build !== BUILD) renew();
     show();
   });
   source.addEventListener("pose", (event) => {
@@ -40,7 +41,8 @@ function connect() {
 
 const heard = () => { spoke = performance.now(); };
 
-// The stream was refused: the reason is asked for, as an event source does not tell it.
+// The stream was refused: the reason is asked for, as an event source does not tell it. It may also be that another
+// version serves, in which the stream is another.
 async function ask() {
   try {
     const answer = await fetch("/wall/stream", { signal: AbortSignal.timeout(3000) });
@@ -49,14 +51,18 @@ async function ask() {
   } catch {
     why = "";
   }
+  if (why) renew();
 }
 
-// Another version serves: only when it answers is this page given up for it.
-async function reload() {
+// Another version serves: only when its page answers, and is another, is this one given up for it. Should the dashboard
+// go again while it loads, the guard within the page (wall.html) loads it once more.
+async function renew() {
   if (reloading) return;
   reloading = true;
   try {
-    if ((await fetch("/wall", { cache: "no-store" })).ok) location.replace(`/wall${location.search}`);
+    const answer = await fetch("/wall", { cache: "no-store", signal: AbortSignal.timeout(10000) });
+    const built = answer.ok && /data-build="(\w+)"/.exec(await answer.text());
+    if (built && built[1] !== BUILD) location.replace(`/wall${location.search}`);
   } catch {
     // The next word of the dashboard tries again.
   }
@@ -92,6 +98,8 @@ function show() {
   text(byId("boards"), now.boards.map((one) => `${one.name} ${one.stale ? "silent" : "live"}`).join(" · "));
 }
 
+const ago = (s) => (s < 120 ? `${Math.floor(s)} s` : s < 7200 ? `${Math.floor(s / 60)} MIN` : s < 172800 ? `${Math.floor(s / 3600)} H` : `${Math.floor(s / 86400)} DAYS`);
+
 // What is old is dimmed, and for how long nothing came is said: once a second, by this display's own clock.
 function look() {
   const at = performance.now(), silent = (at - spoke) / 1000, gone = !spoke || at - spoke > SILENT_MS;
@@ -99,8 +107,8 @@ function look() {
   const old = gone || !now?.there || age === null || age > 3;
   document.body.classList.toggle("old", old);
   const banner = byId("banner");
-  const nobody = !spoke ? "NOT CONNECTED" : gone ? `NO DATA FOR ${Math.floor(silent)} s` : "";
-  const quiet = !now?.there ? "NO BOARD" : old ? `${now.device}: NO DATA FOR ${Math.floor(age ?? 0)} s` : "";
+  const nobody = !spoke ? "NOT CONNECTED" : gone ? `NO DATA FOR ${ago(silent)}` : "";
+  const quiet = !now?.there ? "NO BOARD" : old ? `${now.device}: NO DATA${age === null ? "" : ` FOR ${ago(age)}`}` : "";
   const said = why || nobody || quiet;
   text(banner, said);
   banner.hidden = !said;
@@ -108,12 +116,12 @@ function look() {
   link.dataset.state = !old && now.connected ? "live" : "lost";
   text(link, old ? "" : `${now.connected ? `${now.hz.toFixed(0)} Hz` : "line lost"}${now.late ? `, ${now.late}` : ""}${now.lost ? `, ${now.lost} samples lost` : ""}`);
   text(byId("clock"), new Date().toISOString().slice(11, 19) + " UTC");
-  if (gone && at - tried > AGAIN_MS) connect();
+  window.wallBeat = at; // the guard within the page waits for it
+  if (gone && at - tried > (why ? REFUSED_MS : AGAIN_MS)) connect();
 }
 
 function draw() {
   cube.draw(document.body.classList.contains("old") ? null : pose?.q, pose?.omega);
-  setTimeout(draw, 100); // ten pictures a second; not by frames, which a display in the background has none of
 }
 
 // A display's own link: its token stands behind the #, is kept as a cookie and taken out of the address.
@@ -122,15 +130,17 @@ async function open() {
   const token = location.hash.slice(1);
   try {
     const answer = await fetch("/wall/open", { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify({ token }) });
-    if (answer.ok) return location.replace("/wall");
+    if (answer.ok) return location.replace(`/wall${location.search}`);
     why = (await answer.json()).error;
+    if (answer.status === 403) return; // it will not be better: the link is unknown, revoked or past its end
   } catch {
-    setTimeout(open, AGAIN_MS);
+    // The dashboard is not there yet.
   }
+  setTimeout(open, AGAIN_MS);
 }
 
 open();
 connect();
 setInterval(look, 1000);
+setInterval(draw, 100); // ten pictures a second; not by frames, which a display in the background has none of
 look();
-draw();

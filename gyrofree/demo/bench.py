@@ -6,6 +6,7 @@ process can also be started by hand.
 """
 
 import secrets
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -114,27 +115,13 @@ def run(plan: Plan) -> None:
     """Run until Ctrl-C; raises typer.Exit with a code when it cannot."""
     start_logging()
     stop = stop_on_signals()
-    for what, port, option in (
-        ("bus", plan.bus_port, "--bus-port"),
-        ("dashboard", plan.port, "--port"),
-    ):
-        if port_taken("127.0.0.1", port):
-            raise fail(
-                f"{what} port {port} is taken: end what uses it (`ss -ltnp`), or choose {option}",
-                EXIT_TAKEN,
-            )
+    look_for_others({"--bus-port": (plan.bus_port,), "--port": (plan.port,)})
     config = write_configuration(plan)
     settings = load(config)
     supervisor = _supervise(plan, config)
-    token = _sign_in_token(settings)
     supervisor.say(f"starting; configuration and data in {plan.folder}")
-    users = Path(settings.dashboard.users)
-
-    def welcome() -> list[tuple[str, str]]:
-        link = f"/login/link?token={token}" if link_token_waits(users, token) else ""
-        return [(f"open  {settings.dashboard.url}{link}", "bold green")]
-
-    Watch(supervisor, settings, welcome).run(stop)
+    link = sign_in_link(settings)
+    Watch(supervisor, settings, lambda: [(f"open  {link()}", "bold green")]).run(stop)
     if supervisor.done:
         print(_summary(settings, plan))
 
@@ -156,20 +143,42 @@ def _supervise(plan: Plan, config: Path) -> Supervisor:
     for service in SERVICES:
         hushed = (f"{port}: not there", f"{port}: open") if service == "gateway" else None
         supervisor.add(service, service, "--config", str(config), hushed=hushed)
-    # The board comes last: estimators that see its first standstill know its heading and biases
-    # from the start.
-    name, *arguments = plan.board  # a log's name may begin with -, and comes last
-    places = [f"--config={config}", f"--link={port}"]
-    places += [f"--table-link={plan.folder / 'table'}"] if plan.table else []
-    board = [name, *places, *arguments]
-    supervisor.add("board", *board, waits_for=("estimator", "estimating"), once=plan.once)
+    add_board(supervisor, plan, config)
     return supervisor
 
 
-def _sign_in_token(settings: Settings) -> str:
-    """A fresh demo user with a password nobody knows, and the token of a link that signs in as it,
-    once.
+def add_board(supervisor: Supervisor, plan: Plan, config: Path) -> None:
+    """The board comes last: estimators that see its first standstill know its heading and biases
+    from the start.
+    """
+    name, *arguments = plan.board  # a log's name may begin with -, and comes last
+    places = [f"--config={config}", f"--link={plan.folder / 'board'}"]
+    places += [f"--table-link={plan.folder / 'table'}"] if plan.table else []
+    board = [name, *places, *arguments]
+    supervisor.add("board", *board, waits_for=("estimator", "estimating"), once=plan.once)
+
+
+def look_for_others(wanted: dict[str, tuple[int, ...]]) -> None:
+    """End with a word where a port is taken; wanted: ports by the option that chooses them."""
+    for option, ports in wanted.items():
+        for port in ports:
+            if port_taken("127.0.0.1", port):
+                raise fail(
+                    f"port {port} is taken: end what uses it (`ss -ltnp`), or choose {option}",
+                    EXIT_TAKEN,
+                )
+
+
+def sign_in_link(settings: Settings) -> Callable[[], str]:
+    """A fresh demo user with a password nobody knows; what gives the page's address, with the token
+    that signs in as it, once, as long as that was not used.
     """
     users = Path(settings.dashboard.users)
     add_user(users, USER, secrets.token_urlsafe(24), "operator")
-    return issue_link_token(users, USER)
+    token = issue_link_token(users, USER)
+
+    def link() -> str:
+        waits = link_token_waits(users, token)
+        return settings.dashboard.url + (f"/login/link?token={token}" if waits else "")
+
+    return link
