@@ -93,20 +93,10 @@ class Offset:
             return None
         return best._replace(theta_ns=best.theta_ns + kept[-1].wall)
 
-<<<<<<< HEAD
     def elapsed(self, now_ns: int) -> Measured | None:
         """The same of both elapsed times, which nobody sets."""
-        return self._best(now_ns)
+        return _best(tuple(self._kept), now_ns)
 
-    def _best(self, now_ns: int) -> Measured | None:
-        """Of elapsed times (T-3)."""
-        found = [
-            Measured(one.measured.theta_ns, one.measured.bound_ns + DRIFT * (now_ns - one.t4))
-            for one in self._kept
-            if now_ns - one.t4 <= OLD_NS
-        ]
-        return min(found, key=lambda one: one.bound_ns, default=None)
-=======
 
 def _best(kept: Iterable[Exchange], now_ns: int) -> Measured | None:
     """Of elapsed times (T-3)."""
@@ -116,4 +106,3 @@ def _best(kept: Iterable[Exchange], now_ns: int) -> Measured | None:
         if now_ns - one.t4 <= OLD_NS
     ]
     return min(found, key=lambda one: one.bound_ns, default=None)
->>>>>>> faults
