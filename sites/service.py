@@ -93,7 +93,7 @@ def run(
                 one.undeclare()
         else:
             with beside(session):
-                copy(Copies(sessions, folder), place.site, session, stop)
+                copy(Copies(sessions, folder, place.home, place.place), place.site, session, stop)
         keeping.join(ASK_S + 1.0)
 
 
