@@ -22,6 +22,7 @@ from dashboard.data.alarms import alarms, bench_alarms
 from dashboard.data.lateness import behind, clock, lateness
 from dashboard.data.places import people_said, places
 from dashboard.data.store import Store
+from dashboard.web.alarms.watched import watched
 from messages.bus.beating import BEAT_S
 from messages.bus.presence import AGAIN_S, LOOK_S, SETTLE_S
 from messages.contract import gyrofree_pb2 as pb
@@ -383,6 +384,9 @@ def test_an_office_finds_its_own_disk_clock_certificates_and_a_place_out_of_reac
     assert {one.level for one in own.faults()} >= {"critical", "warning", "watch"}
     bench.store.own_faults = own.faults()
     assert {one.id for one in bench_alarms(bench.store)} == found | {"place-lab"}
+    on_page, _ = watched(bench.store)
+    assert {one.id for one in on_page} == found | {"place-lab"}
+    assert on_page[0].level == pb.Alarm.LEVEL_CRITICAL and all(one.raised_utc_ns for one in on_page)
 
 
 # --- REST and the page
