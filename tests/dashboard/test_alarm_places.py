@@ -234,6 +234,7 @@ def test_who_is_silent_at_a_place_out_of_reach_is_not_blamed_for_it(bench):
     """The gateway, its estimators and the recorder are silent as the link is cut."""
     everybody(bench)
     bench.beats("lab", "recorder")
+    bench.token("lab", "recorder")
     bench.sample()
     store = bench.store
     for topic, estimator in ((tp.LINK, ""), (tp.ESTIMATOR, "products-ekf")):
