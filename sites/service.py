@@ -93,7 +93,7 @@ def run(
                 one.undeclare()
         else:
             with beside(session):
-                copy(Copies(sessions, folder), place.site, session, stop)
+                copy(Copies(sessions, folder, place.home, place.place), place.site, session, stop)
         keeping.join(ASK_S + 1.0)
 
 
@@ -145,7 +145,16 @@ def _keep_certificates(
             loop.turn()
             if time.monotonic() >= due:
                 with loop.during("renewing certificates", RENEW_S):
-                    due = time.monotonic() + (LOOK_S if look(folder, place, ask) else AGAIN_S)
+                    good = _looked(folder, place, ask)
+                due = time.monotonic() + (LOOK_S if good else AGAIN_S)
+
+
+def _looked(folder: Path, place: Place, ask: Callable[[bytes], bytes]) -> bool:
+    try:
+        return look(folder, place, ask)
+    except (SiteError, OSError) as error:  # a file that cannot be read now may be again
+        log.warning("certificates are not looked after: %s", error)
+        return False
 
 
 def look(folder: Path, place: Place, ask: Callable[[bytes], bytes]) -> bool:
@@ -178,11 +187,12 @@ def renew(folder: Path, role: str, ask: Callable[[bytes], bytes]) -> None:
 
 def own_certificates(folder: Path) -> dict[str, dt.datetime]:
     """By role the end of each certificate that this place has."""
-    found = {}
-    for path in sorted(folder.glob("*.pem")):
-        if path.name != TRUSTED:
-            found[path.stem] = _read(path).not_valid_after_utc
-    return found
+    return {role: _read(folder / f"{role}.pem").not_valid_after_utc for role in own_roles(folder)}
+
+
+def own_roles(folder: Path) -> list[str]:
+    """Roles of which this place has a certificate, whatever is in its file."""
+    return sorted(path.stem for path in folder.glob("*.pem") if path.name != TRUSTED)
 
 
 def _life(folder: Path, role: str) -> dt.timedelta:
@@ -194,7 +204,10 @@ def _read(path: Path) -> x509.Certificate:
     try:
         return x509.load_pem_x509_certificate(path.read_bytes())
     except (OSError, ValueError) as error:
-        raise SiteError(f"{path}: cannot be read: {error}") from None
+        raise SiteError(
+            f"{path}: cannot be read: {str(error).partition('. ')[0]}; at the site's home `gyrofree"
+            f" certs renew {path.stem}` makes it anew, elsewhere restore it from a backup"
+        ) from None
 
 
 def _asker(

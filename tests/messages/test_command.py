@@ -2,6 +2,7 @@
 
 import contextlib
 import threading
+from collections import deque
 
 import pytest
 from hypothesis import given
@@ -11,11 +12,12 @@ from support.waiting import until
 from dashboard.desk import Desk
 from messages.bus import orders
 from messages.bus.command import state
-from messages.bus.command.history import KEPT, History
+from messages.bus.command.history import KEPT, History, newest_of
 from messages.bus.command.keeper import Keeper
 from messages.bus.command.state import Held, Refusal, Seat
-from messages.bus.session import BusSettings, open_client, open_router
+from messages.bus.session import BusSettings, Publishers, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import ORDER
 
 SEATS = [Seat(f"s{n}", f"user{n}", "lab", admin=n == 2) for n in range(3)]
 VERBS = {
@@ -217,6 +219,14 @@ def test_a_sign_in_that_ends_lets_go_and_a_keeper_that_was_killed_knows_still(si
     assert site.anna.status.holder.user == "anna"
 
 
+def test_an_order_is_of_the_place_that_its_key_says_whatever_is_in_it(site):
+    done = pb.OrderGiven.OUTCOME_DONE
+    said = pb.OrderGiven(at_utc_ns=1, user="otto", place="lab", what="forged", outcome=done)
+    Publishers(site.session, "t").put(ORDER, "office", said)
+    until(lambda: site.otto.history("forged", 5)[0], "it is kept")
+    assert [one.place for one in site.otto.history("forged", 5)[0]] == ["office"]
+
+
 def test_without_a_keeper_everybody_orders_as_before(bus):
     with open_client(bus, timeout_s=20.0) as session:
         taken = []
@@ -232,3 +242,23 @@ def test_without_a_keeper_everybody_orders_as_before(bus):
         rows, why = desk.history("otto", 5)
         assert [one.what for one in rows] == ["start one"] and "gyrofree procedures" in why
         taking.undeclare()
+
+
+def test_an_order_that_is_given_while_the_history_is_read_disturbs_nobody():
+    kept = deque([pb.OrderGiven(user="ada"), pb.OrderGiven(user="bob")])
+
+    class Meanwhile(list):
+        """Words; while one is compared another order comes, as from a second thread."""
+
+        def __iter__(self):
+            kept.append(pb.OrderGiven(user="eve"))
+            return super().__iter__()
+
+    class Asked(str):
+        def lower(self):
+            return self
+
+        def split(self, *_):
+            return Meanwhile(["ada"])
+
+    assert [one.user for one in newest_of(kept, Asked(), 10)] == ["ada"]

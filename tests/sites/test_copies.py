@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from support.stack import free_port
 
 from messages.bus.session import BusSettings, open_client, open_router
+from sessions.library.copied import read_copied
 from sites.copying.fetching import BOOK, Copies, load_copies
 from sites.copying.gathering import AT_ONCE, Drafts, Gathering, Segment
 from sites.copying.serving import Answers
@@ -92,6 +93,10 @@ def test_newest_first_equal_and_proven_and_asked_for_once(roots: tuple[Path, Pat
     known = load_copies(place)[ONE]["files"]["recording.mcap"]
     content = (there / ONE / "recording.mcap").read_bytes()
     assert known["home_sha256"] == known["here_sha256"] == hashlib.sha256(content).hexdigest()
+    copied = read_copied(here / ONE)
+    assert copied.files["recording.mcap"].equal and set(copied.files) == set(
+        load_copies(place)[ONE]["files"]
+    )
     home.asked.clear()
     assert go(Copies(here, place), home) == 0
     assert [each.split("/")[0] for each in home.asked] == ["index"]
