@@ -14,6 +14,7 @@ import ctypes
 import ipaddress
 import os
 import socket
+import struct
 import threading
 from pathlib import Path
 
@@ -21,6 +22,7 @@ GIVEN_UP_MS = 4_000
 AGAIN_MS = 1_000  # at most, before what was lost is sent again; the least that Linux takes
 UNSENT = 8_192  # bytes that wait in the kernel
 LOOK_S = 0.5
+LINGER = struct.pack("ii", 1, 1)  # on, s: Zenoh waits 10 s in close() for what nobody takes
 PIDFD_GETFD = 438  # linux/unistd.h, the same on every machine
 RTO_MAX_MS, NOTSENT_LOWAT = 44, 25  # linux/tcp.h, not in every Python
 OPTIONS = (
@@ -71,6 +73,7 @@ def _copy(pidfd: int, descriptor: int) -> int:
 
 
 def _set(one: socket.socket) -> None:
+    one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, LINGER)
     for option, value in OPTIONS:
         with contextlib.suppress(OSError):  # a kernel that does not know it
             if one.getsockopt(socket.IPPROTO_TCP, option) != value:

@@ -92,7 +92,7 @@ def stops(arguments: argparse.Namespace, folder: Path, line: Line) -> dict[str, 
     found = {}
     for link in ("bad", "cut"):
         with begun(arguments, folder / link, line, services=(("up",),)) as site:
-            until(lambda: _says(site.lab) and _says(site.office), PATIENCE_S, "both places up")
+            until(lambda: _says(site.lab) and _says(site.office), 2 * PATIENCE_S, "both up")
             put(site, arguments.copy or 9_000_000, 0)
             time.sleep(15.0)
             if link == "cut":

@@ -6,7 +6,7 @@ import socket
 import subprocess
 import sys
 
-from messages.bus.timeouts import GIVEN_UP_MS, NOTSENT_LOWAT, UNSENT, look
+from messages.bus.timeouts import GIVEN_UP_MS, LINGER, NOTSENT_LOWAT, UNSENT, look
 
 
 def given_up_ms(one: socket.socket) -> int:
@@ -31,6 +31,8 @@ def test_sockets_of_this_machine_and_what_is_no_tcp_stay_as_they_are():
         assert [given_up_ms(one) for one in (here, client, mapped)] == [0, 0, 0]
         unsent = [one.getsockopt(socket.IPPROTO_TCP, NOTSENT_LOWAT) for one in (far, six, client)]
         assert unsent == [UNSENT, UNSENT, 0]
+        lingers = [one.getsockopt(socket.SOL_SOCKET, socket.SO_LINGER, 8) for one in (far, client)]
+        assert lingers == [LINGER, bytes(8)]
         assert len(os.listdir("/proc/self/fd")) == files
 
 
