@@ -7,6 +7,7 @@ import logging
 import socket
 import sys
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -38,6 +39,7 @@ from sessions.library.catalogue import Catalogue
 
 log = logging.getLogger(__name__)
 
+SAY_S = 10.0  # between two words that no file is left
 STOP_LOOK_S = 0.1  # s between two looks at the stop event
 # Bytes of a connection that wait in the kernel, which would take 4 MB: one that takes nothing is
 # noticed by what waits here.
@@ -63,6 +65,28 @@ class _Server(uvicorn.Server):
     @contextlib.contextmanager
     def capture_signals(self) -> Any:
         yield
+
+
+class NoFiles:
+    """Said once in a while where no file is left for another connection: asyncio would log a
+    traceback for each place of the backlog, every second.
+    """
+
+    def __init__(self) -> None:
+        self._said = -SAY_S
+
+    def __call__(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        """What the event loop does with a fault that nobody waits for."""
+        error = context.get("exception")
+        if not isinstance(error, OSError) or error.errno not in (errno.EMFILE, errno.ENFILE):
+            loop.default_exception_handler(context)
+        elif time.monotonic() - self._said >= SAY_S:
+            self._said = time.monotonic()
+            log.error(
+                "no file is left for another connection (%s): others wait; raise the limit"
+                " (LimitNOFILE), or lower [dashboard] connections",
+                error.strerror,
+            )
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -117,6 +141,7 @@ def serve(front: Front, bound: socket.socket, stop: threading.Event) -> None:
     server = _Server(config)
 
     async def until_stopped() -> None:
+        asyncio.get_running_loop().set_exception_handler(NoFiles())
         serving = asyncio.create_task(server.serve(sockets=[bound]))
         with Loop("web server") as loop:
             while not stop.is_set() and not serving.done():

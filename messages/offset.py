@@ -16,6 +16,7 @@ cannot both be true say that another machine answers, or that it began anew; old
 """
 
 from collections import deque
+from collections.abc import Iterable
 from typing import NamedTuple
 
 WINDOW = 8  # questions, as in RFC 5905
@@ -60,7 +61,9 @@ class Exchange(NamedTuple):
 
 
 class Offset:
-    """The other's wall clock minus our elapsed time, as the last questions tell it."""
+    """The other's wall clock minus our elapsed time, as the last questions tell it. One thread may
+    take answers while others ask.
+    """
 
     def __init__(self) -> None:
         self._kept: deque[Exchange] = deque(maxlen=WINDOW)
@@ -72,7 +75,7 @@ class Offset:
         if one.t4 < one.t1 or one.t3 < one.t2 or one.delta_ns < -one.drift_ns - ROUNDED_NS:
             self.refused += 1
             return
-        new, before = one.measured, self._best(one.t4)
+        new, before = one.measured, _best(self._kept, one.t4)
         if before is not None and abs(new.theta_ns - before.theta_ns) > (
             new.bound_ns + before.bound_ns
         ):
@@ -84,20 +87,22 @@ class Offset:
         """The best of them at an elapsed time, with the wall clock of the newest answer; None where
         none is young enough.
         """
-        best = self._best(now_ns)
+        kept = tuple(self._kept)  # in one piece: an answer may come meanwhile
+        best = _best(kept, now_ns)
         if best is None:
             return None
-        return best._replace(theta_ns=best.theta_ns + self._kept[-1].wall)
+        return best._replace(theta_ns=best.theta_ns + kept[-1].wall)
 
     def elapsed(self, now_ns: int) -> Measured | None:
         """The same of both elapsed times, which nobody sets."""
-        return self._best(now_ns)
+        return _best(tuple(self._kept), now_ns)
 
-    def _best(self, now_ns: int) -> Measured | None:
-        """Of elapsed times (T-3)."""
-        found = [
-            Measured(one.measured.theta_ns, one.measured.bound_ns + DRIFT * (now_ns - one.t4))
-            for one in self._kept
-            if now_ns - one.t4 <= OLD_NS
-        ]
-        return min(found, key=lambda one: one.bound_ns, default=None)
+
+def _best(kept: Iterable[Exchange], now_ns: int) -> Measured | None:
+    """Of elapsed times (T-3)."""
+    found = [
+        Measured(one.measured.theta_ns, one.measured.bound_ns + DRIFT * (now_ns - one.t4))
+        for one in kept
+        if now_ns - one.t4 <= OLD_NS
+    ]
+    return min(found, key=lambda one: one.bound_ns, default=None)

@@ -66,6 +66,8 @@ def router(config: Config = None, verbose: Verbose = False) -> None:
             return
         with Zenohd(bus, rules, mesh, stop, die_with_parent) as program:
             log.info("%s routes", bus.zenohd)
+            if bus.tls is not None:
+                timeouts.watch(stop, program.pid)
             serve(program.session, program.wait)
 
     run_service(body, verbose, attended(settings, "router"))

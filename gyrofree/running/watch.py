@@ -2,6 +2,7 @@
 there.
 """
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -72,10 +73,9 @@ class Watch:
                 said = True
                 greeter.say()
             elif time.monotonic() > deadline:
-                raise fail(
-                    f"the dashboard does not answer after {WAIT_FOR_PAGE:g} s; the log above"
-                    " says why"
-                )
+                deadline = math.inf  # a machine that starts slowly ends no recording by it
+                text = f"the dashboard does not answer after {WAIT_FOR_PAGE:g} s"
+                supervisor.say(f"{text}: does the log say why? all else goes on", "yellow")
 
 
 class _Greeter:

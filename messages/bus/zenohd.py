@@ -116,6 +116,11 @@ class Zenohd:
                 if self._stop.is_set():
                     raise
 
+    @property
+    def pid(self) -> int:
+        """Of the program."""
+        return self._process.pid
+
     def wait(self, look: Callable[[], object] = lambda: None) -> None:
         """Until `stop`; raises BusUnavailable where the program ends before. look(): is called a
         few times a second.

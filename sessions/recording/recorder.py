@@ -140,8 +140,9 @@ class Recorder:
         if store is not None and now - self._last_flush >= self.settings.flush_s:
             self._last_flush = now
             store.flush()
-            if store.size >= self.settings.max_file_bytes:
+            if store.astray or store.size >= self.settings.max_file_bytes:
                 self._rotate(store)
+                self._message = self._message or store.astray
 
     def _drain(self) -> None:
         store, inbox = self._store, self._inbox
@@ -156,11 +157,8 @@ class Recorder:
         store.manifest.refused = self._door.by_device()
         store.manifest.unknown = self._door.refused["key"]
         if self._overflow:
-            log.error(
-                "%s: %d messages came faster than they can be written",
-                store.manifest.id,
-                self._overflow,
-            )
+            said = "%s: %d messages came faster than they can be written"
+            log.error(said, store.manifest.id, self._overflow)
             store.manifest.overflow += self._overflow
             self._overflow = 0
 

@@ -35,6 +35,13 @@ from sessions.recording.settings import RecorderSettings
 
 log = logging.getLogger(__name__)
 
+
+class AnotherDisk(OSError):
+    """What is written to is not what stands in the session's folder any more: the disk was mounted
+    anew under it.
+    """
+
+
 LATEST_NS = (1 << 63) - 1
 MANIFEST_EVERY_S = 5.0  # counts in session.json of an open session are at most this old
 
@@ -72,6 +79,9 @@ class SessionStore:
         self.manifest = manifest
         self.durable_messages = 0
         self._write_error = self._sync_error = ""
+        self.astray = (
+            ""  # says so where what is written goes into a file that nobody finds any more
+        )
         self._settings = settings
         self._keys: dict[str, KeyState] = {}
         self._witness = Witness()
@@ -165,18 +175,35 @@ class SessionStore:
 
     def flush(self) -> None:
         """Close the running chunk and hand it to the operating system; a refusal is kept in
-        `error`.
+        `error`. Raises AnotherDisk where writing again would never help.
         """
         self._log.close_chunk()
         try:
             self._log.push()
         except OSError as error:
             self._fail("writing", error)
+            if self._place() == "another":
+                text = f"{self.folder}: its disk was mounted anew: beginning anew"
+                raise AnotherDisk(text) from None
             return
+        if self._place() != "ours":
+            self.astray = f"{self.folder} was deleted or moved: what it held is not here any more"
+            log.error("%s", self.astray)
         self._pushed = self._accepted
         self._news.set()
         self.manifest.bytes = self._log.size
         self._write_error = ""
+
+    def _place(self) -> str:
+        """What stands where the recording should: "ours"; "another" where a disk was mounted anew,
+        as one that failed takes nothing for ever from who had its files open; or "nothing".
+        """
+        try:
+            there, ours = os.stat(self.folder / RECORDING), os.fstat(self._fd)
+        except OSError:
+            return "nothing"
+        same = (there.st_dev, there.st_ino) == (ours.st_dev, ours.st_ino)
+        return "ours" if same else "another"
 
     def _fail(self, what: str, error: OSError) -> None:
         text = (

@@ -7,6 +7,7 @@ office, and the page's own feed (tests/support/far_watch.py); two network namesp
 link between them. Both places have this machine's clock, so ages are true.
 
 Usage: python tests/bench/bench_far.py [--json] [--congestion cubic|bbr] [--syn-retries 2]
+       [--zenohd PROGRAM, which routes at both places in place of our router]
        [--cuts 5,30,120] [--rate 1e6] [--delay 0.1] [--loss 0.05] [--seconds 60] [--copy 9000000]
        [--copies 1] [--board-rate 100] [--record 0] [--stops]
 
@@ -46,6 +47,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         found = (stops if arguments.stops else watched)(arguments, Path(folder), line)
     about = {"bench": "far", "congestion": arguments.congestion, "rate": line.rate}
+    about |= {"router": "zenohd" if arguments.zenohd else "gyrofree"}
     about |= {"delay_s": line.delay_s, "loss": line.loss, "board_hz": arguments.board_rate}
     if arguments.json:
         print(json.dumps(about | found))
@@ -63,6 +65,7 @@ def begun(arguments: argparse.Namespace, folder: Path, line: Line, **options):
         congestion=arguments.congestion,
         syn_retries=arguments.syn_retries,
         board=("--rate", str(arguments.board_rate)),
+        zenohd=arguments.zenohd,
         **options,
     )
 
@@ -126,6 +129,7 @@ def parsed() -> argparse.Namespace:
         "--cuts", default="5,30,120", type=lambda s: [float(x) for x in s.split(",") if x]
     )
     parser.add_argument("--syn-retries", type=int, default=2)
+    parser.add_argument("--zenohd", type=Path)
     parser.add_argument("--rate", type=float, default=1e6)
     parser.add_argument("--delay", type=float, default=0.1)
     parser.add_argument("--loss", type=float, default=0.05)

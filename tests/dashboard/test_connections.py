@@ -1,6 +1,9 @@
 """Connections that hang, drip or take nothing, many of them, and people who want to get in."""
 
+import asyncio
 import contextlib
+import os
+import resource
 import socket
 import time
 
@@ -9,6 +12,7 @@ import pytest
 from support.front_door import message, open_door
 from support.waiting import until
 
+from dashboard.service import NoFiles
 from dashboard.web import connections
 from dashboard.web.connections import trusted
 
@@ -225,3 +229,29 @@ def _opens(door, client) -> bool:
         time.sleep(0.1)
         return False
     return True
+
+
+def test_a_page_without_files_says_so_once_and_takes_who_waited_afterwards(caplog):
+    async def crowd() -> bytes:
+        loop = asyncio.get_running_loop()
+        loop.set_exception_handler(NoFiles())
+        server = await asyncio.start_server(lambda _, out: out.close(), "127.0.0.1", 0)
+        caller = socket.socket()
+        caller.setblocking(False)
+        limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+        with contextlib.ExitStack() as stack:
+            stack.callback(resource.setrlimit, resource.RLIMIT_NOFILE, limits)
+            lowest = os.dup(0)
+            os.close(lowest)
+            resource.setrlimit(resource.RLIMIT_NOFILE, (lowest, limits[1]))
+            await loop.sock_connect(caller, server.sockets[0].getsockname())
+            while not caplog.records:
+                await asyncio.sleep(0.01)
+        told = await loop.sock_recv(caller, 1)  # the end, from who took it at last
+        caller.close()
+        server.close()
+        return told
+
+    assert asyncio.run(crowd()) == b""
+    assert [record.exc_info for record in caplog.records] == [None]
+    assert "no file is left" in caplog.text

@@ -4,11 +4,11 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from messages.contract import rates
-from messages.contract.topics import ACCEL, LINK, RATE, parse
+from support.recorded import Recorded
+
+from messages.contract.topics import ACCEL, LINK, RATE, Address
 from sessions.library.catalogue import Catalogue
 from sessions.recording.certificate import HARMLESS, DeviceCertificate
-from sessions.recording.mcap_log import read
 
 DEVICE = "cube"
 
@@ -24,6 +24,7 @@ class Account:
     unestimated: int = 0  # samples without an estimate, between an estimator's first and last
     acknowledged_lost: int = 0  # messages that the recorder had called durable
     boots: int = 0
+    gone: int = 0  # sessions that were deleted
     complete: bool = True  # all of their certificates
     said_missing: int = 0  # samples, by the certificates
     said_lost: dict[str, int] = field(
@@ -36,38 +37,24 @@ class Account:
 def account(root: Path, sessions: list[str], durable: dict[str, int]) -> Account:
     """Read them all; `durable`: by session the messages that the recorder acknowledged."""
     made, catalogue = Account(sessions=sessions), Catalogue(root)
-    seen: set[tuple] = set()
-    samples: dict[int, set[int]] = defaultdict(set)
-    estimates: dict[tuple[str, int], set[int]] = defaultdict(set)
+    found = Recorded(_counted)
     for name in sessions:
-        rows = 0
-        for row in read(catalogue.path(name)):
-            rows += 1
-            address = parse(row.key)
-            if address.topic not in (ACCEL, RATE, LINK) or address.device != DEVICE:
-                continue
-            message = address.topic.type.FromString(row.payload)
-            at = (row.key, message.header.run, message.header.sequence)
-            made.twice += at in seen
-            seen.add(at)
-            if address.topic is ACCEL:
-                n = len(message.counts) // message.axes
-                samples[message.header.epoch].update(
-                    range(message.first_index, message.first_index + n)
-                )
-            elif address.topic is RATE:
-                first, n = message.for_index, rates.count(message)
-                estimates[row.key, message.header.epoch].update(range(first, first + n))
-        made.acknowledged_lost += max(0, durable.get(name, 0) - rows)
+        if not (root / name).exists():
+            made.gone += 1
+            continue
+        found.read(catalogue.path(name))
+        made.acknowledged_lost += max(0, durable.get(name, 0) - found.rows[name])
         _certificate(made, catalogue, name)
-    made.boots = len(samples)
-    for have in samples.values():
-        made.samples += len(have)
-        made.missing += max(have) - min(have) + 1 - len(have)
-    for (_, boot), have in estimates.items():
-        between = {i for i in samples[boot] if min(have) <= i <= max(have)}
-        made.unestimated += len(between - have)
+    made.boots = len(found.samples)
+    made.samples = sum(map(len, found.samples.values()))
+    made.missing, made.twice = found.missing, found.twice
+    made.unestimated = found.unestimated(to_the_end=False)
     return made
+
+
+def _counted(address: Address) -> bool:
+    """What a device's own services say: others may say anything."""
+    return address.topic in (ACCEL, RATE, LINK) and address.device == DEVICE
 
 
 def _certificate(made: Account, catalogue: Catalogue, name: str) -> None:

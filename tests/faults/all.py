@@ -7,14 +7,18 @@ from faults.of_processes import PROCESSES
 from faults.of_sites import SITES
 from faults.of_the_bus import BUS
 from faults.of_the_line import LINE
+from faults.of_the_link import LINK
+from faults.of_the_machine import MACHINE
 from faults.scenario import Scenario
 
 SCENARIOS: dict[str, tuple[Scenario, ...]] = {
     "The line and the board": LINE,
     "Processes": PROCESSES,
     "Disks and the clock": DISKS,
+    "Memory, files and journals": MACHINE,
     "The bus": BUS,
     "Certificates": SITES,
+    "The link between two places": LINK,
 }
 
 
@@ -58,6 +62,30 @@ PROOFS = (
         "nothing; the axis is left out and named",
         "`axes`, alarms `axis-...`",
         ("inertial/test_health.py", "gyrofree/test_alarms.py"),
+    ),
+    Proof(
+        "axes are exchanged in the settings; the board moves while it levels",
+        "nothing; the axes are left out, levelling begins again",
+        "`axes`, the reason in the filter's state",
+        (
+            "logs/test_cube_parts.py::test_swapped_axes_are_named_and_left_out",
+            "inertial/test_alignment.py::test_moving_during_levelling_begins_it_again_and_says_why",
+        ),
+    ),
+    Proof(
+        "positions jump, are dragged away slowly, or stay away for long",
+        "the fixes that are not believed",
+        "alarm `contradicted-...`; sigma and the age of the fix grow",
+        (
+            "inertial/test_drag.py",
+            "inertial/test_navigation.py::test_sigma_and_fix_age_grow_in_an_outage",
+        ),
+    ),
+    Proof(
+        "a line ten times as fast as any board",
+        "what is beyond the buffers, counted",
+        "the link's message: reading waits",
+        ("gateway/test_backlog.py",),
     ),
     Proof(
         "GNSS: no fix, a wrong checksum, a week that begins anew, a leap second, midnight",
@@ -138,6 +166,15 @@ PROOFS = (
         ("dashboard/test_connections.py", "dashboard/test_api.py"),
     ),
     Proof(
+        "bodies that are no JSON, too deep or of no numbers; names that lead out of the folder",
+        "nothing",
+        "the answer names what is wrong, never an error of the server",
+        (
+            "dashboard/test_api.py::test_bad_bodies_are_named_and_never_a_server_fault",
+            "dashboard/test_api.py::test_paths_do_not_leave_the_folder",
+        ),
+    ),
+    Proof(
         "guessing, an expired or revoked sign-in, a viewer's orders, another site's requests",
         "nothing",
         "who did what, on the page of admins",
@@ -154,6 +191,15 @@ PROOFS = (
         "nothing is started",
         "file, line, section and the nearest key",
         ("gyrofree/test_config.py", "gyrofree/test_broken_files.py"),
+    ),
+    Proof(
+        "services start in any order; a port is taken",
+        "nothing; nothing is started at another port",
+        "which port, and what to do",
+        (
+            "messages/test_messages.py::test_a_client_may_start_before_its_router_and_messages_arrive",
+            "gyrofree/test_cli.py::test_a_taken_port_is_said_and_no_other_is_used",
+        ),
     ),
     Proof(
         "notices cannot be delivered",

@@ -4,15 +4,14 @@
 that it can be away. Where this is root, recordings and journals lie on small disks of their own.
 """
 
+import contextlib
 import os
-import re
 import signal
 import subprocess
-import sys
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Self
 
@@ -22,15 +21,14 @@ from support.wall_clock import SlowSync, WallClock
 
 from faults.board import Board
 from faults.disk import Disk
+from faults.ground import Ground, services_below
 from faults.watch import ESTIMATORS, Watch
 from gyrofree.running.process import command
 from messages.bus.session import BusSettings
 from sites.joining import make_site
 
 ROOT = Path(__file__).resolve().parents[2]
-PATIENCE_S = 180.0  # a busy machine; nothing is judged by it
 STOP_S = 20.0
-LOOK_S = 0.05
 SERVICES = ("gateway", "estimator", "record", "procedures", "alarms", "dashboard")
 CONFIGURATION = """
 [bus]
@@ -64,18 +62,18 @@ sessions_root = "{sessions}"
 """
 
 
-class NotWell(AssertionError):
-    """It did not become as it was wanted, with the end of the log."""
-
-
-class Bench:
+class Bench(Ground):
     """A context manager; everything of it ends with it."""
 
-    def __init__(self, folder: Path, site: str = "") -> None:
-        """site: its name, where all links are encrypted and each process has its certificate."""
+    def __init__(self, folder: Path, site: str = "", disk: type[Disk] = Disk) -> None:
+        """site: its name, where all links are encrypted and each process has its certificate.
+        disk: of what kind those of recordings and journals are. Raises NoDevice.
+        """
+        self.log = folder / "up.log"
+        super().__init__(self.log)
         folder.mkdir(parents=True, exist_ok=True)
         self.folder = folder
-        self.sessions, self.journals = Disk(folder / "sessions"), Disk(folder / "journals")
+        self.sessions, self.journals = disk(folder / "sessions"), disk(folder / "journals")
         self.wall = WallClock(folder / "wall")
         self.sync = SlowSync(folder / "sync", self.wall.environment)
         self.site = folder / "site" if site else None
@@ -88,7 +86,6 @@ class Bench:
         self.port = free_port()
         self.config = folder / "gyrofree.toml"
         self.board = Board(folder / "board")
-        self.log = folder / "up.log"
         self._router: subprocess.Popen | None = None
         self._up: subprocess.Popen | None = None
         self.config.write_text(
@@ -156,6 +153,13 @@ class Bench:
         self.ended, self._up = self._up.returncode, None
         return time.monotonic() - began
 
+    def kill_all(self) -> None:
+        """kill -9 of everything at once."""
+        for process in [psutil.Process(self._up.pid), *sum(self._all().values(), [])]:
+            process.kill()
+        self._up.wait()
+        self.stop_router()
+
     def start_router(self) -> None:
         """In a process of its own."""
         self._router = self._start("router", log=self.folder / "router.log")
@@ -167,16 +171,32 @@ class Bench:
             self._router.wait()
             self._router = None
 
-    def _start(self, *words: str, log: Path) -> subprocess.Popen:
+    def _start(self, *words: str, log: Path, config: Path | None = None) -> subprocess.Popen:
         with log.open("ab") as stream:
             return subprocess.Popen(
-                command(*words, "--config", str(self.config)),
+                command(*words, "--config", str(config or self.config)),
                 stdin=subprocess.DEVNULL,
                 stdout=stream,
                 stderr=stream,
                 env=self.sync.environment,
                 cwd=self.folder,
             )
+
+    @contextlib.contextmanager
+    def another(self, service: str, **changed: object) -> Iterator[subprocess.Popen]:
+        """A second process of a service; changed: texts of the configuration and what stands there
+        for it.
+        """
+        text, config = self.config.read_text(), self.config.with_name("another.toml")
+        for old, new in changed.items():
+            text = text.replace(f"{self.folder}/{old}", f"{self.folder}/{new}")
+        config.write_text(text)
+        process = self._start(service, log=self.log, config=config)
+        try:
+            yield process
+        finally:
+            process.terminate()
+            process.wait(STOP_S)
 
     def children(self) -> dict[str, psutil.Process]:
         """By service its process; of the gateway, which is guarded, the one that serves."""
@@ -192,23 +212,15 @@ class Bench:
         return self._all().get(service, [])
 
     def _all(self) -> dict[str, list[psutil.Process]]:
-        found: dict[str, list[psutil.Process]] = {}
-        if self._up is None:
-            return found
-        below = psutil.Process(self._up.pid).children(recursive=True)
-        for process in sorted(below, key=lambda p: p.pid):
-            try:
-                words = process.cmdline()
-            except psutil.Error:
-                continue  # it has just ended
-            if "gyrofree" in words:
-                found.setdefault(words[words.index("gyrofree") + 1], []).append(process)
-        return found
+        return {} if self._up is None else services_below(self._up.pid)
 
     def signal(self, service: str, number: signal.Signals) -> None:
         """Send it to a service; "router" is one."""
-        pid = self._router.pid if service == "router" else self.children()[service].pid
-        os.kill(pid, number)
+        os.kill(self.pid(service), number)
+
+    def pid(self, service: str) -> int:
+        """Of a service; "router" is one."""
+        return self._router.pid if service == "router" else self.children()[service].pid
 
     def kill(self, service: str) -> None:
         """kill -9, and until there is another one."""
@@ -225,19 +237,6 @@ class Bench:
         time.sleep(seconds)
         self.signal(service, signal.SIGCONT)
 
-    def text(self) -> str:
-        """The log of all services so far."""
-        return self.log.read_text(errors="replace")
-
-    def until(self, condition: Callable[[], object], what: str) -> float:
-        """Wait for it; how long it took, s. Raises NotWell."""
-        began = time.monotonic()
-        while not condition():
-            if time.monotonic() - began > PATIENCE_S:
-                raise NotWell(f"no {what} within {PATIENCE_S:g} s:\n{self.text()[-4000:]}")
-            time.sleep(LOOK_S)
-        return time.monotonic() - began
-
     def well(self, since_ns: int = 0) -> bool:
         """Is everything there: each service, the newest samples with their estimates, the
         recording without a gap, and the page? since_ns: monotonic; nothing older counts.
@@ -251,12 +250,3 @@ class Bench:
                 return True
         except (urllib.error.URLError, OSError):
             return False
-
-    def said(self, pattern: str, since: int) -> bool:
-        """Does the log have such a line behind the character `since`?"""
-        return re.search(pattern, self.text()[since:]) is not None
-
-
-def python(*words: str) -> list[str]:
-    """A script that plays a foreign program."""
-    return [sys.executable, "-P", *words]

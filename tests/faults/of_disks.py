@@ -1,13 +1,15 @@
 """Faults of disks and of the clock."""
 
+import shutil
 import time
 
 from faults.bench import Bench
-from faults.disk import Disk
-from faults.scenario import Alarmed, Scenario, Status
+from faults.disk import Device, Disk
+from faults.scenario import Alarmed, Line, Loss, Scenario, Status
 
 FULL_S = 3.0
 SLOW_S = 2.0  # of each fsync
+HANG_S = 4.0
 HOUR_S = 3600.0
 STEP_S = 2.5  # that a clock is left as it was set
 
@@ -24,10 +26,31 @@ def full(disk: Disk) -> None:
     disk.free()
 
 
+def read_only(disk: Device) -> None:
+    """The kernel finds an error on it; a person unmounts, checks and mounts it again."""
+    disk.fail()
+    time.sleep(FULL_S)
+    disk.replace()
+
+
+def hangs(disk: Device) -> None:
+    """Who writes on it waits."""
+    disk.hang(True)
+    time.sleep(HANG_S)
+    disk.hang(False)
+
+
+def deleted(bench: Bench) -> None:
+    """Somebody tidies up."""
+    shutil.rmtree(bench.sessions.path / bench.watch.newest("status").session)
+    bench.hear("recorder")
+
+
 def slow(bench: Bench) -> None:
-    """Each fsync takes seconds."""
+    """Each fsync takes seconds, until that is said."""
     bench.sync.set(SLOW_S)
     time.sleep(3 * SLOW_S)
+    bench.hear("link-said", "recorder")
     bench.sync.set(0.0)
 
 
@@ -42,6 +65,9 @@ def steps(state) -> bool:
     return state.clock_steps > 0
 
 
+READ_ONLY = Status(
+    "`message` of the recorder", "states", lambda state: "Read-only" in state.message
+)
 DISKS = (
     Scenario(
         "disk of the recordings full",
@@ -63,13 +89,48 @@ DISKS = (
     ),
     Scenario(
         "slow disk",
-        "each `fsync` takes 2 s longer, for 6 s",
+        "each `fsync` takes 2 s longer, for 6 s and until that is said",
         slow,
         said=(
             Alarmed("link-said"),
             Alarmed("recorder"),
             Status("`message` of the recorder", "states", lambda state: "slow" in state.message),
         ),
+    ),
+    Scenario(
+        "disk of the recordings read-only",
+        f"the kernel finds an error on it; unmounted, checked and mounted again after {FULL_S:g} s",
+        lambda bench: read_only(bench.sessions),
+        said=(Alarmed("recorder"), READ_ONLY, Line("its disk was mounted anew: beginning anew")),
+        on="device",
+    ),
+    Scenario(
+        "disk of the journals read-only",
+        f"the kernel finds an error on it; unmounted, checked and mounted again after {FULL_S:g} s",
+        lambda bench: read_only(bench.journals),
+        said=(Alarmed("link-said"), Line("data are shown but NOT KEPT"), Line("writable again")),
+        on="device",
+    ),
+    Scenario(
+        "disk of the recordings hangs",
+        f"who writes waits, for {HANG_S:g} s",
+        lambda bench: hangs(bench.sessions),
+        on="device",
+    ),
+    Scenario(
+        "disk of the journals hangs",
+        f"who writes waits, for {HANG_S:g} s",
+        lambda bench: hangs(bench.journals),
+        Loss("what the line's buffer does not hold meanwhile", (0, 300), complete=None),
+        (Alarmed("link"), Status("`stops` of the link", "links", lambda link: link.stops > 0)),
+        on="device",
+    ),
+    Scenario(
+        "recording deleted",
+        "`rm -r` of its folder while it is written",
+        deleted,
+        Loss("what it held; another recording goes on", gone=1),
+        (Alarmed("recorder"), Line("was deleted or moved: what it held is not here any more")),
     ),
     Scenario(
         "clock set back by an hour",

@@ -42,7 +42,7 @@ def alarm(role: str) -> Alarmed:
 
 def hold(bench: Bench, service: str, thread: str, role: str) -> None:
     """Stop one thread of a service until its alarm is there, as a debugger does."""
-    with held(bench.children()[service].pid, thread):
+    with held(bench.pid(service), thread):
         about = f"service-here-{role}"
         bench.until(lambda: about in bench.watch.alarms, f"alarm {about}")
 
@@ -89,14 +89,15 @@ def stop_supervisor(bench: Bench) -> None:
     up.resume()
 
 
-def up_killed(bench: Bench) -> None:
-    """Everything but the router ends, and is started anew."""
-    bench.stop_up(signal.SIGKILL)
+def all_killed(bench: Bench) -> None:
+    """Everything at once, as without power, and all is started again."""
+    bench.kill_all()
+    bench.start_router()
     bench.start_up()
 
 
-def dark(counted: Account) -> bool:
-    return counted.dark_s > 0.0 or not counted.missing
+def certified(counted: Account) -> bool:
+    return counted.missing == counted.said_missing
 
 
 PROCESSES = (
@@ -116,11 +117,18 @@ PROCESSES = (
         "guardian killed",
         "`kill -9` of the gateway's guardian",
         guardian_killed,
-        Loss("what the board says while the port changes hands", (0, 500), complete=None),
+        Loss("what the board says while the port changes hands", (0, 3000), complete=None),
         (
             Line("the process that guards this one is gone: handing over"),
-            Certified("`dark_s` of the certificate, where samples are missing", dark),
+            Certified("`missing_samples` of the certificate", certified),
         ),
+    ),
+    Scenario(
+        "everything killed",
+        "`kill -9` of all processes at once, guardian and router too, and all is started again",
+        all_killed,
+        Loss("what the board says until its port is open again", (0, 6000), complete=None),
+        (Line("recovered"), Line("going on where")),
     ),
     frozen(
         "gateway",
@@ -130,14 +138,15 @@ PROCESSES = (
     frozen("record", 5.0, alarm("recorder")),
     frozen("estimator", 5.0, alarm("estimator"), Alarmed("estimator-products-ekf")),
     frozen("procedures", 5.0, alarm("procedures")),
-    frozen("alarms", 5.0),
+    frozen("alarms", 5.0),  # nobody else says what is wrong
     frozen("dashboard", 5.0, alarm("dashboard")),
-    frozen("router", 8.0),
+    frozen("router", 8.0, Alarmed("link")),
     stands("gateway", "gateway", "link cube"),
     stands("record", "recorder"),
     stands("estimator", "estimator", "estimator", Alarmed("estimator-products-ekf")),
     stands("procedures", "procedures"),
     stands("dashboard", "dashboard"),
+    stands("router", "router"),
     Scenario(
         "up stopped for 5 s",
         "SIGSTOP of the supervisor, SIGCONT after 5 s",

@@ -48,7 +48,7 @@ def of(role: str, *said) -> Scenario:
         f"in mid-session; renewed after {ENDED_S:g} s",
         lambda bench: ended(bench, role),
         said=said,
-        site=SITE,
+        on="site",
     )
 
 

@@ -25,6 +25,7 @@ class Watch:
         self._lock = threading.Lock()
         self._heard: dict[str, tuple[int, object]] = {}  # monotonic ns, message
         self._rates: dict[str, tuple[int, int]] = {}  # boot and index of the newest estimate
+        self._recorded = False  # a recording was ordered
         self.durable: dict[str, int] = {}  # by session the messages that were acknowledged
         self.recording: list[str] = []  # sessions, in the order in which they began
         self.alarms: set[str] = set()  # ids that were ever active since `begin`
@@ -76,15 +77,18 @@ class Watch:
             boot != accel.header.epoch or accel.first_index - index > BEHIND
             for boot, index in self._rates.values()
         ]
-        return link.connected and bool(behind) and not any(behind) and not status.repairing
+        whole = status.recording == self._recorded and not status.repairing
+        return link.connected and bool(behind) and not any(behind) and whole
 
     def record(self, name: str) -> None:
         """Begin a session; raises orders.OrderError."""
         order = pb.RecorderCommand(action=pb.RecorderCommand.ACTION_START, name=name, user="faults")
         orders.give(self.session, self._prefix, orders.RECORDER, order, timeout_s=ORDER_S)
+        self._recorded = True
 
     def stop(self) -> None:
         """End it; raises orders.OrderError."""
+        self._recorded = False
         order = pb.RecorderCommand(action=pb.RecorderCommand.ACTION_STOP, user="faults")
         orders.give(self.session, self._prefix, orders.RECORDER, order, timeout_s=ORDER_S)
 

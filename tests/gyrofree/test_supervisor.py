@@ -4,14 +4,16 @@ import io
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import pytest
 from rich.console import Console
 
+from gyrofree.config import Settings
 from gyrofree.running.supervisor import Supervisor
-from gyrofree.running.watch import BEGINNING, QUIET, SCREENFUL, _Greeter
+from gyrofree.running.watch import BEGINNING, QUIET, SCREENFUL, Watch, _Greeter
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -186,3 +188,22 @@ def test_the_address_is_said_again_below_what_covers_it(supervisor, monkeypatch)
     assert said_after(QUIET + 1) == 0  # a file is no screen
     supervisor.console._force_terminal = True
     assert said_after(QUIET + 1) == 1 and said_after(QUIET + 1) == 0
+
+
+def test_a_page_that_takes_its_time_ends_nothing_else(supervisor, monkeypatch, free_port):
+    monkeypatch.setattr("gyrofree.running.watch.WAIT_FOR_PAGE", 0.0)
+    settings = Settings(dashboard={"port": free_port})
+    supervisor.add_script(
+        "worker", "import time; print('INFO it works', flush=True); time.sleep(60)"
+    )
+    stop, watched = threading.Event(), Watch(supervisor, settings, lambda: [("open  here", "")])
+    looking = threading.Thread(target=watched.run, args=(stop,))
+    looking.start()
+    end = time.monotonic() + 30.0
+    while "it works" not in text(supervisor) and time.monotonic() < end:
+        time.sleep(0.02)
+    stop.set()
+    looking.join(30.0)
+    said = text(supervisor)
+    assert said.count("does not answer") == 1 and "stopped cleanly" in said
+    assert said.index("does not answer") < said.index("it works") < said.index("stopping")

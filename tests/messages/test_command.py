@@ -2,6 +2,7 @@
 
 import contextlib
 import threading
+from collections import deque
 
 import pytest
 from hypothesis import given
@@ -11,7 +12,7 @@ from support.waiting import until
 from dashboard.desk import Desk
 from messages.bus import orders
 from messages.bus.command import state
-from messages.bus.command.history import KEPT, History
+from messages.bus.command.history import KEPT, History, newest_of
 from messages.bus.command.keeper import Keeper
 from messages.bus.command.state import Held, Refusal, Seat
 from messages.bus.session import BusSettings, Publishers, open_client, open_router
@@ -241,3 +242,23 @@ def test_without_a_keeper_everybody_orders_as_before(bus):
         rows, why = desk.history("otto", 5)
         assert [one.what for one in rows] == ["start one"] and "gyrofree procedures" in why
         taking.undeclare()
+
+
+def test_an_order_that_is_given_while_the_history_is_read_disturbs_nobody():
+    kept = deque([pb.OrderGiven(user="ada"), pb.OrderGiven(user="bob")])
+
+    class Meanwhile(list):
+        """Words; while one is compared another order comes, as from a second thread."""
+
+        def __iter__(self):
+            kept.append(pb.OrderGiven(user="eve"))
+            return super().__iter__()
+
+    class Asked(str):
+        def lower(self):
+            return self
+
+        def split(self, *_):
+            return Meanwhile(["ada"])
+
+    assert [one.user for one in newest_of(kept, Asked(), 10)] == ["ada"]

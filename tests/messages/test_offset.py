@@ -68,3 +68,18 @@ def test_what_is_old_is_not_known_any_more():
     assert offset.at(0) is None
     offset.take(Exchange(0, 0, 0, 1000))
     assert offset.at(OLD_NS + 1000) is not None and offset.at(OLD_NS + 1001) is None
+
+
+def test_an_answer_that_comes_while_another_thread_asks_disturbs_nobody():
+    offset = Offset()
+
+    class Interrupting(Exchange):
+        """While it is looked at, another answer comes: what a second thread does now and then."""
+
+        @property
+        def measured(self):
+            offset._kept.append(Exchange(20, 20, 20, 20))
+            return super().measured
+
+    offset._kept.append(Interrupting(10, 10, 10, 10))
+    assert offset.at(30).theta_ns == 0

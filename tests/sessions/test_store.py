@@ -5,6 +5,7 @@ import io
 import json
 import os
 import random
+import shutil
 import subprocess
 import sys
 import threading
@@ -20,12 +21,13 @@ from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import ACCEL, LOCATION, STATUS
 from sessions.library.catalogue import Catalogue
 from sessions.recording import store as store_module
-from sessions.recording.manifest import SessionError, read_manifest
+from sessions.recording.manifest import RECORDING, SessionError, read_manifest
 from sessions.recording.mcap_append import McapLog, Sink
 from sessions.recording.mcap_log import Damage, read
 from sessions.recording.mcap_writer import LIBRARY, McapWriter
 from sessions.recording.recover import recover_all, recover_session, salvage
 from sessions.recording.settings import RecorderSettings
+from sessions.recording.store import AnotherDisk
 
 KEY = ACCEL.key("p", "cube")
 T0 = 1_700_000_000_000_000_000
@@ -388,3 +390,29 @@ def test_the_log_repeats_schemas_per_type_not_per_key(tmp_path):
     channels = {out.open_channel(ACCEL.key("p", name), ACCEL) for name in ("a1", "b1", "a1")}
     assert len(channels) == 2 and len(out._schemas) == 1
     os.close(fd)
+
+
+def test_a_recording_that_was_deleted_is_said_and_not_called_closed(settings):
+    store = record(settings, range(1, 50), close=False)
+    store.flush()
+    assert store.astray == ""
+    shutil.rmtree(store.folder)
+    store.add(T0 + 10**9, KEY, accel(50))
+    store.flush()
+    assert "was deleted or moved" in store.astray
+    assert not store.close()
+
+
+def test_who_writes_on_a_dead_disk_begins_anew_once_another_stands_there(settings):
+    store = record(settings, range(1, 50), close=False)
+    full = os.open("/dev/full", os.O_WRONLY)  # takes nothing, as a file system that failed
+    os.dup2(full, store._fd)
+    os.close(full)
+    path = store.folder / RECORDING
+    away = path.rename(path.with_name("away"))  # not mounted again yet: it is waited for
+    store.flush()
+    assert "wait in memory" in store.error
+    away.rename(path)
+    with pytest.raises(AnotherDisk, match="mounted anew"):
+        store.flush()
+    assert not store.close()

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 import zenoh
+from support.far_link import Line, NoNamespaces
+from support.far_site import Watcher, far_site, until
 from support.stack import free_port
 from typer.testing import CliRunner
 
@@ -29,6 +31,7 @@ from sites.place import load_place
 from sites.service import own_certificates
 
 BOARD = "cube"
+CUT_S, PATIENCE_S = 30.0, 180.0
 
 
 @pytest.fixture(scope="module")
@@ -143,6 +146,25 @@ def test_its_administration_is_shut(home: Path, program: Path) -> None:
             assert [r for r in told if "router" in str(r.ok.key_expr)] == []
             client.put("@/local/router/config/mode", '"peer"')
             assert list(client.info.routers_zid())
+
+
+@pytest.mark.zenohd
+def test_two_places_linked_by_it_survive_a_long_cut(program: Path, tmp_path: Path) -> None:
+    try:
+        with far_site(tmp_path, Line(), services=(("router",),), zenohd=program) as site:
+            watcher = Watcher(site)
+            until(lambda: watcher.newest > time.time() - 2.0, PATIENCE_S, "a picture")
+            site.link.cut()
+            time.sleep(CUT_S)  # TCP's own pauses have grown by then
+            site.link.mend()
+            mended = time.time()
+            until(lambda: watcher.newest > mended, PATIENCE_S, "the picture after a cut")
+            time.sleep(2.0)  # a gap that is noticed is asked for
+            assert watcher.lines[-1]["lost"] == 0
+            for log in (site.lab / "up.log", site.office / "router.log"):
+                assert f"{program} routes" in log.read_text()
+    except NoNamespaces as error:
+        pytest.skip(f"no network namespaces here: {error}")
 
 
 def test_a_program_that_is_none_or_ends_is_said(tmp_path: Path) -> None:

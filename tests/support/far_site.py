@@ -92,18 +92,21 @@ def far_site(
     congestion: str = "cubic",
     syn_retries: int = 0,
     lab: tuple[str, ...] = ("up",),
-    board: tuple[str, ...] = (),
+    board: tuple[str, ...] | None = (),
+    zenohd: Path | None = None,
 ) -> Iterator[FarSite]:
     """Made and joined as docs/sites.md says, with `lab` at the lab and `services` at the office.
 
     congestion: how TCP takes losses; CUBIC is what most machines have. syn_retries: of TCP's first
-    packet; 0: as the machine has it. board: further words of `gyrofree simulate`. settings, office:
-    further lines of the gyrofree.toml of the lab and of the office. Raises NoNamespaces.
+    packet; 0: as the machine has it. board: further words of `gyrofree simulate`; None: nothing is
+    simulated, the lab's port is `board` in its folder. zenohd: the program that routes at both.
+    settings, office: further lines of the gyrofree.toml of the lab and of the office. Raises
+    NoNamespaces.
     """
     with far_link(Line()) as link:
         made = FarSite(link, folder / "lab", folder / "office", [])
-        made.lab.mkdir(parents=True)
-        made.office.mkdir(parents=True)
+        made.lab.mkdir(parents=True, exist_ok=True)
+        made.office.mkdir(parents=True, exist_ok=True)
         for place in (link.a, link.b):
             place.congestion(congestion)
             if syn_retries:
@@ -112,8 +115,12 @@ def far_site(
             _join(made)
             _append(made.lab, BOARD + settings)
             _append(made.office, office)
+            if zenohd is not None:
+                for folder in (made.lab, made.office):
+                    _route_by(folder / "gyrofree.toml", zenohd)
             link.line = line
-            made.begin(link.a, made.lab, "simulate", "--link", "board", *PROFILE, *board)
+            if board is not None:
+                made.begin(link.a, made.lab, "simulate", "--link", "board", *PROFILE, *board)
             made.begin(link.a, made.lab, *lab)
             for words in services:
                 made.begin(link.b, made.office, *words)
@@ -125,6 +132,12 @@ def far_site(
 def _append(folder: Path, text: str) -> None:
     with (folder / "gyrofree.toml").open("a") as stream:
         stream.write(text)
+
+
+def _route_by(config: Path, zenohd: Path) -> None:
+    text = config.read_text()
+    assert text.count("[bus]\n") == 1
+    config.write_text(text.replace("[bus]\n", f'[bus]\nzenohd = "{zenohd}"\n'))
 
 
 def _join(made: FarSite) -> None:

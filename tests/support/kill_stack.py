@@ -12,11 +12,10 @@ from pathlib import Path
 
 from messages.bus.session import BusSettings, open_client, subscribe
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract import rates
-from messages.contract.topics import ACCEL, LINK, RATE, STATUS, parse
+from messages.contract.topics import LINK, RATE, STATUS
 from messages.history.journal_file import scan
 from sessions.library.catalogue import Catalogue
-from sessions.recording.mcap_log import read
+from support.recorded import Recorded
 from support.stack import RunningDemo
 
 SERVICES = ("gateway", "record", "estimator", "dashboard", "router")
@@ -128,63 +127,21 @@ def account(folder: Path, kills: list[tuple[str, int]], durable: dict[str, int])
     """Read every session of a stopped stack and count what is missing, double, or was acknowledged
     and is not there.
     """
-    result = Account()
+    result, found = Account(), Recorded()
     for service, _ in kills:
         result.kills[service] += 1
-    catalogue = Catalogue(folder / "sessions")
-    seen: set[tuple] = set()
-    covered: dict[int, list[tuple[int, int, int, float]]] = defaultdict(
-        list
-    )  # by boot: index, n, UTC ns, period
-    estimates: dict[str, set[int]] = defaultdict(set)
-    for info in sorted(catalogue.list(), key=lambda info: info.id):
+    for info in sorted(Catalogue(folder / "sessions").list(), key=lambda info: info.id):
         result.states.append(info.state)
-        rows = 0
-        for row in read(info.path):
-            address = parse(row.key)
-            rows += 1
-            if (
-                "header" not in address.topic.type.DESCRIPTOR.fields_by_name
-                or address.topic.source == "simulator"
-            ):
-                continue
-            message = address.topic.type.FromString(row.payload)
-            name = (row.key, message.header.run, message.header.sequence)
-            result.duplicates += name in seen
-            seen.add(name)
-            if address.topic is ACCEL:
-                n = len(message.counts) // message.axes
-                covered[message.header.epoch].append(
-                    (message.first_index, n, message.header.utc_ns, message.period_s)
-                )
-            elif address.topic is RATE:
-                n = rates.count(message)
-                estimates[row.key].update(range(message.for_index, message.for_index + n))
-        result.acknowledged_lost += max(0, durable.get(info.id, 0) - rows)
-    _holes(result, covered, kills, estimates)
+        found.read(info.path)
+        result.acknowledged_lost += max(0, durable.get(info.id, 0) - found.rows[info.id])
+    result.samples = sum(map(len, found.samples.values()))
+    result.duplicates = found.twice
+    result.estimates_missing = found.unestimated(to_the_end=True)
+    for hole in found.holes():
+        result.total_missing_s += hole.seconds
+        cause = min(kills, key=lambda kill: abs(kill[1] - hole.at_ns))[0]
+        result.missing_s[cause] = max(result.missing_s.get(cause, 0.0), hole.seconds)
     return result
-
-
-def _holes(result: Account, covered: dict, kills: list[tuple[str, int]], estimates: dict) -> None:
-    for batches in covered.values():
-        batches.sort()
-        have = set()
-        for (index, n, utc_ns, period), following in zip(
-            batches, [*batches[1:], None], strict=True
-        ):
-            result.samples += n
-            have |= set(range(index, index + n))
-            if following is None or following[0] <= index + n:
-                continue
-            hole_s = (following[0] - index - n) * period
-            result.total_missing_s += hole_s
-            at_ns = utc_ns + n * period * 1e9
-            cause = min(kills, key=lambda kill: abs(kill[1] - at_ns))[0]
-            result.missing_s[cause] = max(result.missing_s.get(cause, 0.0), hole_s)
-        for indices in estimates.values():
-            mine = indices & set(range(min(have), max(have) + 1))
-            first = min(mine, default=0)
-            result.estimates_missing += len({i for i in have if i > first} - mine) if mine else 0
 
 
 def journal_records(folder: Path) -> tuple[int, int]:

@@ -65,9 +65,11 @@ class History:
 
 
 def newest_of(given: Sequence[pb.OrderGiven], text: str, most: int) -> list[pb.OrderGiven]:
-    """Those that contain every word of the text, newest first; `given` is oldest first."""
-    words = text.lower().split()
-    return list(islice((one for one in reversed(given) if _has(one, words)), most))
+    """Those that contain every word of the text, newest first; `given` is oldest first, and another
+    thread may add to it.
+    """
+    words, there = text.lower().split(), tuple(given)
+    return list(islice((one for one in reversed(there) if _has(one, words)), most))
 
 
 def _has(one: pb.OrderGiven, words: list[str]) -> bool:
