@@ -18,12 +18,13 @@ import zenoh
 from messages import text
 from messages.bus import orders
 from messages.bus import session as busmod
+from messages.bus.beating import HERE
 from messages.bus.command.history import newest_of
 from messages.bus.command.said import words
 from messages.bus.command.watch import Watch, name_of
 from messages.bus.turning import Loop
 from messages.contract import gyrofree_pb2 as pb
-from messages.contract.topics import COMMAND, NOTE, ORDER, TopicError
+from messages.contract.topics import NOTE, ORDER, TopicError
 
 log = logging.getLogger(__name__)
 
@@ -236,11 +237,11 @@ class Desk:
         given.seconds = time.monotonic() - began
         given.text = text.plain(said, 500)
         given.user, given.place = self._seat.user, self._place
-        given.header.device, given.header.run = COMMAND, self._since
+        given.header.device, given.header.run = self._place or HERE, self._since
         given.header.utc_ns = given.at_utc_ns
         with self._saying:
             self._given.append(given)
             self.told(given)
             if self._session is not None and not self._watching:
                 with contextlib.suppress(TopicError):
-                    self._publishers.put(ORDER, COMMAND, given)
+                    self._publishers.put(ORDER, given.header.device, given)

@@ -19,6 +19,7 @@ from sites.roles import (
     join_key,
     listening,
     order_keys,
+    ordered,
     presence,
     presence_of,
     preview_keys,
@@ -137,6 +138,8 @@ def _local(rules: Rules, place: Place, holder: Issued, devices: Iterable[str]) -
     for name in {place.place, holder.common_name.partition(".")[2]}:
         if NAME.fullmatch(name):
             said += presence(place.site, name, holder.role)
+            if place.seat == "operator":
+                said += ordered(place.site, name, holder.role)
     rules.allow([holder.common_name], said, [f"{place.site}/**", *preview_keys(place.site)])
 
 
@@ -147,7 +150,8 @@ def _between(rules: Rules, place: Place, peer: Peer, router: str) -> None:
     site = place.site
     seat = peer.seat if place.at_home else place.seat
     asks = (*listening(site), renew_key(site), *(order_keys(site) if seat == "operator" else ()))
-    said = (NOTE.pattern(site), ORDER.pattern(site)) if seat == "operator" else ()
+    away = peer.place if place.at_home else place.place  # an order is in the name of its place
+    said = (NOTE.pattern(site), ORDER.pattern(site, away)) if seat == "operator" else ()
     notes = Rights(put=said)
     heard = (*topic_keys(site), *claim_keys(site), alive_keys(site), *preview_keys(site))
     if place.at_home:

@@ -105,6 +105,8 @@ def deeds(place: Place, device: str) -> list[Deed]:
             ("authority",) if place.at_home else (),
         ),
         Deed("say who has the command", tp.HOLDER.key(site, tp.COMMAND), ("procedures",)),
+        Deed("say what was ordered here", tp.ORDER.key(site, place.place), orders_by),
+        Deed("say what another place ordered", tp.ORDER.key(site, OTHER), ()),
         Deed("order the recorder", orders.RECORDER.key(site, ""), orders_by, "order"),
         Deed(
             "change what a service logs",

@@ -182,6 +182,16 @@ def new_requests(roles: tuple[str, ...] = AWAY) -> dict[str, tuple[bytes, str]]:
     return made
 
 
+def is_whole(folder: Path, role: str) -> bool:
+    """Are key and certificate of a role there, and of one another?"""
+    try:
+        certificate = x509.load_pem_x509_certificate((folder / f"{role}.pem").read_bytes())
+        key = serialization.load_pem_private_key(key_of(folder, role).read_bytes(), None)
+    except (OSError, ValueError, TypeError):
+        return False
+    return key.public_key() == certificate.public_key()
+
+
 def renewal(folder: Path, role: str) -> tuple[bytes, bytes]:
     """A new key, PEM, and the question that renews the certificate of a role. Raises OSError,
     ValueError for files that cannot be read.

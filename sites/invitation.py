@@ -12,6 +12,8 @@ import secrets
 import zlib
 from pathlib import Path
 
+from cryptography import x509
+from cryptography.exceptions import InvalidSignature
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from inertial.one_at_a_time import alone
@@ -70,14 +72,23 @@ def read_invitation(line: str) -> Invitation:
         packed = base64.urlsafe_b64decode(text[len(HEAD) :])
         plain = zlib.decompressobj().decompress(packed, LONGEST)
         invitation = Invitation.model_validate_json(plain)
-    except (ValueError, zlib.error, ValidationError):
+        trusted = x509.load_pem_x509_certificate(invitation.trusted.encode())
+        certificate = x509.load_pem_x509_certificate(invitation.certificate.encode())
+        certificate.verify_directly_issued_by(trusted)
+    except (ValueError, TypeError, zlib.error, ValidationError, InvalidSignature):
         raise SiteError(
             "the invitation is damaged: copy the whole line, or have another one printed"
         ) from None
-    if invitation.ends < dt.datetime.now(dt.UTC):
+    now = dt.datetime.now(dt.UTC)
+    if invitation.ends < now:
         raise SiteError(
-            f"the invitation ended {invitation.ends:%Y-%m-%d %H:%M UTC}: have another one printed"
-            " at the site's home"
+            f"the invitation ended {invitation.ends:%Y-%m-%d %H:%M UTC}, and this machine's clock"
+            f" says {now:%Y-%m-%d %H:%M UTC}: have another one printed at the site's home"
+        )
+    if now < certificate.not_valid_before_utc:  # no link to home would come about
+        raise SiteError(
+            f"the invitation begins {certificate.not_valid_before_utc:%Y-%m-%d %H:%M UTC}, and this"
+            f" machine's clock says {now:%Y-%m-%d %H:%M UTC}: set it right first"
         )
     return invitation
 

@@ -17,8 +17,9 @@ import zenoh
 from messages.bus import timeouts
 from messages.bus.session import BusSettings, LateSession
 from messages.bus.settings import FAR_LEASE_MS
+from messages.bus.turning import MOST_S, Loop
 from messages.previews.frames import lane_key
-from sites.place import SiteError, load_place
+from sites.place import Place, SiteError, load_place
 
 HANG_UP_S = 2.0
 LOOK_S = 5.0  # between two looks at who belongs to the site
@@ -46,22 +47,24 @@ class Lanes:
         hang_up([one for sessions in self._open.values() for one in sessions])
 
     def _run(self) -> None:
-        while not self._stop.is_set():
-            try:
-                place = load_place(self._folder)
-            except SiteError as error:
-                log.warning("lanes stay as they are: %s", error)
+        with Loop("lanes", LOOK_S + HANG_UP_S + MOST_S) as loop:
+            while not self._stop.is_set():
+                loop.turn()
+                try:
+                    self._look(load_place(self._folder))
+                except SiteError as error:
+                    log.warning("lanes stay as they are: %s", error)
                 self._stop.wait(LOOK_S)
-                continue
-            wanted = {peer.address for peer in place.peers if peer.address}
-            for address in wanted - self._open.keys():
-                self._open[address] = [
-                    self._lane(address, lane_key(place.site, number))
-                    for number in range(self._count)
-                ]
-            for address in self._open.keys() - wanted:
-                hang_up(self._open.pop(address))
-            self._stop.wait(LOOK_S)
+
+    def _look(self, place: Place) -> None:
+        """Call whom home calls now, and hang up on the others."""
+        wanted = {peer.address for peer in place.peers if peer.address}
+        for address in wanted - self._open.keys():
+            self._open[address] = [
+                self._lane(address, lane_key(place.site, number)) for number in range(self._count)
+            ]
+        for address in self._open.keys() - wanted:
+            hang_up(self._open.pop(address))
 
     def _lane(self, address: str, key: str) -> LateSession:
         bus = self._bus.model_copy(update={"router": address, "lease_ms": FAR_LEASE_MS}).acting_as(

@@ -15,7 +15,7 @@ from typing import Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from inertial.whole_file import put_in_place, sync_folder
-from messages.bus.tls import NEXT
+from messages.bus.tls import NEXT, key_of
 from messages.contract.names import Name
 
 Seat = Literal["viewer", "operator"]  # what the people of another place may do here
@@ -110,10 +110,9 @@ def write_identity(folder: Path, role: str, key: bytes, certificate: bytes) -> N
     """Write key and certificate of a role, both PEM: cut off anywhere, the old pair or the new one
     is there as a whole (messages.bus.tls.key_of).
     """
-    waiting = folder / f"{role}.key{NEXT}"
-    write(waiting, key)
+    write(folder / f"{role}.key{NEXT}", key)
     write(folder / f"{role}.pem", certificate, 0o644)
-    waiting.replace(folder / f"{role}.key")
+    key_of(folder, role)  # a service that begins in this moment may do it first
     sync_folder(folder)
 
 

@@ -215,7 +215,9 @@ class Previews:
                     self._publishers[name, rate] = self._session.declare_publisher(
                         frame_key(self._site, name, rate),
                         congestion_control=zenoh.CongestionControl.DROP,
-                        priority=zenoh.Priority.INTERACTIVE_LOW,  # little waits: settings.py
+                        # a frame waits behind one other at most (messages/bus/settings.py)
+                        priority=zenoh.Priority.INTERACTIVE_LOW,
+                        express=True,
                     )
         watched = {
             rate for (_, rate), one in self._publishers.items() if one.matching_status.matching

@@ -37,7 +37,8 @@ KINDS = (
     orders.SEAT,
 )
 SEGMENTS = "/segment/"  # of a key: what stands behind it is asked for
-SAID = (tp.NOTE, tp.MUTE, tp.ORDER)  # by people who order
+SAID = (tp.NOTE, tp.MUTE)  # by people who order
+ORDERING = ("dashboard", "operator", "procedures")
 REPLAYED = f"$*{tp.REPLAY_SUFFIX}"  # of a device's name: any device that is a replay
 
 
@@ -135,6 +136,11 @@ def presence(site: str, place: str, role: str) -> Rights:
         put=tuple(f"{beat[:-1]}{name}-$*" for name in said),
         token=tuple(f"{token[:-1]}{name}-$*" for name in said),
     )
+
+
+def ordered(site: str, place: str, role: str) -> Rights:
+    """Who orders says so for the history of all orders: in the name of his own place alone."""
+    return Rights(put=(tp.ORDER.pattern(site, place),) if role in ORDERING else ())
 
 
 def presence_of(site: str, place: str = "*") -> Rights:

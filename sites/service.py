@@ -41,7 +41,7 @@ RENEW_S = 120.0  # that asking for a certificate of each role may take
 SEGMENT_S = 60.0  # for a part or a list of segments over a slow link
 WAKE_S = 1.0  # while nothing is to be done, that much is said so often
 HASH_S = 60.0  # that reading and hashing a file may take between two segments
-ROUND_S = 2.0  # between two looks at what home has recorded
+ROUND_S = 1.0  # between two looks at what home has recorded
 
 Beside = Callable[[zenoh.Session], contextlib.AbstractContextManager[None]]
 
@@ -93,15 +93,17 @@ def run(
                 one.undeclare()
         else:
             with beside(session):
-                copy(Copies(sessions, folder), place.site, session, stop)
+                copy(Copies(sessions, folder, place.home, place.place), place.site, session, stop)
         keeping.join(ASK_S + 1.0)
 
 
 def copy(copies: Copies, site: str, session: zenoh.Session, stop: threading.Event) -> None:
     """Bring home's recordings here, round after round, until `stop`."""
+    until = cancelled_by(stop)
 
     def ask(key: str) -> bytes:
-        return asked(session, key, b"", INDEX_S if f"{SEGMENTS}{INDEX}/" in key else SEGMENT_S)
+        patience_s = INDEX_S if f"{SEGMENTS}{INDEX}/" in key else SEGMENT_S
+        return asked(session, key, b"", patience_s, until)
 
     roads = Roads(session, site, ask)
     said = ""
@@ -117,21 +119,42 @@ def copy(copies: Copies, site: str, session: zenoh.Session, stop: threading.Even
                 copies.round(roads, stopped)
                 said = ""
             except (SiteError, OSError) as error:
-                if str(error) != said:
+                if str(error) != said and not stop.is_set():
                     log.warning("recordings are not copied: %s", error)
                 said = str(error)
+
+
+def cancelled_by(stop: threading.Event) -> zenoh.CancellationToken:
+    """What ends the waiting for answers when `stop` is set: over a bad link they may be long."""
+    token = zenoh.CancellationToken()
+
+    def watch() -> None:
+        stop.wait()
+        token.cancel()
+
+    threading.Thread(target=watch, name="asking ends", daemon=True).start()
+    return token
 
 
 def _keep_certificates(
     folder: Path, place: Place, session: zenoh.Session, stop: threading.Event
 ) -> None:
-    ask, due = _asker(folder, place, session), time.monotonic() + AGAIN_S / 10
+    ask, due = _asker(folder, place, session, cancelled_by(stop)), time.monotonic() + AGAIN_S / 10
     with Loop("certificates") as loop:
         while not stop.wait(WAKE_S):
             loop.turn()
             if time.monotonic() >= due:
                 with loop.during("renewing certificates", RENEW_S):
-                    due = time.monotonic() + (LOOK_S if look(folder, place, ask) else AGAIN_S)
+                    good = _looked(folder, place, ask)
+                due = time.monotonic() + (LOOK_S if good else AGAIN_S)
+
+
+def _looked(folder: Path, place: Place, ask: Callable[[bytes], bytes]) -> bool:
+    try:
+        return look(folder, place, ask)
+    except (SiteError, OSError) as error:  # a file that cannot be read now may be again
+        log.warning("certificates are not looked after: %s", error)
+        return False
 
 
 def look(folder: Path, place: Place, ask: Callable[[bytes], bytes]) -> bool:
@@ -164,11 +187,12 @@ def renew(folder: Path, role: str, ask: Callable[[bytes], bytes]) -> None:
 
 def own_certificates(folder: Path) -> dict[str, dt.datetime]:
     """By role the end of each certificate that this place has."""
-    found = {}
-    for path in sorted(folder.glob("*.pem")):
-        if path.name != TRUSTED:
-            found[path.stem] = _read(path).not_valid_after_utc
-    return found
+    return {role: _read(folder / f"{role}.pem").not_valid_after_utc for role in own_roles(folder)}
+
+
+def own_roles(folder: Path) -> list[str]:
+    """Roles of which this place has a certificate, whatever is in its file."""
+    return sorted(path.stem for path in folder.glob("*.pem") if path.name != TRUSTED)
 
 
 def _life(folder: Path, role: str) -> dt.timedelta:
@@ -180,25 +204,45 @@ def _read(path: Path) -> x509.Certificate:
     try:
         return x509.load_pem_x509_certificate(path.read_bytes())
     except (OSError, ValueError) as error:
-        raise SiteError(f"{path}: cannot be read: {error}") from None
+        raise SiteError(
+            f"{path}: cannot be read: {str(error).partition('. ')[0]}; at the site's home `gyrofree"
+            f" certs renew {path.stem}` makes it anew, elsewhere restore it from a backup"
+        ) from None
 
 
-def _asker(folder: Path, place: Place, session: zenoh.Session | None) -> Callable[[bytes], bytes]:
+def _asker(
+    folder: Path,
+    place: Place,
+    session: zenoh.Session | None,
+    until: zenoh.CancellationToken | None = None,
+) -> Callable[[bytes], bytes]:
     """Who renews: home itself, others ask over the bus."""
     if place.at_home:
         return Registrar(folder).renew_own
 
     def ask(question: bytes) -> bytes:
-        return asked(session, renew_key(place.site), question)
+        return asked(session, renew_key(place.site), question, until=until)
 
     return ask
 
 
-def asked(session: zenoh.Session, key: str, question: bytes, patience_s: float = ASK_S) -> bytes:
-    """Home's answer; raises SiteError with its reason, or where it does not answer."""
+def asked(
+    session: zenoh.Session,
+    key: str,
+    question: bytes,
+    patience_s: float = ASK_S,
+    until: zenoh.CancellationToken | None = None,
+) -> bytes:
+    """Home's answer; raises SiteError with its reason, or where it does not answer. until: ends all
+    waiting when it is cancelled.
+    """
     # behind everything that is live: who fetches the past must not hold up the present
     for reply in session.get(
-        key, payload=question, timeout=patience_s, priority=zenoh.Priority.BACKGROUND
+        key,
+        payload=question,
+        timeout=patience_s,
+        priority=zenoh.Priority.BACKGROUND,
+        cancellation_token=until,
     ):
         if reply.ok is not None:
             return reply.ok.payload.to_bytes()

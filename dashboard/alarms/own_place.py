@@ -71,6 +71,7 @@ class OwnPlace:
                 point.cause.page,
                 id.removeprefix(f"{point.cause.kind}-") if id != point.cause.kind else "",
                 level=point.cause.level,
+                raised_s=point.raised_ns * 1e-9,
             )
             for (_, id), point in self.book.points.items()
             if point.active

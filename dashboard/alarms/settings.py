@@ -103,7 +103,7 @@ class HealthSettings(BaseModel):
         "the gateway's clock was set while it ran, a place's is off, or its offset is not known",
     )
     twin: LevelOrOff = setting("critical", "two gateways want one board")
-    service: LevelOrOff = setting("warning", "a service is frozen, or gone without a word")
+    service: LevelOrOff = setting("warning", "a service hangs, is frozen, or gone without a word")
     place: LevelOrOff = setting("watch", "nothing is heard of another place of the site")
     certificate: LevelOrOff = setting(
         "warning", "a certificate is near its end and was not renewed by itself"

@@ -16,7 +16,7 @@ from dashboard.data.pace import FULL, Pace
 from messages.previews.frames import WHOLE, frame_key
 
 Live = Literal["auto", "preview", "full"]
-CUT_S = 3.0  # without a frame of a device that was heard: what was is asked for when one comes
+CUT_S = 2.2  # without a frame of a device that was heard, two in a row at 1 Hz: it is asked for
 
 log = logging.getLogger(__name__)
 

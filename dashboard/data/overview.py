@@ -38,6 +38,7 @@ class Overviews:
         self._session, self._prefix, self._done = session, prefix, done
         self._wanted: queue.PriorityQueue = queue.PriorityQueue()
         self._count, self._stop = 0, threading.Event()
+        self._until = zenoh.CancellationToken()  # ends the waiting for an answer
         self._queriers: dict[str, list[zenoh.Querier]] = {}
         self._thread = threading.Thread(target=self._run, name="overviews", daemon=True)
         self._thread.start()
@@ -56,6 +57,7 @@ class Overviews:
     def close(self) -> None:
         """Ask no more."""
         self._stop.set()
+        self._until.cancel()
         self._put(-1, "", 0, 0, 0.0)
         self._thread.join(CLOSE_S)
 
@@ -75,7 +77,9 @@ class Overviews:
                 log.warning("%s: home does not answer what was missed", device)
 
     def _asked(self, device: str, query: pb.HistoryQuery, main: bool) -> bool:
-        for reply in self._querier(device, main).get(payload=query.SerializeToString()):
+        for reply in self._querier(device, main).get(
+            payload=query.SerializeToString(), cancellation_token=self._until
+        ):
             if self._stop.is_set():
                 return True
             if reply.ok is None:

@@ -20,6 +20,7 @@ TRY_S = 6.0  # of calm, before more is tried
 FULL_AFTER_S = 20.0  # likewise, before everything is
 AGAIN_S, LONGEST_S = 30.0, 1800.0  # what was too much is tried again after so long, and longer
 SETTLE_S = 4.0  # after a change, before the next one
+HASTY_S = 1.5  # likewise, after one up that was too much
 SILENT_S = 3.0  # without a frame: the link is cut, and says nothing about rates
 BASE_S = 300.0  # so long the quickest frame is remembered
 
@@ -34,6 +35,7 @@ class Pace:
     _came: deque[tuple[float, float]] = field(default_factory=deque)  # when, and how late it came
     _quickest: deque[tuple[float, float]] = field(default_factory=deque)  # of 10 s: begin, least
     _since: float = 0.0  # of the rate
+    _rose: bool = False  # to it
     _refused: dict[int, tuple[float, float]] = field(default_factory=dict)  # rate: until, how long
 
     def __post_init__(self) -> None:
@@ -61,7 +63,7 @@ class Pace:
         if not self._came or now - self._came[-1][0] > SILENT_S:
             self._since = now  # what comes first after a cut was long under way
             return self.rate
-        if now - self._since < SETTLE_S:
+        if now - self._since < (HASTY_S if self._rose else SETTLE_S):
             return self.rate
         lates = self._lates()
         half = len(lates) // 2
@@ -101,5 +103,7 @@ class Pace:
         return RATES[RATES.index(self.rate) + step]
 
     def _change(self, now: float, rate: int) -> None:
+        # 0 is everything: more than any rate of a preview
+        self._rose = rate == FULL or (self.rate != FULL and rate > self.rate)
         self.rate, self._since = rate, now
         self._came.clear()

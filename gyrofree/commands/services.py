@@ -33,9 +33,11 @@ def router(config: Config = None, verbose: Verbose = False) -> None:
         from messages.bus import timeouts
         from messages.bus.beating import Beating, tell_time
         from messages.bus.session import connected, open_router
+        from messages.bus.settings import room_for_connections
         from messages.bus.turning import Loop
         from messages.bus.zenohd import Zenohd
 
+        room_for_connections()
         rules, mesh = router_rules(settings)
         bus = settings.bus.acting_as("router")
 

@@ -1,5 +1,6 @@
 """`gyrofree simulate`: a simulated board, or a run of it as a log."""
 
+import logging
 import threading
 from pathlib import Path
 from typing import Annotated
@@ -18,6 +19,8 @@ from gyrofree.commands.options import (
 from gyrofree.commands.parser import output_file, output_link
 from gyrofree.running.process import EXIT_CONFIG as CONFIG
 from gyrofree.running.process import fail, run_service
+
+log = logging.getLogger(__name__)
 
 
 def simulate(
@@ -122,6 +125,8 @@ def simulate(
         if csv is not None:
             from gyrofree.running import simulate_csv
 
+            for text in fault or ():
+                say(f"fault {text}: not in the CSV, which is of a sound cube")
             count = simulate_csv.write(csv, motion, seed, layout, half_side, rate)
             say(f"{csv}: {count} samples")
             return
@@ -133,7 +138,10 @@ def simulate(
     def body(stop: threading.Event) -> None:
         from gyrofree.running import simulate as simulator
         from gyrofree.running import simulate_hand
+        from inertial.simulation.faults import when
 
+        for one, text in zip(faults, fault or (), strict=True):
+            log.warning("fault %s %s", text, when(one, motion.seconds))
         options = simulator.Options(
             link=link,
             tcp=tcp,

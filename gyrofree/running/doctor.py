@@ -59,7 +59,7 @@ def examine(settings: Settings) -> list[Finding]:
         _versions(),
         *_ports(settings),
         _clock(),
-        _endpoint("bus port", settings.bus.listen[0].removeprefix("tcp/"), "[bus] listen"),
+        _endpoint("bus port", settings.bus.listen[0].partition("/")[2], "[bus] listen"),
         _endpoint(
             "dashboard port",
             f"{settings.dashboard.host}:{settings.dashboard.port}",

@@ -42,16 +42,21 @@ def write_place(
 ) -> None:
     """Write a place into a configuration; everything else stays as it was, or is as in `settings`.
 
-    folder: of its certificates. listen: endpoint of its router, which has this port. Raises
-    ConfigError, OSError.
+    folder: of its certificates. listen: endpoint of its router, which has this port; where other
+    machines reach it the processes of this one have a door of their own, which no stranger can
+    crowd. Raises ConfigError, OSError.
     """
+    near = f"tls/127.0.0.1:{port}"
+    open_to_others = not listen.startswith(("tls/127.", "tls/localhost:", "tls/[::1]:"))
+    if open_to_others:
+        near = f"tls/127.0.0.1:{port + 1 if port < 65535 else port - 1}"
     if settings is None:
         settings = load(config) if config.exists() else Settings()
     bus = settings.bus.model_copy(
         update={
             "prefix": site,
-            "router": f"tls/127.0.0.1:{port}",
-            "listen": [listen],
+            "router": near,
+            "listen": [near, listen] if open_to_others else [near],
             "tls": folder,
         }
     )
@@ -118,6 +123,25 @@ def _place(folder: Path) -> Place:
         return load_place(folder)
     except SiteError as error:
         raise ConfigError(f"[bus] tls: {error}") from None
+
+
+def of_no_site(config: Path, folder: Path) -> None:
+    """An installation is of one site: it is not taken from one by the way. Raises ConfigError."""
+    tls = load(config).bus.tls if config.exists() else None
+    if tls is not None and tls.absolute() != folder.absolute():
+        raise ConfigError(
+            f"{config}: [bus] tls = {str(tls)!r}: this installation is of a site already; begin in"
+            " an empty folder, or take that line out"
+        )
+
+
+def unfinished(config: Path, folder: Path) -> Place | None:
+    """The place of a folder whose making was cut off before the configuration knew of it; raises
+    ConfigError, SiteError.
+    """
+    if not (folder / PLACE).exists() or (config.exists() and load(config).bus.tls is not None):
+        return None
+    return load_place(folder)
 
 
 class Renewed:

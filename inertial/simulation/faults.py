@@ -1,7 +1,7 @@
 """Faults of single accelerometer axes, put into simulated counts: so that a person and a test can
 see them named.
 
-a21:stuck@12                 from 12 s of the profile on
+a21:stuck@12                 from 12 s of the profile on, in each run of it
 a21:biased@12-20             until 20 s
 a21:biased=0.8@12            off by 0.8 m/s^2
 a13:swapped=a21@12           exchanged with a21
@@ -99,6 +99,13 @@ def parse(text: str, names: Sequence[str]) -> AxisFault:
     if value is not None:
         raise FaultError(f"fault {text!r}: {kind} takes no value")
     return fault
+
+
+def when(fault: AxisFault, run_s: float) -> str:
+    """When a fault comes to a table whose runs take run_s, in words."""
+    if fault.start_s >= run_s:
+        return f"never comes: a run of the table takes {run_s:g} s, and each begins anew at 0 s"
+    return f"comes {fault.start_s:g} s after the beginning of each run, which takes {run_s:g} s"
 
 
 def _seconds(text: str, value: str) -> float:

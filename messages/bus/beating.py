@@ -17,7 +17,7 @@ from typing import Self
 import zenoh
 from google.protobuf.message import DecodeError
 
-from messages.bus import tls
+from messages.bus import deadline, tls
 from messages.bus.pulse import Shared, Voice
 from messages.bus.session import BusSettings, connected
 from messages.bus.turning import Observer
@@ -123,6 +123,8 @@ class Beating:
         for role, count in sorted(self._viewers().items()):
             beat.viewers.add(role=role, count=count)
         beat.clock_ahead_s, beat.clock_bound_s = self.clock_ahead()
+        if (compared := self._offset.elapsed(elapsed_ns())) is not None:
+            deadline.heard(*compared)
         now = time.monotonic()
         passed_s, self._before = min(now - self._before, BEAT_S), now
         standing = self._observer.look(passed_s)

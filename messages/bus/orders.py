@@ -13,6 +13,7 @@ from typing import Generic, TypeVar
 import zenoh
 from google.protobuf.message import DecodeError, Message
 
+from messages.bus import deadline
 from messages.bus.claiming import OVERDUE, id_of, newest
 from messages.bus.command.watch import Watch, given_by
 from messages.contract import gyrofree_pb2 as pb
@@ -168,7 +169,7 @@ def give(
         # twice: a session that watches claims may know of a new one and not yet say so
         serves = newest(session, base) or newest(session, base)
         replies = session.get(
-            key,
+            key + deadline.until(patience_s),
             payload=command.SerializeToString(),
             attachment=None if by is None else by.SerializeToString(),
             timeout=patience_s,
@@ -278,6 +279,11 @@ def take(
             query.reply_err(f"an order is for one device, not for {asked}".encode())
             return
         by = given_by(query.attachment)
+        late_s = deadline.late_s(query.parameters.get(deadline.UNTIL))
+        if late_s and kind.commanded(command):
+            log.warning("%s: an order comes %.1f s too late: not carried out", kind.who, late_s)
+            query.reply_err(f"not carried out: it came {late_s:.1f} s too late".encode())
+            return
         if kind.commanded(command) and (reason := watch.refusal(by)):
             log.warning("%s: an order of %s is refused: %s", kind.who, by.seat.user, reason)
             query.reply_err(reason.encode())

@@ -11,12 +11,13 @@ from typing import Self
 
 import zenoh
 
-from messages.bus.turning import MOST_S, Observer
+from messages.bus.turning import Observer
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import BEAT, alive_key
 
 UP = "up"  # its role
 LOOP = "services"
+MOST_S = 6.0  # that a turn of it may take: it waits for the page's first answer
 VARIABLE = "GYROFREE_PULSE"  # descriptor and process id, for the child
 SIZE = 8  # bytes: how many turns
 

@@ -1,5 +1,6 @@
 """[bus] of gyrofree.toml, and what it means to Zenoh."""
 
+import resource
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Self
@@ -65,7 +66,18 @@ class BusSettings(BaseModel):
 # Between places. TCP tries again after twice the time each time, so a connection that was cut for
 # long would come back long after the link did: it is given up after the lease, and a new one made.
 FAR_LEASE_MS = 5_000
+ACCEPT_MS = 4_500  # a little more than who is far away takes to be known
+PENDING = 2_000  # connections that are not known yet; of a process's files, which are raised to it
 FAR_ATTEMPT_MS = 4_000  # of a client; with 5 % loss and 200 ms a handshake takes 1 s, hardly ever 4
+
+
+def room_for_connections() -> None:
+    """Let this process, a router, have as many open files as it may have connections."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = 2 * PENDING + 1000
+    if soft < wanted:
+        most = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
 
 
 def configuration(settings: BusSettings, mode: str, mesh: Iterable[str] = ()) -> dict[str, Any]:
@@ -93,6 +105,13 @@ def configuration(settings: BusSettings, mode: str, mesh: Iterable[str] = ()) ->
     if settings.tls is not None:
         values |= tls.values(settings.tls, settings.role)
     if mode == "router":
+        values |= {
+            # Whoever holds a certificate, a revoked one too, can begin connections and say no more:
+            # 100 of them, Zenoh's own limit, kept everybody else out for 10 s, again and again.
+            "transport/unicast/accept_timeout": ACCEPT_MS,
+            "transport/unicast/accept_pending": PENDING,
+            "transport/unicast/max_sessions": PENDING,
+        }
         values["listen/endpoints"] = settings.listen
         values["connect/endpoints"] = list(mesh)
         values[

@@ -71,9 +71,7 @@ def _copy(pidfd: int, descriptor: int) -> int:
 
 
 def _set(one: socket.socket) -> None:
-    for option, value in [
-        o for o in OPTIONS if str(o[0]) in os.environ.get("GF_OPTS", "18,25,16,44").split(",")
-    ]:  # SCRATCH
+    for option, value in OPTIONS:
         with contextlib.suppress(OSError):  # a kernel that does not know it
             if one.getsockopt(socket.IPPROTO_TCP, option) != value:
                 one.setsockopt(socket.IPPROTO_TCP, option, value)

@@ -100,7 +100,14 @@ ALARM = Topic("alarm", pb.AlarmStatus, 0.5, "alarms", "what is wrong, and who to
 HOLDER = Topic(
     "holder", pb.CommandStatus, 1, "procedures", "who has the command of the site", recorded=False
 )
-ORDER = Topic("order", pb.OrderGiven, 0, "any", "an order and what came of it", recorded=False)
+ORDER = Topic(
+    "order",
+    pb.OrderGiven,
+    0,
+    "people",
+    "an order and what came of it; the device is the place that gave it",
+    recorded=False,
+)
 NOTE = Topic("note", pb.Note, 0, "any", "remarks on the data by people and programs")
 REPLAY = Topic("replay", pb.ReplayStatus, 5, "replay", "where a replay stands", recorded=False)
 STATUS = Topic("status", pb.RecorderStatus, 1, "recorder", "state of the recording", recorded=False)

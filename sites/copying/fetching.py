@@ -16,6 +16,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from inertial.whole_file import put_in_place
+from sessions.library.copied import Copied, Hashes, write_copied
 from sites.copying.gathering import Drafts, Gathering, Segment
 from sites.copying.roads import Ask, Ways
 from sites.copying.shelf import FILE, SEGMENT, SESSION, Listed, Listing, list_file
@@ -35,9 +36,11 @@ log = logging.getLogger(__name__)
 class Copies:
     """What a place has of home's sessions."""
 
-    def __init__(self, root: Path, folder: Path) -> None:
-        """root: of the sessions here; folder: of the place, where the proof is kept."""
-        self._root, self._book = root, folder / BOOK
+    def __init__(self, root: Path, folder: Path, home: str = "home", here: str = "here") -> None:
+        """root: of the sessions here; folder: of the place, where the proof is kept; home, here:
+        names of the two places.
+        """
+        self._root, self._book, self._names = root, folder / BOOK, (home, here)
         self._heard, self._drafts = Heard(), Drafts()
         self._small: dict[str, bytes] = {}  # session.json of open sessions, by sha256
         self.known: dict[str, dict] = load_copies(folder)
@@ -54,12 +57,20 @@ class Copies:
                 continue
             proof = self._session(session, ways, stop)
             if proof is not None:
-                now = dt.datetime.now(dt.UTC).isoformat(timespec="seconds")
-                self.known[session] = {"stamp": there[session], "equal_since": now, "files": proof}
-                write(self._book, json.dumps(self.known, indent=1).encode() + b"\n", 0o644)
+                self._prove(session, there[session], proof)
                 log.info("%s: the copy is equal to home's", session)
                 count += 1
         return count
+
+    def _prove(self, session: str, stamp: str, proof: dict[str, dict[str, str]]) -> None:
+        """Into the session's folder, for who looks at it, and into the book."""
+        now = dt.datetime.now(dt.UTC).replace(microsecond=0)
+        home, here = self._names
+        files = {name: Hashes(**hashes) for name, hashes in proof.items()}
+        copied = Copied(home=home, here=here, equal_since=now, files=files)
+        write_copied(self._root / session, copied)
+        self.known[session] = {"stamp": stamp, "equal_since": now.isoformat(), "files": proof}
+        write(self._book, json.dumps(self.known, indent=1).encode() + b"\n", 0o644)
 
     def _ask(self, what: str, ways: Ways) -> bytes:
         """What may be long, and changes a little."""
@@ -81,6 +92,8 @@ class Copies:
             if recording and name == LAST:
                 return None
             wanted, path = listing.files[name], folder / name
+            if name == LAST and wanted.sha256 in self._small:  # it need not come twice
+                _part(path).write_bytes(self._small[wanted.sha256])
             if recording:
                 wanted = _full(wanted)  # its end changes with every message
             if not self._file(path, wanted, ways, stop):

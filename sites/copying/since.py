@@ -1,6 +1,6 @@
 """Long answers that change a little, told by what has changed.
 
-Home's list of sessions and the list of a recording that runs are asked for every two seconds, and
+Home's list of sessions and the list of a recording that runs are asked for every second, and
 only their ends change. Who asks says by its hash which answer he has; he is told how much of it
 still stands, and what comes behind that.
 """

@@ -156,6 +156,8 @@ def test_and_report(one: Newcomer, page: Page, keep) -> str:
     unit.press("Tab")
     start.click()
     one.click("Start test")
+    scene.get_by_role("button", name="Yes, start it").click()
+    one.click("Yes, start it")
     expect(scene.get_by_text("Turn the table").first).to_be_visible(timeout=PATIENCE_MS)
     keep(page, "test")
     report = scene.get_by_role("link", name="Open the report")

@@ -1,9 +1,14 @@
 """The page of alarms and its REST: who may what, what is refused, what is said without a bus."""
 
+import time
+
 import pytest
 from support.front_door import open_door
 
+from dashboard.data.store import Store
 from dashboard.desk import Desk
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import ALARM
 
 ORDERS = {
     "acknowledge": {"id": "axis-a21", "device": "cube"},
@@ -20,6 +25,25 @@ def door(tmp_path_factory):
     desk = Desk(None, "gyrofree")
     with open_door(tmp_path_factory.mktemp("door"), scene=False, desk=desk) as opened:
         yield opened
+
+
+def test_a_place_that_only_watches_sees_the_sites_alarms_and_why_no_orders(tmp_path):
+    """It may ask no service: what is said to everybody is shown, and where it is not, that is."""
+    store, desk = Store(), Desk(None, "lab", watching="office watches lab")
+    one = pb.Alarm(id="axis-a21", device="cube", kind="axis", title="axis a21 stuck", level=2)
+    one.state = pb.Alarm.STATE_UNACKNOWLEDGED
+    with (
+        open_door(tmp_path, scene=False, store=store, desk=desk) as door,
+        door.client("vera") as viewer,
+    ):
+        silent = viewer.get("/api/alarms").json()
+        assert silent["part"] and "not known now" in silent["trouble"] and not silent["alarms"]
+        status = pb.AlarmStatus(header=pb.Header(utc_ns=time.time_ns()), alarms=[one])
+        store.put(ALARM, "cube", "", status)
+        seen = viewer.get("/api/alarms").json()
+        assert not seen["trouble"] and [a["title"] for a in seen["alarms"]] == ["axis a21 stuck"]
+        orders = viewer.get("/api/orders").json()
+        assert orders["orders"] == [] and "office watches lab" in orders["message"]
 
 
 @pytest.mark.parametrize("path", ORDERS)

@@ -20,8 +20,9 @@ from dashboard.alarms.settings import AlarmSettings, HealthSettings
 from dashboard.alarms.watch import Watch
 from dashboard.data.alarms import alarms, bench_alarms
 from dashboard.data.lateness import behind, clock, lateness
-from dashboard.data.places import places
+from dashboard.data.places import people_said, places
 from dashboard.data.store import Store
+from dashboard.web.alarms.watched import watched
 from messages.bus.beating import BEAT_S
 from messages.bus.presence import AGAIN_S, LOOK_S, SETTLE_S
 from messages.contract import gyrofree_pb2 as pb
@@ -229,6 +230,31 @@ def test_a_place_of_which_nothing_is_heard_is_one_alarm_and_not_one_for_each_ser
     assert list(bench.found()) == ["place-lab"]
 
 
+def test_who_is_silent_at_a_place_out_of_reach_is_not_blamed_for_it(bench):
+    """The gateway, its estimators and the recorder are silent as the link is cut."""
+    everybody(bench)
+    bench.beats("lab", "recorder")
+    bench.sample()
+    store = bench.store
+    for topic, estimator in ((tp.LINK, ""), (tp.ESTIMATOR, "products-ekf")):
+        store.put(topic, "cube", estimator, topic.type(header=pb.Header(utc_ns=int(WALL_S * 1e9))))
+    recording = pb.RecorderStatus(recording=True)
+    store.put(tp.STATUS, "recorder", "", recording)
+    for latest in (*store.devices["cube"].latest.values(), store.recorder):
+        latest.arrived -= 30.0
+    silent = {"link", "estimator-products-ekf"}
+    assert {one.id for one in alarms(store, store.devices["cube"])} == silent
+    assert "recorder" in {one.id for one in bench_alarms(store)}
+    for _ in range(20):
+        bench.passes(0.5)
+        for role in ("dashboard", "router"):
+            bench.beats("office", role)
+    assert not alarms(store, store.devices["cube"])
+    assert [one.id for one in bench_alarms(store)] == ["place-lab"]
+    (lab,) = [one for one in places(store.presence) if one["name"] == "lab"]
+    assert people_said(lab["people"], lab["state"]) == "who looks is not known"
+
+
 def test_two_gateways_of_one_board_are_an_alarm_of_that_board(bench):
     everybody(bench)
     bench.passes(SETTLE_S)
@@ -357,6 +383,9 @@ def test_an_office_finds_its_own_disk_clock_certificates_and_a_place_out_of_reac
     assert {one.level for one in own.faults()} >= {"critical", "warning", "watch"}
     bench.store.own_faults = own.faults()
     assert {one.id for one in bench_alarms(bench.store)} == found | {"place-lab"}
+    on_page, _ = watched(bench.store)
+    assert {one.id for one in on_page} == found | {"place-lab"}
+    assert on_page[0].level == pb.Alarm.LEVEL_CRITICAL and all(one.raised_utc_ns for one in on_page)
 
 
 # --- REST and the page

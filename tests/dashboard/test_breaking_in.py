@@ -1,5 +1,6 @@
 """What a hostile visitor or user of the page tries that has no test elsewhere."""
 
+import hashlib
 import socket
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -127,3 +128,15 @@ def test_a_flood_of_ways_to_the_provider_pushes_nobody_else_out():
     for _ in range(2000):
         _remember(attempts, Attempt("/", "10.0.0.2"))
     assert mine in attempts.values() and len(attempts) == 1 + ATTEMPTS_EACH
+
+
+def test_while_the_users_file_is_damaged_nobody_loses_the_command(door: Door):
+    with door.client("otto") as client:
+        (cookie,) = client.cookies.values()
+        seat = door.front.seats.of_key(hashlib.sha256(cookie.encode()).hexdigest())
+        whole = door.settings.users.read_text()
+        door.settings.users.write_text(whole[:50])
+        assert door.front.seats.alive(seat)  # its thread goes on
+        door.settings.users.write_text(whole)
+        remove_user(door.settings.users, "otto")
+        assert not door.front.seats.alive(seat)

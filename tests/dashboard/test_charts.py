@@ -143,7 +143,7 @@ def test_a_gap_stays_open_and_a_hidden_line_goes(visit):
 def test_on_a_phone_no_page_is_wider_than_the_screen(visit, path):
     page = visit(path, PHONE, "light", has_touch=True, is_mobile=True)
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
-    assert page.evaluate(COLOURED, ["rate x", 0.0, 0.3]) > 0.9
+    assert page.evaluate(COLOURED, ["rate x", 0.0, 0.3]) > 0.7  # dots where a filter is blind
 
 
 def test_axes_follow_the_theme(visit):

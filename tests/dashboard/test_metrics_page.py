@@ -26,6 +26,7 @@ def test_a_viewers_token_reads_the_figures_of_all_services(tmp_path):
     store.put(ESTIMATOR, "cube", "ekf", said)
     store.put(STATUS, "recorder", "", status_of(pb.RecorderStatus, "recorder", recording=True))
     beat = pb.Beat(role="gateway", clock_ahead_s=math.nan, certificate_ends_utc_ns=5_000_000_000)
+    beat.loop, beat.turn_ago_s, beat.turn_most_s = "link cube", 4.0, 3.0
     store.presence.beat("lab", "gateway-aa", beat)
     store.presence.beat("lab", "gateway-aa", beat)
     store.presence.look(1.0)
@@ -54,7 +55,9 @@ def test_a_viewers_token_reads_the_figures_of_all_services(tmp_path):
     assert found["gyrofree_disk_free_bytes", "dashboard.users"] > 0.0
     assert found["process_resident_memory_bytes",] > 0.0
     service = "lab", "gateway-aa"
-    assert found["gyrofree_service_running", *service] == 1.0
+    assert found["gyrofree_service_turn_age_seconds", *service] >= 4.0
+    assert found["gyrofree_service_turn_limit_seconds", *service] == 3.0
+    assert found["gyrofree_service_running", *service] == 0.0  # it hangs
     assert found["gyrofree_service_certificate_end_timestamp_seconds", *service] == 5.0
     assert ("gyrofree_service_clock_ahead_seconds", *service) not in found  # not measured
     assert not any("old-replay" in key for key in found)

@@ -3,7 +3,9 @@ real viser server.
 """
 
 import contextlib
+import html as html_module
 import json
+import re
 import time
 import urllib.request
 from types import SimpleNamespace
@@ -24,7 +26,7 @@ from dashboard.data.track import Track
 from dashboard.desk import Desk
 from dashboard.scene.drawing import camera, series
 from dashboard.scene.drawing import geometry as geo
-from dashboard.scene.drawing.drawn import Curve, _data
+from dashboard.scene.drawing.drawn import Curve, Name, _data, drawn
 from dashboard.scene.drawing.palette import estimator_colour, number
 from dashboard.scene.panels import PAGES, Snapshot
 from dashboard.scene.panels.base import Panel
@@ -172,6 +174,28 @@ def test_chart_data_are_of_one_length_finite_and_end_with_the_mask():
     assert len(data) == 1 + 3 + 1 + 2 and {len(array) for array in data} == {series.POINTS}
     assert all(np.isfinite(array).all() for array in data) and not data[-1].any()
     assert data[2].max() < 20.0  # a band without bound does not press the curves flat
+
+
+def test_what_is_not_vouched_for_is_dotted_and_a_band_that_is_not_known_is_none():
+    t = np.arange(0, 10, 0.01)
+    blind, half = (t > 4.0) & (t < 6.0), np.where((t > 7.0) & (t < 8.0), np.nan, 1.0)
+    curve = Curve("a", "#56B4E9", t, np.sin(t), half=half, sight=np.where(blind, 2, 0))
+    shown = drawn(Name("rate", "°/s"), [curve], 0.0, 10.0, True).heading
+    told = json.loads(html_module.unescape(re.search(r'data-chart="([^"]*)"', shown)[1]))
+    assert told["faint"] == {"a": [[pytest.approx(4.01), pytest.approx(6.0)]]}
+    assert told["holes"].keys() == {"a +3σ", "a −3σ"}
+    assert told["holes"]["a +3σ"] == [[pytest.approx(7.0), pytest.approx(8.0)]]
+
+
+def test_a_preview_is_greyed_by_its_own_pauses(store):
+    for k in range(4):
+        store.preview_hz = 1
+        truth = pb.Truth(header=pb.Header(utc_ns=UTC0_NS + k * 10**9), q_nb=[1, 0, 0, 0])
+        store.put(tp.TRUTH, "cube-01", "", truth, arrived=100.0 + k)
+        accel = pb.AccelBatch(header=truth.header, axes=12, f_mps2=[0.0] * 12, period_s=0.01)
+        store.put(tp.ACCEL, "cube-01", "", accel, arrived=100.0 + k)
+    device = store.device("cube-01")
+    assert not device.stale("truth", now=105.9) and device.stale("truth", now=106.1)
 
 
 # --- geometry

@@ -216,8 +216,11 @@ class Bench(Ground):
 
     def signal(self, service: str, number: signal.Signals) -> None:
         """Send it to a service; "router" is one."""
-        pid = self._router.pid if service == "router" else self.children()[service].pid
-        os.kill(pid, number)
+        os.kill(self.pid(service), number)
+
+    def pid(self, service: str) -> int:
+        """Of a service; "router" is one."""
+        return self._router.pid if service == "router" else self.children()[service].pid
 
     def kill(self, service: str) -> None:
         """kill -9, and until there is another one."""

@@ -42,7 +42,7 @@ def alarm(role: str) -> Alarmed:
 
 def hold(bench: Bench, service: str, thread: str, role: str) -> None:
     """Stop one thread of a service until its alarm is there, as a debugger does."""
-    with held(bench.children()[service].pid, thread):
+    with held(bench.pid(service), thread):
         about = f"service-here-{role}"
         bench.until(lambda: about in bench.watch.alarms, f"alarm {about}")
 
@@ -146,6 +146,7 @@ PROCESSES = (
     stands("estimator", "estimator", "estimator", Alarmed("estimator-products-ekf")),
     stands("procedures", "procedures"),
     stands("dashboard", "dashboard"),
+    stands("router", "router"),
     Scenario(
         "up stopped for 5 s",
         "SIGSTOP of the supervisor, SIGCONT after 5 s",

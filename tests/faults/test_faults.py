@@ -15,6 +15,10 @@ from faults.far import FarBench
 from faults.ground import Ground
 from faults.of_sites import SITE
 from faults.scenario import Scenario, run
+from messages.bus.pulse import UP
+from messages.bus.session import subscribe
+from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import BEAT
 
 BENCHES = {  # by kind
     "": Bench,
@@ -81,6 +85,20 @@ def test_a_fault_costs_what_it_may_and_is_said(
     record_property("well_s", round(measured.well_s, 1))
     record_property("missing", measured.account.missing)
     record_property("unnamed", measured.unnamed)
+
+
+def test_every_service_says_whether_its_work_goes_on(benches: Benches) -> None:
+    """Its beats name a loop; the supervisor's, too, which has no session on the bus."""
+    bench, heard = benches.of(""), dict[str, pb.Beat]()
+
+    def take(_: str, beat: pb.Beat) -> None:
+        heard[beat.role] = beat
+
+    beats = subscribe(bench.watch.session, BEAT, bench.bus.prefix, take)
+    wanted = {"router", "gateway", "estimator", "recorder", "procedures", "alarms", "dashboard", UP}
+    bench.until(lambda: heard.keys() >= wanted, "a beat of everybody")
+    beats.undeclare()
+    assert not [role for role in wanted if not heard[role].loop or not heard[role].turn_most_s]
 
 
 def test_an_orderly_end_is_quick_and_loses_nothing(benches: Benches) -> None:

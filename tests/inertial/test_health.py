@@ -20,7 +20,7 @@ from inertial.rate import axis_samples, parity
 from inertial.rate.axis_belief import projection
 from inertial.rate.estimators import VARIANTS
 from inertial.rate.health import AxisState, HealthMonitor
-from inertial.simulation.faults import FaultError, Faults, parse
+from inertial.simulation.faults import FaultError, Faults, parse, when
 from inertial.simulation.table import IDEAL, TableTest
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import AXES
@@ -407,3 +407,8 @@ def test_axis_health_is_published_four_times_a_second():
     assert list(last.position_b_m) == [-0.05, 0.05, 0.05] and not any(
         a.excluded for a in said[2].axes
     )
+
+
+def test_a_fault_says_when_it_comes_or_that_it_never_does():
+    assert when(parse("a21:stuck@12", NAMES), 30.0).startswith("comes 12 s after")
+    assert when(parse("a21:stuck@30", NAMES), 30.0).startswith("never comes")

@@ -15,8 +15,9 @@ from messages.bus.command import state
 from messages.bus.command.history import KEPT, History, newest_of
 from messages.bus.command.keeper import Keeper
 from messages.bus.command.state import Held, Refusal, Seat
-from messages.bus.session import BusSettings, open_client, open_router
+from messages.bus.session import BusSettings, Publishers, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
+from messages.contract.topics import ORDER
 
 SEATS = [Seat(f"s{n}", f"user{n}", "lab", admin=n == 2) for n in range(3)]
 VERBS = {
@@ -216,6 +217,14 @@ def test_a_sign_in_that_ends_lets_go_and_a_keeper_that_was_killed_knows_still(si
     assert "otto (lab) signed out" in site.anna.status.last
     site.anna.recorder(START)
     assert site.anna.status.holder.user == "anna"
+
+
+def test_an_order_is_of_the_place_that_its_key_says_whatever_is_in_it(site):
+    done = pb.OrderGiven.OUTCOME_DONE
+    said = pb.OrderGiven(at_utc_ns=1, user="otto", place="lab", what="forged", outcome=done)
+    Publishers(site.session, "t").put(ORDER, "office", said)
+    until(lambda: site.otto.history("forged", 5)[0], "it is kept")
+    assert [one.place for one in site.otto.history("forged", 5)[0]] == ["office"]
 
 
 def test_without_a_keeper_everybody_orders_as_before(bus):

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from messages.bus import orders
+from messages.bus import deadline, orders
 from messages.bus.session import BusSettings, open_client, open_router
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.topics import TopicError, control_key
@@ -163,3 +163,41 @@ def test_without_a_router_or_with_a_strange_name_nothing_is_sent(bus):
     session.close()
     with pytest.raises(orders.NoAnswer, match="the order cannot be sent"):
         orders.give(session, "t", orders.BOARD, pb.BoardCommand(), "cube")
+
+
+def test_an_order_that_waited_until_its_giver_had_given_up_is_not_carried_out(asker, bus):
+    """As of a service that was stopped by a signal: what was ordered meanwhile waits for it."""
+    taken, held = [], threading.Event()
+
+    def handler(order):
+        taken.append(order.command.name or order.command.ask)
+        held.wait(PATIENCE)  # the first one stops it
+        order.answer(pb.Reply(ok=True))
+
+    with open_client(bus, timeout_s=PATIENCE) as session:
+        deadline.heard(0, 0.0)
+        orders.take(session, "t", orders.BOARD, handler, "cube")
+        while not taken:
+            with contextlib.suppress(orders.NoAnswer):
+                orders.give(
+                    asker, "t", orders.BOARD, pb.BoardCommand(name="start"), "cube", timeout_s=0.2
+                )
+        with pytest.raises(orders.NoAnswer):
+            order = pb.BoardCommand(name="self_test")
+            orders.give(asker, "t", orders.BOARD, order, "cube", timeout_s=0.2)
+        with pytest.raises(orders.NoAnswer):  # who only asks does no harm
+            order = pb.BoardCommand(ask=True)
+            orders.give(asker, "t", orders.BOARD, order, "cube", timeout_s=0.2)
+        time.sleep(1.0)
+        held.set()
+        again = known(asker, orders.BOARD, "cube", timeout_s=PATIENCE, name="batch", value=4)
+        assert again.ok and "batch" in taken and True in taken and "self_test" not in taken
+
+
+def test_a_deadline_that_is_none_spoils_no_order():
+    deadline.heard(0, 0.0)
+    for said in (None, "", "x", "-5", "9" * 40, "\u0663", "1e9"):
+        assert deadline.late_s(said) == 0.0
+    assert deadline.late_s("0") > 1.0
+    deadline.heard(0, 3e9)  # a comparison that may be off by more than an order lasts
+    assert deadline.until(8.0) == "" and deadline.late_s("0") == 0.0

@@ -6,7 +6,7 @@ import socket
 import subprocess
 import sys
 
-from messages.bus.timeouts import GIVEN_UP_MS, look
+from messages.bus.timeouts import GIVEN_UP_MS, NOTSENT_LOWAT, UNSENT, look
 
 
 def given_up_ms(one: socket.socket) -> int:
@@ -29,6 +29,8 @@ def test_sockets_of_this_machine_and_what_is_no_tcp_stay_as_they_are():
             look()
         assert [given_up_ms(one) for one in (far, six)] == [GIVEN_UP_MS, GIVEN_UP_MS]
         assert [given_up_ms(one) for one in (here, client, mapped)] == [0, 0, 0]
+        unsent = [one.getsockopt(socket.IPPROTO_TCP, NOTSENT_LOWAT) for one in (far, six, client)]
+        assert unsent == [UNSENT, UNSENT, 0]
         assert len(os.listdir("/proc/self/fd")) == files
 
 

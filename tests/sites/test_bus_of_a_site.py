@@ -196,8 +196,12 @@ def test_an_office_joins_hears_everything_may_order_nothing_and_can_be_sent_away
         assert abs(people.clock_ahead()[0]) <= people.clock_ahead()[1]
         page.put(tp.BEAT.key("lab", "lab", "dashboard-1"), forged_beat("lab"))
         page.put(tp.BEAT.key("lab", "office", "dashboard-2"), forged_beat("office"))
+        page.put(tp.BEAT.key("lab", "lab", "up-1"), forged_beat("lab"))
+        page.put(tp.BEAT.key("lab", "office", "up-2"), forged_beat("office"))  # of who started it
         until(lambda: ("office", "dashboard-2") in presence.processes, "its own name is let in")
+        until(lambda: ("office", "up-2") in presence.processes, "so is its supervisor's")
         assert ("lab", "dashboard-1") not in presence.processes
+        assert ("lab", "up-1") not in presence.processes
         clock.undeclare()
     assert remove(home, "office") >= 4
     heard.clear()

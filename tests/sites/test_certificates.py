@@ -93,6 +93,15 @@ def test_another_secret_an_old_invitation_and_a_removed_place_are_refused(home: 
         read_invitation(old.line())
 
 
+def test_a_clock_that_is_behind_is_said_before_home_is_waited_for_in_vain(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sites.authority.BACKDATED", -dt.timedelta(days=1))  # home is a day ahead
+    invitation, _ = invite(home, "office", "viewer", "tls/office:7447", WEEK)
+    with pytest.raises(SiteError, match="clock says .*: set it right first"):
+        read_invitation(invitation.line())
+
+
 @pytest.fixture(scope="module")
 def line(tmp_path_factory: pytest.TempPathFactory) -> str:
     """An invitation."""

@@ -9,15 +9,21 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+import zenoh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support.stack import free_port
 
+from messages.bus.session import BusSettings, open_client, open_router
+from sessions.library.copied import read_copied
 from sites.copying.fetching import BOOK, Copies, load_copies
 from sites.copying.gathering import AT_ONCE, Drafts, Gathering, Segment
 from sites.copying.serving import Answers
 from sites.copying.shelf import PART, SEGMENT, Shelf, ShelfError, hash_file, list_file
 from sites.copying.since import Heard, Told
 from sites.place import SiteError
+from sites.roles import segment_key
+from sites.service import copy
 
 PARTS = SEGMENT // PART  # of a full segment
 ONE, TWO = "20261129-120000-first", "20261129-130000"
@@ -87,6 +93,10 @@ def test_newest_first_equal_and_proven_and_asked_for_once(roots: tuple[Path, Pat
     known = load_copies(place)[ONE]["files"]["recording.mcap"]
     content = (there / ONE / "recording.mcap").read_bytes()
     assert known["home_sha256"] == known["here_sha256"] == hashlib.sha256(content).hexdigest()
+    copied = read_copied(here / ONE)
+    assert copied.files["recording.mcap"].equal and set(copied.files) == set(
+        load_copies(place)[ONE]["files"]
+    )
     home.asked.clear()
     assert go(Copies(here, place), home) == 0
     assert [each.split("/")[0] for each in home.asked] == ["index"]
@@ -251,11 +261,15 @@ def gathered(content: bytes, ways: list[Way]) -> bytes:
 
 def test_a_way_that_never_answers_holds_up_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sites.copying.gathering.LATE_S", 0.05)
-    content, released = noise(2 * SEGMENT + 9), threading.Event()
-    stuck = Way(content, lambda: released.wait(30.0))
-    good = Way(content, lambda: stuck.asked or released.wait(0.05))
+    content, began, released = noise(2 * SEGMENT + 9), threading.Event(), threading.Event()
+
+    def for_ever() -> None:
+        began.set()
+        released.wait(60.0)
+
+    stuck, good = Way(content, for_ever), Way(content, lambda: began.wait(60.0))
     assert gathered(content, [stuck, good]) == content
-    assert len(stuck.asked) == AT_ONCE and set(stuck.asked) <= set(good.asked)
+    assert 1 <= len(stuck.asked) <= AT_ONCE and set(stuck.asked) <= set(good.asked)
     released.set()
 
 
@@ -281,6 +295,33 @@ def test_the_last_way_that_fails_ends_it() -> None:
     gone = Way(noise(SEGMENT), fail)
     with pytest.raises(SiteError, match="gone"):
         gathered(gone.content, [gone])
+
+
+def test_who_waits_for_home_ends_when_he_is_told_to(
+    roots: tuple[Path, Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The link is cut: home has the question, and its answer does not come."""
+    monkeypatch.setattr("sites.service.INDEX_S", 600.0)
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    bus = BusSettings(prefix="lab", router=endpoint, listen=[endpoint])
+    _, here, place = roots
+    waiting, came, stop = [], threading.Event(), threading.Event()
+
+    def on_query(query: zenoh.Query) -> None:
+        waiting.append(query)  # answered by nobody
+        came.set()
+
+    with open_router(bus), open_client(bus) as home, open_client(bus) as office:
+        queryable = home.declare_queryable(f"{segment_key('lab')}/**", on_query)
+        arguments = (Copies(here, place), "lab", office, stop)
+        thread = threading.Thread(target=copy, args=arguments, daemon=True)
+        thread.start()
+        assert came.wait(30.0)
+        stop.set()
+        thread.join(60.0)
+        assert not thread.is_alive()
+        queryable.undeclare()
+        waiting.clear()
 
 
 # --- what has changed

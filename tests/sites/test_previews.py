@@ -197,6 +197,15 @@ def test_the_rate_follows_what_the_link_carries(offset: float) -> None:
     assert found.count(20) < len(found) / 6, "what was too much is not tried again and again"
 
 
+def test_a_rate_that_is_far_too_much_is_left_at_once_for_what_comes_through() -> None:
+    pace, link = Pace(50, may_be_full=False), Link(1e7)
+    assert link.run(pace, 0.0, 120.0)[-1] == 50
+    link.rate = 8_000.0  # 8 frames a second
+    found = link.run(pace, 120.0, 12.0)
+    assert not {20, 10} & set(found), "no step in between"
+    assert found[-1] <= 5
+
+
 def test_a_link_that_carries_everything_gets_everything() -> None:
     pace = Pace(50, may_be_full=True)
     assert Link(1e7).run(pace, 0.0, 120.0)[-1] == FULL

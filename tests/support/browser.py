@@ -24,6 +24,7 @@ FLAGS = [
 # said without harm: drawing in software; a part of viser that we do not use wants to evaluate texts
 KNOWN = ("GPU stall", "Evaluating a string as JavaScript")
 DESKTOP, PHONE = {"width": 1440, "height": 900}, {"width": 390, "height": 844}
+EXPECTED = 30_000  # ms; the 5 s of playwright are short on a busy machine
 PATIENCE = 90_000  # ms; the scene is drawn in software here
 
 
@@ -35,8 +36,9 @@ def _shared(fixture_name: str, config: pytest.Config) -> str:
 @pytest.fixture(scope=_shared)
 def chromium() -> "Iterator[Browser]":
     """A browser that draws in software; one for all, each visitor has a context of his own."""
-    from playwright.sync_api import sync_playwright  # most tests need none
+    from playwright.sync_api import expect, sync_playwright  # most tests need none
 
+    expect.set_options(timeout=EXPECTED)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         yield browser

@@ -21,7 +21,7 @@ MAY_IMPORT = {
     "logs": {"messages", "inertial"},
     "sessions": {"messages", "inertial", "logs"},
     "dashboard": {"messages", "inertial", "logs", "sessions"},
-    "sites": {"messages", "inertial"},
+    "sites": {"messages", "inertial", "sessions"},
 }
 MAY_IMPORT["gyrofree"] = set(MAY_IMPORT)  # the composition root wires them all
 LONGEST = 330  # lines of a module

@@ -2,10 +2,16 @@
 history it would have to ask for, it may not ask.
 """
 
+from dashboard.data.fault import Alarm
 from dashboard.data.store import Store
 from dashboard.data.there import role_out_of_reach
 from messages.contract import gyrofree_pb2 as pb
 
+LEVELS = {
+    "watch": pb.Alarm.LEVEL_WATCH,
+    "warning": pb.Alarm.LEVEL_WARNING,
+    "critical": pb.Alarm.LEVEL_CRITICAL,
+}
 WATCHED = (
     "Seen from here is what is wrong now. Limits, notices and what happened stand on the page of"
     " the site's home."
@@ -13,10 +19,10 @@ WATCHED = (
 
 
 def watched(store: Store) -> tuple[list[pb.Alarm], str]:
-    """The alarms that the site's service says, the worst first, and what is wrong with that. Call
-    under the store's lock.
+    """The alarms that the site's service says and those of this place, the worst first; and what
+    is wrong with that. Call under the store's lock.
     """
-    found = {}
+    found = {("", one.id): _own(one) for one in store.own_faults}
     for name in store.names():
         device = store.devices[name]
         heard = device.get("alarm")
@@ -30,3 +36,18 @@ def watched(store: Store) -> tuple[list[pb.Alarm], str]:
     else:
         trouble = "Nothing is heard of the site's alarms: what is wrong is not known now."
     return sorted(found.values(), key=lambda one: (-one.level, one.raised_utc_ns)), trouble
+
+
+def _own(one: Alarm) -> pb.Alarm:
+    """A fault that this place has found of itself (dashboard.alarms.own_place)."""
+    return pb.Alarm(
+        id=one.id,
+        kind=one.kind,
+        title=one.title,
+        text=one.text,
+        page=one.page,
+        level=LEVELS.get(one.level, pb.Alarm.LEVEL_WARNING),
+        state=pb.Alarm.STATE_UNACKNOWLEDGED,
+        active=True,
+        raised_utc_ns=int(one.raised_s * 1e9),
+    )

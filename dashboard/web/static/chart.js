@@ -4,7 +4,7 @@
 
 import { Cursors } from "/static/cursors.js";
 import { keyed, selectable } from "/static/drag.js";
-import { dress, inPixels } from "/static/figure.js";
+import { dress, gapsOf } from "/static/figure.js";
 
 const { uPlot } = window; // vendor/uplot, a classic script before this module
 const FONT = "12px system-ui, 'DejaVu Sans', sans-serif";
@@ -48,7 +48,7 @@ function seriesOf(lines, unsureOf) {
   const series = [{}], bands = [];
   for (const [n, line] of lines.entries()) {
     const look = {
-      gaps: (u, ...found) => [...(found.at(-1) ?? []), ...inPixels(u, unsureOf(n))],
+      gaps: (u, at, from, to, found) => gapsOf(u, found, unsureOf(n)),
       label: line.short, stroke: faded(line.color, line.alpha ?? 1), width: line.width ?? 1.4,
       dash: line.dash?.length ? line.dash : undefined, points: { show: false },
     };

@@ -116,8 +116,16 @@ function drawRanges(u, { ranges }) {
 
 const within = (stretches, x) => stretches.some(([from, until]) => x >= from && x <= until);
 
-// For the gaps of a series of uPlot: stretches of time in px.
-export const inPixels = (u, stretches) => stretches.map((ends) => ends.slice(0, 2).map((t) => u.valToPos(t, "x", true)));
+// The gaps of a series of uPlot, px: those that it found, and stretches of time; it wants them in order, none over another.
+export function gapsOf(u, found, stretches) {
+  const more = stretches.map(([from, until]) => [u.valToPos(from, "x", true), u.valToPos(until, "x", true)]);
+  const merged = [];
+  for (const [a, b] of [...found, ...more].sort((one, other) => one[0] - other[0])) {
+    if (merged.length && a <= merged.at(-1)[1]) merged.at(-1)[1] = Math.max(b, merged.at(-1)[1]);
+    else merged.push([a, b]);
+  }
+  return merged;
+}
 
 // What an estimator does not vouch for is dotted; the chart's own line has a gap there.
 function drawFaint(u, figure) {

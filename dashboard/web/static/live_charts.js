@@ -2,7 +2,7 @@
 // they show stands in the heading above each (data-chart); see dashboard/scene/drawing/chart.py.
 import { Cursors, pictures } from "/static/cursors.js";
 import { keyed, selectable } from "/static/drag.js";
-import { dress, inPixels } from "/static/figure.js";
+import { dress, gapsOf } from "/static/figure.js";
 import { ask, choose, state, whenStated, zoomed } from "/static/view.js";
 
 const LOOK_MS = 250;
@@ -48,10 +48,10 @@ function holed(chart) {
   chart.series.forEach((series, k) => {
     if (!k) return;
     const { label = "" } = series, mine = label.replace(EDGE, "").trim();
-    series.gaps = (u, ...found) => {
+    series.gaps = (u, at, from, to, found) => {
       const { holes = {}, faint = {} } = told(u);
       const own = mine === label ? (faint[label] ?? []) : (holes[label] ?? []); // a band where it is not known
-      return [...(found.at(-1) ?? []), ...inPixels(u, [...(holes[mine] ?? []), ...own])];
+      return gapsOf(u, found, [...(holes[mine] ?? []), ...own]);
     };
   });
 }

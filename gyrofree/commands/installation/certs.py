@@ -79,22 +79,32 @@ def certs_renew(
     as_json: AsJson = False,
     config: Config = None,
 ) -> None:
-    """New keys and certificates for this place now, at its home; `up` does it in time."""
-    from sites.enrolment import Registrar
-    from sites.service import own_certificates, renew
+    """New keys and certificates for this place now, at its home; `up` does it in time.
+
+    Also where a file of theirs is damaged or gone.
+    """
+    from sites.authority import Authority
+    from sites.enrolment import Registrar, is_whole
+    from sites.joining import issue_here
+    from sites.roles import SERVICES
+    from sites.service import own_roles, renew
 
     folder = _folder(settings_of(config))
     try:
-        if not load_place(folder).at_home:
+        place = load_place(folder)
+        if not place.at_home:
             raise SiteError(
                 "away from home certificates are renewed by `gyrofree up`, over the bus"
             )
-        there = own_certificates(folder)
+        there = list(dict.fromkeys((*own_roles(folder), *SERVICES)))
         if role and role not in there:
             raise SiteError(f"no certificate of {role!r} here; there are {', '.join(there)}")
-        chosen = [role] if role else list(there)
+        chosen = [role] if role else own_roles(folder)
         for each in chosen:
-            renew(folder, each, Registrar(folder).renew_own)
+            if is_whole(folder, each):
+                renew(folder, each, Registrar(folder).renew_own)
+            else:
+                issue_here(folder, Authority(folder), place, (each,))
     except (SiteError, OSError, ValueError) as error:
         raise fail(error, EXIT_FAILED) from None
     say(json.dumps({"renewed": chosen}) if as_json else f"renewed: {', '.join(chosen)}")

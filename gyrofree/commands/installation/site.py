@@ -64,11 +64,14 @@ def site_init(
     config: File = DEFAULT_PATH,
 ) -> None:
     """Make a site whose home is here: its authority, certificates, and the configuration."""
-    from gyrofree.setup.site import write_place
+    from gyrofree.setup.site import of_no_site, unfinished, write_place
     from sites.joining import make_site
 
     try:
-        place = make_site(folder, name, ("simulator",) if simulator else ())
+        of_no_site(config, folder)
+        place = unfinished(config, folder)
+        if place is None or (place.site, place.at_home) != (name, True):
+            place = make_site(folder, name, ("simulator",) if simulator else ())
         write_place(config, place.site, folder, f"tls/127.0.0.1:{port}", port)
     except (SiteError, ConfigError, OSError) as error:
         raise fail(error, EXIT_CONFIG) from None
@@ -123,7 +126,7 @@ def site_join(
     config: File = DEFAULT_PATH,
 ) -> None:
     """Join a site by an invitation: waits for its home to call, then writes the configuration."""
-    from gyrofree.setup.site import write_place
+    from gyrofree.setup.site import of_no_site, unfinished, write_place
     from sites.invitation import read_invitation
     from sites.joining import join
 
@@ -132,10 +135,11 @@ def site_join(
         if not line.startswith("gyrofree-") and Path(line).is_file():
             line = Path(line).read_text(errors="replace")
         start_logging()
+        of_no_site(config, folder)
         endpoint, stop = _endpoint(listen), stop_on_signals()
-        place = join(
-            folder, read_invitation(line), endpoint, stop, lambda text: say(text, file=sys.stderr)
-        )
+        invited, place = read_invitation(line), unfinished(config, folder)
+        if place is None or (place.site, place.place) != (invited.site, invited.place):
+            place = join(folder, invited, endpoint, stop, lambda text: say(text, file=sys.stderr))
         write_place(config, place.site, folder, endpoint, int(endpoint.rpartition(":")[2]))
     except (SiteError, ConfigError, OSError) as error:
         raise fail(error, EXIT_CONFIG) from None

@@ -16,6 +16,7 @@ from pathlib import Path
 import zenoh
 
 from messages.bus import orders
+from messages.bus.beating import HERE
 from messages.bus.command import state
 from messages.bus.command.history import History
 from messages.bus.command.state import Held, Refusal, Seat
@@ -44,7 +45,7 @@ class Keeper:
         self._held = _load(self._file)
         self._since, self._due = time.time_ns(), 0.0
         self._given: deque[pb.OrderGiven] = deque(maxlen=WAITING)
-        self._hearing = subscribe(session, ORDER, prefix, lambda _, one: self._given.append(one))
+        self._hearing = subscribe(session, ORDER, prefix, self._on_given)
         self._taking = orders.take(session, prefix, orders.SEAT, self._on_asked)
 
     def close(self) -> None:
@@ -60,6 +61,14 @@ class Keeper:
             self._become(lambda held, now_s, utc_ns: state.ticked(held, now_s, utc_ns))
             if time.monotonic() >= self._due:
                 self._publish()
+
+    def _on_given(self, key: str, one: pb.OrderGiven) -> None:
+        """Zenoh's thread. Of which place an order is says its key: the rules of a site hold that,
+        whatever stands in the message.
+        """
+        place = key.split("/")[1]
+        one.place = "" if place == HERE else place
+        self._given.append(one)
 
     def _on_asked(self, asked: Asked) -> None:
         """Zenoh's thread: the answer is at once, so that who orders first waits for nothing."""
