@@ -33,4 +33,5 @@ Index, in the order in which the data pass:
     doubts        is a setting wrong? what rates and gravity say of pulses, sizes, axes
     toml_file     files with a version, read strictly and written whole
     whole_file    what somebody named is written whole, and a device stays one
+    one_at_a_time changes of a folder's files by several processes, one after the other
 """

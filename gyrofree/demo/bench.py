@@ -115,7 +115,7 @@ def run(plan: Plan) -> None:
     """Run until Ctrl-C; raises typer.Exit with a code when it cannot."""
     start_logging()
     stop = stop_on_signals()
-    look_for_others({"--bus-port": (plan.bus_port,), "--port": (plan.port,)})
+    look_for_others(("bus", "--bus-port", plan.bus_port), ("dashboard", "--port", plan.port))
     config = write_configuration(plan)
     settings = load(config)
     supervisor = _supervise(plan, config)
@@ -158,15 +158,14 @@ def add_board(supervisor: Supervisor, plan: Plan, config: Path) -> None:
     supervisor.add("board", *board, waits_for=("estimator", "estimating"), once=plan.once)
 
 
-def look_for_others(wanted: dict[str, tuple[int, ...]]) -> None:
-    """End with a word where a port is taken; wanted: ports by the option that chooses them."""
-    for option, ports in wanted.items():
-        for port in ports:
-            if port_taken("127.0.0.1", port):
-                raise fail(
-                    f"port {port} is taken: end what uses it (`ss -ltnp`), or choose {option}",
-                    EXIT_TAKEN,
-                )
+def look_for_others(*wanted: tuple[str, str, int]) -> None:
+    """End with a word where a port is taken; wanted: whose, the option for it, the port."""
+    for what, option, port in wanted:
+        if port_taken("127.0.0.1", port):
+            raise fail(
+                f"{what} port {port} is taken: end what uses it (`ss -ltnp`), or choose {option}",
+                EXIT_TAKEN,
+            )
 
 
 def sign_in_link(settings: Settings) -> Callable[[], str]:

@@ -45,7 +45,13 @@ def run(plan: Plan) -> None:
     """
     start_logging()
     page, router, line = plan.port + 1, plan.bus_port + 1, plan.bus_port + 2
-    look_for_others({"--port": (plan.port, page), "--bus-port": (plan.bus_port, router, line)})
+    look_for_others(
+        ("bus", "--bus-port", plan.bus_port),
+        ("office's bus", "--bus-port", router),
+        ("line's", "--bus-port", line),
+        ("dashboard", "--port", plan.port),
+        ("office's dashboard", "--port", page),
+    )
     lab, office = (plan.folder / place / "gyrofree.toml" for place in (LAB, OFFICE))
     plan = replace(plan, folder=lab.parent)
     _make_places(plan, lab, office)

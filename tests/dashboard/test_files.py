@@ -65,23 +65,32 @@ def sent(client, *names: str, content: bytes = b"") -> tuple[int, list]:
 
 
 @pytest.mark.parametrize("form", ["NFC", "NFD"])
-def test_files_are_taken_as_they_are_called(door, form):
-    names = ["Messung Prüfstand.csv", "base (1).csv", "gps_cube.csv", "100 % #7 [a]&b;c'd.CSV"]
+@pytest.mark.parametrize("name", ["Messung Prüfstand.csv", "base (1).csv", "gps_cube.csv"])
+def test_files_are_taken_as_they_are_called(door, form, name):
     with door.client("otto") as client:
-        for name in names:
-            upload, (answer,) = sent(client, unicodedata.normalize(form, name))
-            assert answer.status_code == 200, answer.text
-            order = {"device": "cube", "name": unicodedata.normalize(form, name[:-4])}
-            job = ended(client, client.post(f"/api/imports/{upload}/finish", json=order))
-            assert job["state"] == "done", job
-            again = client.post(f"/api/imports/{upload}/files/x.csv", content=b"x")
-            assert again.status_code == 404  # it is read and gone
-            made = client.get(f"/api/sessions/{job['made']}").json()
-            named = made["title"] or made["id"].split("-", 2)[2].removesuffix("-2")
-            assert named == unicodedata.normalize("NFC", name[:-4])
-            download = client.get(f"/api/sessions/{job['made']}/download")
-            assert f'filename="{job["made"]}.mcap"' in download.headers["content-disposition"]
-            assert client.get(f"/sessions/{job['made']}").status_code == 200
+        upload, (answer,) = sent(client, unicodedata.normalize(form, name))
+        assert answer.status_code == 200, answer.text
+        found = client.get(f"/api/imports/{upload}/look").json()["files"]
+        assert [unicodedata.normalize("NFC", one) for one in found] == [name]
+
+
+@pytest.mark.parametrize(
+    "form, name", [("NFD", "Messung Prüfstand.csv"), ("NFC", "100 % #7 [a]&b;c'd.CSV")]
+)
+def test_a_file_becomes_a_session_of_its_name(door, form, name):
+    with door.client("otto") as client:
+        upload, _ = sent(client, unicodedata.normalize(form, name))
+        order = {"device": "cube", "name": unicodedata.normalize(form, name[:-4])}
+        job = ended(client, client.post(f"/api/imports/{upload}/finish", json=order))
+        assert job["state"] == "done", job
+        again = client.post(f"/api/imports/{upload}/files/x.csv", content=b"x")
+        assert again.status_code == 404  # it is read and gone
+        made = client.get(f"/api/sessions/{job['made']}").json()
+        named = made["title"] or made["id"].split("-", 2)[2].removesuffix("-2")
+        assert named == unicodedata.normalize("NFC", name[:-4])
+        download = client.get(f"/api/sessions/{job['made']}/download")
+        assert f'filename="{job["made"]}.mcap"' in download.headers["content-disposition"]
+        assert client.get(f"/sessions/{job['made']}").status_code == 200
 
 
 def test_a_cube_s_tachometer_may_be_in_a_file_of_its_own(door):

@@ -197,11 +197,11 @@ def test_a_board_whose_thread_fails_begins_anew_and_the_other_notices_nothing(
     )
     sound, failed = DeviceLink._loop, threading.Event()
 
-    def loop(link, stop):
+    def loop(link, turns, stop):
         if link.name == "one" and not failed.is_set():
             failed.set()
             raise RuntimeError("a fault")
-        sound(link, stop)
+        sound(link, turns, stop)
 
     monkeypatch.setattr(DeviceLink, "_loop", loop)
     stop = threading.Event()

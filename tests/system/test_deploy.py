@@ -112,14 +112,23 @@ def test_no_container_of_a_site_has_more_than_it_needs(place):
 
 
 @pytest.mark.parametrize("place", SITES)
-def test_podman_compose_takes_the_file(place):
+def test_podman_compose_takes_the_file(place, tmp_path):
+    """It asks for podman's version before it reads anything, and for nothing else."""
     tool = shutil.which(
         "podman-compose", path=f"{Path(sys.executable).parent}:{os.environ['PATH']}"
     )
     if tool is None:
         pytest.skip("podman-compose is not installed: make dev")
     file = ROOT / "deploy" / f"compose.{place}.yml"
-    done = subprocess.run([tool, "--file", str(file), "config"], capture_output=True, text=True)
+    podman = tmp_path / "podman"
+    podman.write_text("#!/bin/sh\necho 'podman version 4.3.1'\n")
+    podman.chmod(0o755)
+    done = subprocess.run(
+        [tool, "--file", str(file), "config"],
+        env=os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}"},
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr
     assert yaml.safe_load(done.stdout)["services"].keys() <= file_of(place)["services"].keys()
 
