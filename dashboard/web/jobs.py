@@ -75,7 +75,7 @@ class Jobs:
     ) -> None:
         self._longest_s = longest_s
         self._options = list(options)
-        self._command = [*(["nice", "-n", "15"] if shutil.which("nice") else []), *command]
+        self._command = [*(["nice", "-n", "5"] if shutil.which("nice") else []), *command]
         self._scratch = Path(tempfile.mkdtemp(prefix="gyrofree-jobs-"))
         self._numbers = itertools.count(1)
         self._jobs: OrderedDict[int, Job] = OrderedDict()
