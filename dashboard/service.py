@@ -5,7 +5,6 @@ import contextlib
 import errno
 import logging
 import socket
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -46,9 +45,6 @@ STOP_LOOK_S = 0.1  # s between two looks at the stop event
 SEND_BYTES = 1 << 19
 BACKLOG = 512  # connections that wait to be taken; a flood must not fill it
 HEAD_LIMIT = 32_768  # bytes of the head of one request
-# A thread that sent to one browser may go on with the next one after so long, while another thread
-# draws; Python's own 5 ms add up over fifty browsers.
-SWITCH_S = 0.005
 GRACE_S = 1  # s, for answers under way when the process ends
 
 
@@ -215,7 +211,6 @@ def run(
         service as scene,
     )  # here: viser takes a second to import, a taken port should not wait
 
-    sys.setswitchinterval(SWITCH_S)
     certificate = open_certificate(settings)
     with listen(settings.host, settings.port) as bound:
         if not load_users(settings.users):
