@@ -146,6 +146,14 @@ def scene_of(page):
     return page.locator("#scene").element_handle().content_frame()
 
 
+def resting_box(page, locator):
+    """Where it is once it moves no more: panels take their width after the page is there."""
+    box = None
+    while box != (box := locator.bounding_box()):
+        page.wait_for_timeout(500)
+    return box
+
+
 def turn_to(page, key, rounds):
     """Open a page of the view as a click on an alarm does, and wait until it is drawn."""
     page.evaluate("async (p) => (await import('/static/desk.js')).turnTo(p)", key)
@@ -363,7 +371,7 @@ def test_a_zoom_stays_while_data_come_in_until_one_follows_again(chromium, door)
         scene.wait_for_function(f"() => ({CHARTS})().some(([a, b]) => b - a > 1)")
         scene.wait_for_selector(".uplot .gf-tools")  # until then it is uPlot that is dragged
         chart = scene.locator(".uplot .u-over").first
-        box = chart.bounding_box()
+        box = resting_box(page, chart)
         y = box["y"] + box["height"] / 2
         page.mouse.move(box["x"] + 0.3 * box["width"], y)
         page.mouse.down()
