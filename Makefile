@@ -2,6 +2,7 @@
 #             SOURCE=tilt or arm other simulated boards, BOARD=emulated the firmware image in the emulator, OFFICE=1 also
 #             an office that watches over a slow line)
 # make test   everything it needs, then all tests
+# make lint   formatter, linter, and clang-tidy over the core
 # make cases  inputs that once failed, from $GYROFREE_CASES or ../shared/cases
 # make zenohd Zenoh's own router (cargo builds it), held against our rules
 # make firmware  the board's image and map into build/firmware, with its size
@@ -86,7 +87,7 @@ system-packages:
 
 # The browser draws in software and wants the machine for itself, so it comes after the others.
 test: setup dev system-packages site
-	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "not browser and not faults and not cases and not zenohd"
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "not browser and not faults and not cases and not zenohd and not lint"
 	$(BIN)/python -m pytest -m browser
 
 # Every fault done to real processes; it writes the tables of docs/faults.md.
@@ -104,8 +105,11 @@ zenohd: setup dev build/zenohd/bin/zenohd
 cases: setup dev
 	$(BIN)/python -m pytest -q -rs tests/system/test_cases.py
 
-lint: dev
+# Formatter, linter, and clang-tidy over the core, which takes a minute or three.
+lint: setup dev system-packages
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/python -m pytest -q -m lint tests/inertial/test_core_lint.py
 
 bench: setup dev
 	@for file in tests/bench/bench_*.py; do echo "== $$file"; $(BIN)/python $$file || exit 1; done

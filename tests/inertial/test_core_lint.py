@@ -51,6 +51,7 @@ def configure(folder: Path, *options: str) -> None:
     )
 
 
+@pytest.mark.lint
 @pytest.mark.timeout(1800)
 @needs("clang-tidy", "clang++")
 def test_clang_tidy_is_clean(tmp_path):
