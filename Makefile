@@ -2,7 +2,7 @@
 #             SOURCE=tilt or arm other simulated boards, BOARD=emulated the firmware image in the emulator, OFFICE=1 also
 #             an office that watches over a slow line)
 # make test   everything it needs, then all tests
-# make lint   formatter, linter, and clang-tidy over the core
+# make compilers  the core by other compilers: clang-tidy, sanitizers, aarch64
 # make cases  inputs that once failed, from $GYROFREE_CASES or ../shared/cases
 # make zenohd Zenoh's own router (cargo builds it), held against our rules
 # make firmware  the board's image and map into build/firmware, with its size
@@ -24,7 +24,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 INSTALL := $(PIP) install --quiet --no-deps --require-hashes
 DRIVE := $(if $(DATA),--data "$(DATA)")
 
-.PHONY: demo test cases setup wheel dev system-packages bench docs site pictures messages lint firmware fuzz fuzz-web compose-test faults zenohd clean
+.PHONY: demo test cases setup wheel dev system-packages bench docs site pictures messages lint compilers firmware fuzz fuzz-web compose-test faults zenohd clean
 
 # BOARD=emulated: the table is sensed by the firmware image in the emulator
 demo: setup $(if $(filter emulated,$(BOARD)),.make/board firmware)
@@ -87,7 +87,7 @@ system-packages:
 
 # The browser draws in software and wants the machine for itself, so it comes after the others.
 test: setup dev system-packages site
-	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "not browser and not faults and not cases and not zenohd and not lint"
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "not browser and not faults and not cases and not zenohd and not compilers"
 	$(BIN)/python -m pytest -m browser
 
 # Every fault done to real processes; it writes the tables of docs/faults.md.
@@ -105,11 +105,13 @@ zenohd: setup dev build/zenohd/bin/zenohd
 cases: setup dev
 	$(BIN)/python -m pytest -q -rs tests/system/test_cases.py
 
-# Formatter, linter, and clang-tidy over the core, which takes a minute or three.
-lint: setup dev system-packages
+lint: dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/python -m pytest -q -m lint tests/inertial/test_core_lint.py
+
+# clang-tidy over the core, its tests with the sanitizers, and its bits on aarch64: five to ten minutes.
+compilers: setup dev system-packages
+	$(BIN)/python -m pytest -q -m compilers tests/inertial
 
 bench: setup dev
 	@for file in tests/bench/bench_*.py; do echo "== $$file"; $(BIN)/python $$file || exit 1; done

@@ -9,21 +9,22 @@ from hypothesis import settings
 from support.browser import chromium  # noqa: F401  a fixture
 
 settings.register_profile("untimed", deadline=None)  # a busy machine is no fault
-settings.load_profile("untimed")
+settings.register_profile("few", deadline=None, max_examples=15)  # for a core ten times as slow
+settings.load_profile(os.environ.get("GYROFREE_EXAMPLES", "untimed"))
 
 ROOT = Path(__file__).resolve().parent.parent
 # Files that take the longest, begun first: else one worker ends them while the others have nothing.
 LONGEST = (
-    "test_core_lint",
-    "test_cases",
-    "test_aarch64",
     "test_procedures",
     "test_files",
     "test_wheel",
     "test_wall_clock",
+    "test_alarms",
+    "test_by_hand",
     "test_broken_files",
-    "test_setup",
     "test_mcap_damage",
+    "test_cli_sessions",
+    "test_setup",
     "test_service",
     "test_faults",
 )

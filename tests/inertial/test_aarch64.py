@@ -41,6 +41,7 @@ BUILDS = {
 PROGRAMS = ("g++", "aarch64-linux-gnu-g++", "qemu-aarch64")
 MISSING = [program for program in PROGRAMS if not shutil.which(program)]
 pytestmark = [
+    pytest.mark.compilers,
     pytest.mark.skipif(
         bool(MISSING) and not os.environ.get("CI"),
         reason=f"no {', '.join(MISSING)}: run make system-packages",

@@ -18,10 +18,13 @@ TESTS = sorted(
     if path.name != Path(__file__).name
     and ("inertial.core" in path.read_text() or "import core" in path.read_text())
 )
-pytestmark = pytest.mark.skipif(
-    importlib.util.find_spec("nanobind") is None or importlib.util.find_spec("cmeel") is None,
-    reason="the packages of requirements/build.txt are not here: run make setup",
-)
+pytestmark = [
+    pytest.mark.compilers,
+    pytest.mark.skipif(
+        importlib.util.find_spec("nanobind") is None or importlib.util.find_spec("cmeel") is None,
+        reason="the packages of requirements/build.txt are not here: run make setup",
+    ),
+]
 
 
 def needs(*programs: str):
@@ -51,7 +54,6 @@ def configure(folder: Path, *options: str) -> None:
     )
 
 
-@pytest.mark.lint
 @pytest.mark.timeout(1800)
 @needs("clang-tidy", "clang++")
 def test_clang_tidy_is_clean(tmp_path):
@@ -112,6 +114,7 @@ def test_the_sanitizers_find_nothing_while_the_tests_of_the_core_run():
         env=os.environ
         | {
             "PYTHONPATH": path,
+            "GYROFREE_EXAMPLES": "few",
             "LD_PRELOAD": ":".join(runtimes),
             "ASAN_OPTIONS": "detect_leaks=0",  # Python's own are many
             "UBSAN_OPTIONS": "print_stacktrace=1",
