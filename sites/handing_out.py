@@ -27,29 +27,19 @@ def hand_out(
     if bool(devices) != (role == "gateway"):
         raise SiteError("a gateway's certificate names its boards (--board), others none")
     with alone(folder):
-        return _hand_out(authority, folder, role, name, devices, life, out)
-
-
-def _hand_out(
-    authority: Authority,
-    folder: Path,
-    role: str,
-    name: str,
-    devices: tuple[str, ...],
-    life: dt.timedelta,
-    out: Path,
-) -> Issued:
-    ((key, request),) = new_requests((role,)).values()
-    place = load_place(folder)
-    here = place.place
-    if name in {peer.place for peer in place.peers}:
-        raise SiteError(f"{name} is a place of this site: choose another name for the machine")
-    if any(each.common_name == f"{role}.{name}" for each in authority.register()):
-        raise SiteError(f"{role}.{name} was issued already: choose another name for the machine")
-    with new_folder(out) as draft:
-        write(draft / TRUSTED, (folder / TRUSTED).read_bytes(), 0o644)
-        certificate = authority.issue(
-            load_request(request), role, here, name=name, devices=devices, life=life
-        )
-        write_identity(draft, role, key, pem(certificate))
-    return authority.register()[-1]
+        ((key, request),) = new_requests((role,)).values()
+        place = load_place(folder)
+        here = place.place
+        if name in {peer.place for peer in place.peers}:
+            raise SiteError(f"{name} is a place of this site: choose another name for the machine")
+        if any(each.common_name == f"{role}.{name}" for each in authority.register()):
+            raise SiteError(
+                f"{role}.{name} was issued already: choose another name for the machine"
+            )
+        with new_folder(out) as draft:
+            write(draft / TRUSTED, (folder / TRUSTED).read_bytes(), 0o644)
+            certificate = authority.issue(
+                load_request(request), role, here, name=name, devices=devices, life=life
+            )
+            write_identity(draft, role, key, pem(certificate))
+        return authority.register()[-1]

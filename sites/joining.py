@@ -101,11 +101,7 @@ def _join(
     bus = BusSettings(prefix=invitation.site, listen=[listen], tls=temporary).acting_as("join")
     made = _requests_kept(temporary)
     keys = {role: key for role, (key, _) in made.items()}
-    question = JoinRequest(
-        place=invitation.place,
-        secret=invitation.secret,
-        requests={role: request for role, (_, request) in made.items()},
-    ).model_dump_json()
+    question = join_question(invitation, made)
     with open_router(bus) as session:
         told = False
         while not stop.is_set():
@@ -115,13 +111,23 @@ def _join(
                     told = True
                 stop.wait(PAUSE_S)
                 continue
-            answer = _patiently(session, join_key(invitation.site), question.encode(), stop)
+            answer = _patiently(session, join_key(invitation.site), question, stop)
             given = keep(folder, answer, keys, trusted)
             for path in temporary.iterdir():
                 path.unlink()
             temporary.rmdir()
             return given.place
     raise SiteError("not joined: ended before home had answered; the invitation is still good")
+
+
+def join_question(invitation: Invitation, made: dict[str, tuple[bytes, str]]) -> bytes:
+    """What Registrar.join answers; made: of new_requests, for each role of the place."""
+    asked = JoinRequest(
+        place=invitation.place,
+        secret=invitation.secret,
+        requests={role: request for role, (_, request) in made.items()},
+    )
+    return asked.model_dump_json().encode()
 
 
 def _patiently(session: zenoh.Session, key: str, question: bytes, stop: threading.Event) -> bytes:

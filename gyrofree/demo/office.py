@@ -28,9 +28,9 @@ from gyrofree.running.watch import Watch
 from gyrofree.setup.site import services, write_place
 from messages.bus.tls import TRUSTED
 from sessions.recording.settings import RecorderSettings
-from sites.enrolment import JoinRequest, Registrar, keep, new_requests
+from sites.enrolment import Registrar, keep, new_requests
 from sites.invitation import invite
-from sites.joining import make_site
+from sites.joining import join_question, make_site
 
 LAB, OFFICE = "lab", "office"
 RATE_BPS, DELAY_S = 1e6, 0.1  # of the line between them, each way
@@ -96,12 +96,7 @@ def _make_places(plan: Plan, lab: Path, office: Path) -> None:
     address = f"tls/127.0.0.1:{plan.bus_port + 2}"
     given, _ = invite(at_home, OFFICE, "operator", address, LIFE)
     made = new_requests()
-    asked = JoinRequest(
-        place=OFFICE,
-        secret=given.secret,
-        requests={role: request for role, (_, request) in made.items()},
-    )
-    answer = Registrar(at_home).join(asked.model_dump_json().encode())
+    answer = Registrar(at_home).join(join_question(given, made))
     away.mkdir(parents=True)
     (away / TRUSTED).write_text(given.trusted)
     keep(away, answer, {role: key for role, (key, _) in made.items()}, given.trusted.encode())
