@@ -231,26 +231,38 @@ def _opens(door, client) -> bool:
     return True
 
 
-def test_a_page_without_files_says_so_once_and_takes_who_waited_afterwards(caplog):
+@contextlib.contextmanager
+def without_files():
+    """No file can be opened in this process meanwhile."""
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    lowest = os.dup(0)
+    os.close(lowest)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (lowest, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+
+
+@pytest.mark.parametrize("ends", ["afterwards", "meanwhile"])
+def test_a_page_without_files_says_so_once_and_takes_who_waited_afterwards(ends, caplog):
     async def crowd() -> bytes:
         loop = asyncio.get_running_loop()
         loop.set_exception_handler(NoFiles())
         server = await asyncio.start_server(lambda _, out: out.close(), "127.0.0.1", 0)
-        caller = socket.socket()
-        caller.setblocking(False)
-        limits = resource.getrlimit(resource.RLIMIT_NOFILE)
-        with contextlib.ExitStack() as stack:
-            stack.callback(resource.setrlimit, resource.RLIMIT_NOFILE, limits)
-            lowest = os.dup(0)
-            os.close(lowest)
-            resource.setrlimit(resource.RLIMIT_NOFILE, (lowest, limits[1]))
-            await loop.sock_connect(caller, server.sockets[0].getsockname())
-            while not caplog.records:
-                await asyncio.sleep(0.01)
-        told = await loop.sock_recv(caller, 1)  # the end, from who took it at last
-        caller.close()
-        server.close()
-        return told
+        with socket.socket() as caller:
+            caller.setblocking(False)
+            with without_files():
+                await loop.sock_connect(caller, server.sockets[0].getsockname())
+                while not caplog.records:
+                    await asyncio.sleep(0.01)
+                if ends == "meanwhile":
+                    server.close()
+                    await asyncio.sleep(1.2)  # asyncio tries again after 1 s
+                    return b""
+            told = await loop.sock_recv(caller, 1)  # the end, from who took it at last
+            server.close()
+            return told
 
     assert asyncio.run(crowd()) == b""
     assert [record.exc_info for record in caplog.records] == [None]
