@@ -4,13 +4,17 @@ that is full, orders that come too late, files with names of any kind.
 
 import os
 import resource
+import signal
 import socket
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
 
 import pytest
 from support.procedures import Answers, start
+from support.waiting import until
 
 from messages.contract import gyrofree_pb2 as pb
 from messages.contract.checks import check
@@ -113,6 +117,35 @@ def test_a_table_that_pours_or_takes_nothing_holds_nobody_up():
             table.set_rate(1.0)
     os.close(ours)
     os.close(other)
+
+
+def test_an_answer_that_came_while_the_process_was_frozen_is_one(tmp_path):
+    """A debugger, or a machine that sleeps, in the middle of an answer: real signals."""
+    slow = SlowTable(**{"SENS:RATE?": "89.5"})
+    begun, enough = tmp_path / "begun", tmp_path / "enough"
+    asks = (
+        "import pathlib, sys\n"
+        "from sessions.procedure.driven.description import described\n"
+        "from sessions.procedure.driven.table import TextTable\n"
+        "table = TextTable(described('simulated'), sys.argv[1])\n"
+        "begun, enough = map(pathlib.Path, sys.argv[2:])\n"
+        "while not enough.exists():\n"
+        "    told = table.rate()\n"
+        "    begun.touch()\n"
+        "print(told)\n"
+    )
+    words = [sys.executable, "-c", asks, slow.line.path, str(begun), str(enough)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as asking:
+        until(lambda: begun.exists() or asking.poll() is not None, "the first answer")
+        for _ in range(4):
+            asking.send_signal(signal.SIGSTOP)
+            time.sleep(described("simulated").timeout_s + 0.2)
+            asking.send_signal(signal.SIGCONT)
+            time.sleep(0.05)
+        enough.touch()
+        told, wrong = asking.communicate()
+    assert asking.returncode == 0, wrong.decode()
+    assert float(told) == pytest.approx(89.5 * DEG)
 
 
 def test_two_on_one_line_do_not_take_each_others_answers():

@@ -232,15 +232,17 @@ class TextTable:
             return ""
         until, told = time.monotonic() + self._said.timeout_s, b""
         while not told.endswith(end):
-            told += line.read(1) if len(told) < LONGEST else b""
             if self._hurry.is_set():
                 raise TableError(f"{self.name}: {command!r} was given up for a stop")
-            if time.monotonic() > until or len(told) >= LONGEST:
+            # an answer that came while this process was held up is one
+            over = time.monotonic() > until and not line.in_waiting
+            if over or len(told) >= LONGEST:
                 heard = repr(told[:80].decode(errors="replace")) if told else "nothing"
                 raise TableError(
                     f"{self.name} on {self._port}: {command!r} was answered by {heard} within "
                     f"{self._said.timeout_s:g} s"
                 )
+            told += line.read(1)
         return told.decode(errors="replace").strip()
 
     def _open(self) -> serial.SerialBase:
