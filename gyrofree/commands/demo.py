@@ -59,6 +59,13 @@ def demo(
             ),
         ),
     ] = False,
+    profile: Annotated[
+        str | None,
+        typer.Option(
+            help="Motion of the table, as of `gyrofree simulate`: published, wobble, fast, still,"
+            " or a CSV or TOML file of your own."
+        ),
+    ] = None,
     fault: Fault = None,
 ) -> None:
     """Start router, gateway, estimator, recorder, dashboard and a board, and print one URL.
@@ -68,17 +75,10 @@ def demo(
     """
     from gyrofree.demo import bench as demonstration
 
+    if profile is not None and source != "table":
+        raise fail(f"--profile is of the table, not of --source {source}", CONFIG)
     if source == "table":
-        faults_of(fault)  # a wrong one is said here, not in the board's log
-        board, device, layout = (
-            [
-                "simulate",
-                *(["--slips=1"] * by_hand),
-                *(w for f in fault or () for w in ("--fault", f)),
-            ],
-            "cube",
-            "cube",
-        )
+        board, device, layout = _table(profile, by_hand, fault), "cube", "cube"
     elif source in demonstration.SIMULATED:
         board, device, layout = demonstration.SIMULATED[source]
     elif source == "emulated":
@@ -104,6 +104,22 @@ def demo(
 
         return both.run(plan)
     demonstration.run(plan)
+
+
+def _table(profile: str | None, by_hand: bool, fault: list[str] | None) -> list[str]:
+    """Words of the simulated table's command. What is wrong is said here, not in its log."""
+    from sessions.procedure.profile_file import profile_of
+
+    faults_of(fault)
+    words = ["simulate", *(["--slips=1"] * by_hand)]
+    if profile is not None:
+        try:
+            profile_of(profile)
+        except (ValueError, OSError) as error:
+            raise fail(error, CONFIG) from None
+        file = Path(profile).suffix
+        words.append(f"--profile={Path(profile).absolute() if file else profile}")
+    return [*words, *(f"--fault={one}" for one in fault or ())]
 
 
 def _check_log(path: Path, gnss: Path | None = None, as_named: bool = False) -> str:
