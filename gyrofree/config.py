@@ -18,7 +18,7 @@ from estimator.settings import EstimatorSettings
 from gateway.settings import GatewaySettings
 from gyrofree.operations.settings import LogSettings, MetricsSettings
 from inertial.toml_file import parsed, text_of
-from messages.bus.session import BusSettings
+from messages.bus.settings import BusSettings
 from messages.setting import setting
 from sessions.procedure.settings import ProcedureSettings
 from sessions.recording.settings import RecorderSettings

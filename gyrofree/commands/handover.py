@@ -20,7 +20,6 @@ from gyrofree.commands.options import (
     settings_of,
 )
 from gyrofree.commands.parser import output_folder
-from gyrofree.commands.reprocess import reprocess
 from gyrofree.commands.run import progress_bar
 from gyrofree.running.process import EXIT_CONFIG, EXIT_FAILED, fail
 from messages.contract.topics import TopicError, check_name
@@ -267,15 +266,3 @@ def rerun(
     except (UnknownEstimator, SessionError, ValueError, OSError) as error:
         raise fail(error, EXIT_CONFIG) from None
     say(json.dumps({"session": folder.name}) if as_json else folder.name)
-
-
-def mount(app: typer.Typer) -> None:
-    """Add the commands to the one command line."""
-    for name, command in (
-        ("export", export),
-        ("report", report),
-        ("import", import_log),
-        ("rerun", rerun),
-        ("reprocess", reprocess),
-    ):
-        app.command(name)(command)

@@ -1,86 +1,116 @@
-"""The command line. Every command takes its parameters here and does its work in another module."""
+"""The command line. A command is imported when it is called: all of them at once take a second."""
 
+import importlib
 import importlib.metadata
-from typing import Annotated
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any
 
 import typer
+from typer.completion import completion_init
+from typer.core import TyperGroup
 
-from gyrofree.commands import calibrate, handover, layout, procedure, sessions, users
-from gyrofree.commands import run as logs
-from gyrofree.commands.board import board
-from gyrofree.commands.demo import demo, play
-from gyrofree.commands.installation import alarms, certs, config, site
-from gyrofree.commands.installation.backup import backup, restore
-from gyrofree.commands.installation.completion import answer_the_shell, completion
-from gyrofree.commands.installation.doctor import doctor
-from gyrofree.commands.installation.log_level import log_level
-from gyrofree.commands.installation.orders import orders
-from gyrofree.commands.installation.setup import setup
-from gyrofree.commands.installation.up import up
-from gyrofree.commands.installation.zenohd import zenohd_config
-from gyrofree.commands.options import say
 from gyrofree.commands.parser import Commands, run_main
-from gyrofree.commands.replay import replay
-from gyrofree.commands.services import (
-    dashboard,
-    estimator,
-    gateway,
-    procedures,
-    record,
-    router,
-)
-from gyrofree.commands.simulate import simulate
+
+HERE = "gyrofree.commands"
+PLACES = {
+    "export": f"{HERE}.handover:export",
+    "report": f"{HERE}.handover:report",
+    "import": f"{HERE}.handover:import_log",
+    "rerun": f"{HERE}.handover:rerun",
+    "reprocess": f"{HERE}.reprocess:reprocess",
+    "run": f"{HERE}.run:run",
+    "board": f"{HERE}.board:board",
+    "demo": f"{HERE}.demo:demo",
+    "setup": f"{HERE}.installation.setup:setup",
+    "up": f"{HERE}.installation.up:up",
+    "router": f"{HERE}.services:router",
+    "gateway": f"{HERE}.services:gateway",
+    "estimator": f"{HERE}.services:estimator",
+    "record": f"{HERE}.services:record",
+    "procedures": f"{HERE}.services:procedures",
+    "dashboard": f"{HERE}.services:dashboard",
+    "simulate": f"{HERE}.simulate:simulate",
+    "play": f"{HERE}.demo:play",
+    "replay": f"{HERE}.replay:replay",
+    "doctor": f"{HERE}.installation.doctor:doctor",
+    "log-level": f"{HERE}.installation.log_level:log_level",
+    "backup": f"{HERE}.installation.backup:backup",
+    "restore": f"{HERE}.installation.backup:restore",
+    "orders": f"{HERE}.installation.orders:orders",
+    "completion": f"{HERE}.installation.completion:completion",
+    "users": f"{HERE}.users:app",
+    "alarms": f"{HERE}.installation.alarms:app",
+    "config": f"{HERE}.installation.config:app",
+    "site": f"{HERE}.installation.site:app",
+    "certs": f"{HERE}.installation.certs:app",
+    "layout": f"{HERE}.layout:app",
+    "sessions": f"{HERE}.sessions:app",
+    "procedure": f"{HERE}.procedure:app",
+    "calibrate": f"{HERE}.calibrate:app",
+    "reproduce": f"{HERE}.run:app",
+}
+
+LOOK = {"add_completion": False, "rich_markup_mode": None, "pretty_exceptions_enable": False}
+
+
+class OnDemand(Mapping[str, Any]):
+    """Commands by name; the places are `module:attribute` of a function or of a typer app."""
+
+    def __init__(self, places: dict[str, str]) -> None:
+        self._places, self._made = places, dict[str, Any]()
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._made:
+            self._made[name] = self._make(name, self._places[name])
+        return self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    @staticmethod
+    def _make(name: str, place: str) -> Any:
+        module, _, attribute = place.partition(":")
+        found = getattr(importlib.import_module(module), attribute)
+        alone = Commands(**LOOK)
+        alone.callback()(lambda: None)  # or a typer of one command is that command
+        if isinstance(found, typer.Typer):
+            alone.add_typer(found, name=name)
+        else:
+            alone.command(name)(found)
+        return typer.main.get_group(alone).commands[name]
+
+
+def group_of(places: dict[str, str]) -> type[TyperGroup]:
+    """The class of a group with these commands."""
+    commands = OnDemand(places)
+
+    class Group(TyperGroup):
+        """Its commands are at their places."""
+
+        def __init__(self, **settings: Any) -> None:
+            super().__init__(**settings | {"commands": commands})
+
+    return Group
+
 
 app = Commands(
+    cls=group_of(PLACES),
     no_args_is_help=True,
-    add_completion=False,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
     help=(
         "Bench and remote eye for inertial units without gyroscopes.\n\n"
         "`gyrofree demo` shows everything on one page; the other commands are its parts."
     ),
+    **LOOK,
 )
-
-app.add_typer(users.app, name="users")
-app.add_typer(alarms.app, name="alarms")
-app.add_typer(config.app, name="config")
-site.app.command("zenohd-config")(zenohd_config)
-app.add_typer(site.app, name="site")
-app.add_typer(certs.app, name="certs")
-app.add_typer(layout.app, name="layout")
-app.add_typer(sessions.app, name="sessions")
-app.add_typer(procedure.app, name="procedure")
-handover.mount(app)
-app.add_typer(calibrate.app, name="calibrate")
-app.add_typer(logs.app, name="reproduce")
-for command in (
-    logs.run,
-    board,
-    demo,
-    setup,
-    up,
-    router,
-    gateway,
-    estimator,
-    record,
-    procedures,
-    dashboard,
-    simulate,
-    play,
-    replay,
-    doctor,
-    log_level,
-    backup,
-    restore,
-    orders,
-    completion,
-):
-    app.command()(command)
 
 
 def _show_version(wanted: bool) -> None:
     if wanted:
+        from gyrofree.commands.options import say
+
         say(f"gyrofree {importlib.metadata.version('gyrofree')}")
         raise typer.Exit
 
@@ -97,5 +127,5 @@ def _root(
 
 def main() -> None:
     """Entry point of `gyrofree`."""
-    answer_the_shell()
+    completion_init()  # how each shell asks
     run_main(app)

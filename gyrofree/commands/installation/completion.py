@@ -4,7 +4,7 @@ from enum import StrEnum
 from typing import Annotated
 
 import typer
-from typer.completion import completion_init, get_completion_script
+from typer.completion import get_completion_script
 
 from gyrofree.commands.options import say
 
@@ -36,8 +36,3 @@ def completion(
     first, _, rest = script.partition("\n")
     note = f"# To install: {INSTALL[shell.value]}"
     say("\n".join([first, note, rest] if first.startswith("#compdef") else [note, script]))
-
-
-def answer_the_shell() -> None:
-    """Have the program know how each shell asks; to be called before it parses its arguments."""
-    completion_init()

@@ -12,6 +12,7 @@ import zenoh
 from rich.table import Table
 
 from gyrofree.commands.installation.site_status import site_status
+from gyrofree.commands.installation.zenohd import zenohd_config
 from gyrofree.commands.options import AsJson, Config, Verbose, say, settings_of, show_table
 from gyrofree.commands.parser import Commands, output_folder
 from gyrofree.config import DEFAULT_PATH, ConfigError, Settings
@@ -172,6 +173,7 @@ def site_show(as_json: AsJson = False, config: Config = None) -> None:
 
 
 app.command("status")(site_status)
+app.command("zenohd-config")(zenohd_config)
 
 
 @app.command("copies")
