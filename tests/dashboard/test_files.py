@@ -18,6 +18,8 @@ from support.waiting import until
 
 from dashboard.web.jobs import Jobs
 from dashboard.web.uploads import UploadError, samples_and_fixes
+from gyrofree.config import load
+from gyrofree.running.rerun_settings import from_library, with_changes
 
 HEADER = "t_s," + ",".join(f"a{t}{k}_counts" for t in (1, 2, 3, 4) for k in (1, 2, 3))
 STILL = [0, 0, 256] * 2 + [0, 0, -256] * 2
@@ -148,33 +150,44 @@ def test_what_has_latitudes_is_the_file_of_fixes(tmp_path):
             samples_and_fixes(wrong)
 
 
+FOREIGN = [  # {} stands for a file that is not of the library
+    ("calibration", "{}"),
+    ("calibration", "../secret.txt"),
+    ("calibration", "link.toml"),
+    ("calibration", "nowhere.toml"),
+    ("calibration", "cards"),
+    ("calibrations.cube", "{}"),
+    ("axis_maps.cube", "{}"),
+    ("layout.file", "{}"),
+    ("layouts.cube.file", "{}"),
+    ("journal", "/tmp/journal"),
+    ("cards", "/"),
+    ("axes", "/etc"),
+    ("layouts", '{{ cube = {{ file = "{}" }} }}'),
+]
+
+
+@pytest.mark.parametrize("key, value", FOREIGN)
+def test_a_setting_names_files_of_the_library_only(door, key, value):
+    configured = load(door.folder / "gyrofree.toml").estimator
+    word = value.format(door.folder / "secret.txt")
+    with pytest.raises(ValueError) as refused:
+        from_library(configured, with_changes(configured, [f"{key}={word}"]))
+    assert "root:x" not in str(refused.value) and "content of" not in str(refused.value)
+
+
 def test_a_rerun_opens_files_of_the_library_only(door):
-    secret = str(door.folder / "secret.txt")
-    tries = [
-        ("calibration", secret),
-        ("calibration", "../secret.txt"),
-        ("calibration", "link.toml"),
-        ("calibration", "nowhere.toml"),
-        ("calibration", "cards"),
-        ("calibrations.cube", secret),
-        ("axis_maps.cube", secret),
-        ("layout.file", secret),
-        ("layouts.cube.file", secret),
-        ("journal", str(door.folder / "journal")),
-        ("cards", "/"),
-        ("axes", "/etc"),
-        ("layouts", f'{{ cube = {{ file = "{secret}" }} }}'),
-    ]
+    said = {}
     with door.client("otto") as client:
-        for key, value in tries:
-            order = {"settings": {key: value}, "estimators": ["least-squares"]}
+        for value in (str(door.folder / "secret.txt"), "link.toml", "no card.toml"):
+            order = {"settings": {"calibration": value}, "estimators": ["least-squares"]}
             job = ended(client, client.post(f"/api/sessions/{SESSION}/rerun", json=order))
-            assert job["state"] == "failed" and job["message"], (key, value, job)
-            assert "root:x" not in job["message"] and "content of" not in job["message"]
-        assert not (door.folder / "journal").exists()
-        order = {"settings": {"calibration": "no card.toml"}}
-        job = ended(client, client.post(f"/api/sessions/{SESSION}/rerun", json=order))
-        assert job["state"] == "failed" and "no card.toml" in job["message"]  # it was opened
+            assert job["state"] == "failed", job
+            said[value] = job["message"]
+    opened = said.pop("no card.toml")
+    assert "no card.toml" in opened and "no such file" not in opened  # and it was no card
+    for value, message in said.items():
+        assert message and "root:x" not in message and "content of" not in message, value
 
 
 WORD = st.sampled_from([*HOSTILE, "\0", "a\0b", "../x", "--config", "\ud800"]) | st.text(
