@@ -13,20 +13,28 @@ settings.register_profile("few", deadline=None, max_examples=15)  # for a core t
 settings.load_profile(os.environ.get("GYROFREE_EXAMPLES", "untimed"))
 
 ROOT = Path(__file__).resolve().parent.parent
-# Files that take the longest, begun first: else one worker ends them while the others have nothing.
-LONGEST = (
+# Whole installations in real time, each busy with a core: one after the other, or all are late.
+INSTALLATIONS = (
     "test_procedures",
-    "test_files",
-    "test_wheel",
+    "test_by_hand",
+    "test_up",
+    "test_faults",
     "test_wall_clock",
     "test_alarms",
-    "test_by_hand",
+    "test_demo_office",
+    "test_wheel",
+    "test_play",
+    "test_alarm_places",
+    "test_operations",
+)
+# Of the others those that take the longest come first: else one worker ends them alone.
+LONGEST = (
+    "test_files",
     "test_broken_files",
     "test_mcap_damage",
     "test_cli_sessions",
     "test_setup",
     "test_service",
-    "test_faults",
 )
 
 
@@ -39,10 +47,16 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return True if "mark.browser" not in collection_path.read_text(encoding="utf-8") else None
 
 
+@pytest.hookimpl(tryfirst=True)  # before xdist writes the groups into the names
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The order in which `pytest --dist loadfile --no-loadscope-reorder` hands files out."""
-    place = {name: number for number, name in enumerate(LONGEST)}
-    items.sort(key=lambda item: place.get(item.path.stem, len(LONGEST)))
+    """What `pytest --dist loadgroup --no-loadscope-reorder` gives one worker, and in which order:
+    the tests of a file, and the installations as if they were one file.
+    """
+    place = {name: number for number, name in enumerate((*INSTALLATIONS, *LONGEST))}
+    items.sort(key=lambda item: place.get(item.path.stem, len(place)))
+    for item in items:
+        group = "installations" if item.path.stem in INSTALLATIONS else str(item.path)
+        item.add_marker(pytest.mark.xdist_group(group))
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -146,7 +146,7 @@ class Mender:
         if stream.waiting:
             self._ask(Question(question.stream, stream.waiting.popleft()))
             return out
-        self._give_up(question.stream)
+        self._give_up(question.stream, answered=reply is not None)
         stream.asking = stream.full = False
         stream.tried.clear()
         while stream.held and not stream.asking:
@@ -286,8 +286,9 @@ class Mender:
         key.repaired += 1
         return [arrival]
 
-    def _give_up(self, stream: tuple[str, str]) -> None:
+    def _give_up(self, stream: tuple[str, str], answered: bool) -> None:
         """What the answers have not brought is lost."""
+        why = "their publisher has them no more" if answered else "nobody answered for them"
         for (device, name), key in self._keys.items():
             if (
                 device == stream[0]
@@ -296,12 +297,7 @@ class Mender:
             ):
                 lost = key.give_up()
                 if lost:
-                    log.warning(
-                        "%s/%s: %d messages are lost: their publisher has them no more",
-                        device,
-                        name,
-                        lost,
-                    )
+                    log.warning("%s/%s: %d messages are lost: %s", device, name, lost, why)
 
     def _release(self, stream: Stream) -> list[Arrival]:
         """Let go what is held, gaps and all."""

@@ -50,6 +50,19 @@ def test_who_has_a_password_cannot_guess_at_anothers_in_between(door: Door):
     assert waited > 60.0  # each guess costs twice as long as the one before
 
 
+def test_an_address_that_a_request_makes_up_is_not_believed(door: Door):
+    """No proxy of ours is set: each guess under another name, from another made up address."""
+    door.frozen = time.time()
+    with door.client() as client:
+        for number in range(200):
+            client.headers["x-forwarded-for"] = f"10.0.{number}.1"
+            client.headers["forwarded"] = f"for=10.0.{number}.1"
+            if sign_in(client, f"name{number}", "a guess") == 429:
+                break
+        else:
+            raise AssertionError("two hundred guesses from one address")
+
+
 def test_of_two_who_change_users_at_once_neither_is_lost(tmp_path):
     path, names = tmp_path / "users.json", [f"user-{number}" for number in range(4)]
     for name in ("removed", "demoted", *names):
