@@ -110,7 +110,8 @@ lint: dev
 	$(BIN)/ruff format --check .
 
 # clang-tidy over the core, its tests with the sanitizers, and its bits on aarch64: five to ten minutes.
-compilers: setup dev system-packages
+compilers: setup dev
+	@sh tests/support/system_packages.sh compilers
 	$(BIN)/python -m pytest -q -m compilers tests/inertial
 
 bench: setup dev

@@ -44,7 +44,7 @@ pytestmark = [
     pytest.mark.compilers,
     pytest.mark.skipif(
         bool(MISSING) and not os.environ.get("CI"),
-        reason=f"no {', '.join(MISSING)}: run make system-packages",
+        reason=f"no {', '.join(MISSING)}: run make compilers",
     ),
     pytest.mark.skipif(os.uname().machine != "x86_64", reason="the reference is x86-64"),
     pytest.mark.skipif(

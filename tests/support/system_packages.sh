@@ -1,5 +1,6 @@
 #!/bin/sh
 # Debian packages that the tests need, installed (as root) or named. Debian 12 and 13; elsewhere: the programs of the same names.
+# With the word compilers also what `make compilers` needs.
 set -eu
 
 missing=""
@@ -10,8 +11,10 @@ need g++ "g++ libc6-dev"
 need git git
 need arm-none-eabi-gcc gcc-arm-none-eabi
 need qemu-system-arm qemu-system-arm
-need aarch64-linux-gnu-g++ g++-aarch64-linux-gnu
-need qemu-aarch64 qemu-user
+if [ "${1:-}" = compilers ]; then
+  need aarch64-linux-gnu-g++ g++-aarch64-linux-gnu
+  need qemu-aarch64 qemu-user
+fi
 need clang-tidy clang-tidy
 need cppcheck cppcheck
 
