@@ -87,7 +87,7 @@ system-packages:
 
 # The browser draws in software and wants the machine for itself, so it comes after the others.
 test: setup dev system-packages site
-	$(BIN)/python -m pytest -n auto --dist loadgroup --no-loadscope-reorder -m "not browser and not faults and not cases and not zenohd and not compilers"
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "not browser and not faults and not cases and not zenohd and not compilers"
 	$(BIN)/python -m pytest -m browser
 
 # Every fault done to real processes; it writes the tables of docs/faults.md.

@@ -47,16 +47,25 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return True if "mark.browser" not in collection_path.read_text(encoding="utf-8") else None
 
 
-@pytest.hookimpl(tryfirst=True)  # before xdist writes the groups into the names
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What `pytest --dist loadgroup --no-loadscope-reorder` gives one worker, and in which order:
-    the tests of a file, and the installations as if they were one file.
-    """
+    """The order in which `pytest --dist loadfile --no-loadscope-reorder` hands files out."""
     place = {name: number for number, name in enumerate((*INSTALLATIONS, *LONGEST))}
     items.sort(key=lambda item: place.get(item.path.stem, len(place)))
-    for item in items:
-        group = "installations" if item.path.stem in INSTALLATIONS else str(item.path)
-        item.add_marker(pytest.mark.xdist_group(group))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object | None:
+    """`--dist loadfile`: the installations are as one file, for one worker."""
+    if config.option.dist != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class Scheduling(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = super()._split_scope(nodeid)
+            return "installations" if Path(file).stem in INSTALLATIONS else file
+
+    return Scheduling(config, log)
 
 
 @pytest.hookimpl(optionalhook=True)
