@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 import gyrofree.commands
 from gyrofree.commands.main import app
 
-ROUNDS = int(os.environ.get("GYROFREE_FUZZ_ROUNDS", "5"))  # of each command and file
+ROUNDS = int(os.environ.get("GYROFREE_FUZZ_ROUNDS", "3"))  # of each command and file
 SEED = os.environ.get("GYROFREE_FUZZ_SEED", "3")
 LONGEST_S = 30  # of one call, of the processor: a command that works for ever is a fault
 WAITS_S = 300  # of the clock: so is one that waits for ever
