@@ -30,9 +30,10 @@ DRIVE := $(if $(DATA),--data "$(DATA)")
 demo: setup $(if $(filter emulated,$(BOARD)),.make/board firmware)
 	@$(BIN)/gyrofree demo --source $(if $(filter emulated,$(BOARD)),emulated,$(SOURCE)) $(DRIVE) $(if $(OFFICE),--office) --speed $(SPEED) --port $(PORT) --bus-port $(BUS_PORT)
 
-# Packages come while the core compiles; neither needs the other.
+# Packages come while the core compiles; neither needs the other. For tests all that they want.
+ALSO := $(if $(filter test,$(MAKECMDGOALS)),.make/dev .make/site)
 setup: .make/tools
-	@$(MAKE) --no-print-directory --silent --output-sync=line -j2 BUILDS=$(BUILDS) .make/runtime .make/core
+	@$(MAKE) --no-print-directory --silent --output-sync=line -j3 BUILDS=$(BUILDS) .make/core .make/runtime $(ALSO)
 
 .make/venv:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed; this is $$($(PYTHON) --version). Name another: make PYTHON=python3.12"; exit 1; }
@@ -79,7 +80,8 @@ wheel: .make/tools
 
 dev: .make/dev .make/both-cores
 .make/dev: requirements/dev.txt .make/runtime
-	$(INSTALL) -r requirements/dev.txt
+	@echo "Installing what the tests need ..."
+	@$(INSTALL) --no-compile -r requirements/dev.txt
 	@touch $@
 
 system-packages:
