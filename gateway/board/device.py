@@ -202,7 +202,8 @@ class DeviceLink:
         now_ns = time.monotonic_ns()
         self._take_frames(self.decoder.wait(now_ns), now_ns)
         self.wall.follow()
-        self.watch.look(self.readers[0].connected, time.monotonic_ns())
+        board = self.readers[0]
+        self.watch.look(board.connected, time.monotonic_ns(), board.silent_s)
         if self.out.live:
             status = self.report.message(self.readers, self.queue.qsize())
             self.out.publish(LINK, status, 0, self.wall.now_ns())

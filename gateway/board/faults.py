@@ -103,9 +103,11 @@ class FaultWatch:
         """A HELLO of this boot."""
         self._hello = hello
 
-    def heard(self, now_s: float, utc_ns: int) -> None:
-        """A frame has come: how long was it silent?"""
-        if self._heard_s is not None and now_s - self._heard_s > SILENT_S:
+    def heard(self, now_s: float, utc_ns: int, late: bool = False) -> None:
+        """A frame has come: how long was it silent? late: the frame may have waited for this
+        process, and nothing is known of the line.
+        """
+        if not late and self._heard_s is not None and now_s - self._heard_s > SILENT_S:
             self._see(
                 "uart-stall",
                 f"the line was silent for {now_s - self._heard_s:.1f} s",
@@ -227,14 +229,15 @@ class FaultWatch:
         window_s: float,
         now_s: float,
         utc_ns: int,
+        silent_s: float | None = None,
     ) -> None:
-        """Once a second: what only the line shows. doubt_ppm: by how much the skew may be wrong."""
-        silent = self._heard_s is not None and now_s - self._heard_s > SILENT_S
-        if connected and silent:
-            text = (
-                f"the line is open and silent for {now_s - self._heard_s:.1f} s: has the board"
-                " stopped?"
-            )
+        """Once a second: what only the line shows. doubt_ppm: by how much the skew may be wrong;
+        silent_s: for how long the port was seen to have nothing, by the last frame if it is None.
+        """
+        if silent_s is None:
+            silent_s = 0.0 if self._heard_s is None else now_s - self._heard_s
+        if connected and self._heard_s is not None and silent_s > SILENT_S:
+            text = f"the line is open and silent for {silent_s:.1f} s: has the board stopped?"
             self._see("uart-stall", text, now_s, utc_ns, 1.5)
         if window_s >= SKEW_WINDOW_S and SKEW_PPM + doubt_ppm < abs(skew_ppm) < CRYSTAL_PPM:
             text = (

@@ -50,7 +50,7 @@ class FrameHandler:
             frame = frame._replace(t_us=t_us)
         self._late = late
         self._state.flags = frame.flags
-        self._watch.heard(received_ns)
+        self._watch.heard(received_ns, late)
         if not self._clock.started:  # later only from frames that leave with their last datum
             self._clock.add(frame.t_us, received_ns)
         match frame.payload:

@@ -27,9 +27,9 @@ class BoardWatch:
         self._state, self._clock, self._pps, self._wall, self._out = state, clock, pps, wall, out
         self._faults = FaultWatch()
 
-    def heard(self, received_ns: int) -> None:
-        """A frame has come."""
-        self._faults.heard(received_ns * 1e-9, self._wall.utc_ns(received_ns))
+    def heard(self, received_ns: int, late: bool = False) -> None:
+        """A frame has come. late: it may have waited for this process."""
+        self._faults.heard(received_ns * 1e-9, self._wall.utc_ns(received_ns), late)
 
     def stopped(self, seconds: float) -> None:
         """This process was stopped for so long: what was not heard meanwhile is not the board's
@@ -55,15 +55,17 @@ class BoardWatch:
             self._faults.status(payload, received_ns * 1e-9, self._wall.utc_ns(received_ns))
         self._publish(received_ns, device_us)
 
-    def look(self, connected: bool, now_ns: int) -> None:
-        """Once a second: faults that only the line shows, and the news of them."""
+    def look(self, connected: bool, now_ns: int, silent_s: float | None = None) -> None:
+        """Once a second: faults that only the line shows, and the news of them. silent_s: the
+        reader's, for how long the port was seen to have nothing.
+        """
         by_pulses = self._pps.span_s >= PPS_ENOUGH_S
         skew = self._pps.skew_ppm if by_pulses else self._clock.skew_ppm
         window = SKEW_WINDOW_S if by_pulses else self._clock.span_s
         # half the scatter, end to end
         doubt = 0.0 if by_pulses else 0.5e6 * self._clock.residual_s / max(window, 1.0)
         utc_ns = self._wall.utc_ns(now_ns)
-        self._faults.line(connected, skew, doubt, window, now_ns * 1e-9, utc_ns)
+        self._faults.line(connected, skew, doubt, window, now_ns * 1e-9, utc_ns, silent_s)
         self.tell_news(self._clock.device_us(now_ns), now_ns)
 
     def tell_news(self, device_us: int, now_ns: int) -> None:

@@ -21,10 +21,10 @@ log = logging.getLogger(__name__)
 
 FIRST_RETRY_S = 0.1
 LAST_RETRY_S = 2.0
-LOOK_MS = 500  # a silent port is looked at so often, so that silence is told from being stopped
+LOOK_MS = 200  # a silent port is looked at so often, so that silence is told from being stopped
 HOLD_S = 0.02
 OPEN_S = 20.0  # that a port may take to be opened: over a network it has a conversation first
-STOPPED_NS = 1_500_000_000  # between two looks: this process was stopped, or got no processor
+STOPPED_NS = 450_000_000  # between two looks: this process was stopped, or got no processor
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +59,7 @@ class Reader:
         self.reconnects = 0
         self.held = 0  # times that reading waited, as more came than can be decoded
         self.held_at: float | None = None  # s, monotonic, of the last one
+        self._came_ns = self._empty_ns = 0  # last bytes, and the last look that found none
         self._rate = LINE_BYTES_S * max(1.0, time_scale)
         self._opened = 0
         self._channel = channel
@@ -78,6 +79,11 @@ class Reader:
         self._thread.join()
         os.close(self._wake_in)
         os.close(self._wake_out)
+
+    @property
+    def silent_s(self) -> float:
+        """For how long nothing came that is known: to the last look at the port that found none."""
+        return max(0, self._empty_ns - self._came_ns) * 1e-9
 
     def write(self, data: bytes) -> None:
         """Send to the board; raises PortError when the port is not open or does not take it."""
@@ -146,6 +152,7 @@ class Reader:
         poller = select.poll()
         poller.register(port.fileno(), select.POLLIN)
         poller.register(self._wake_out, select.POLLIN)
+        self._came_ns = time.monotonic_ns()
         looked, late, pace = time.monotonic_ns(), False, Pace(self._rate)
         while not self._stop.is_set():
             loop.turn()
@@ -162,7 +169,10 @@ class Reader:
             now = time.monotonic_ns()
             late, looked = late or now - looked > STOPPED_NS, now
             data = port.read() if ready else b""
+            if not ready:
+                self._empty_ns = now
             if data:
+                self._came_ns = time.monotonic_ns()
                 self._take(data, time.monotonic_ns(), time.time_ns(), late)
             if not port.is_file and (wait_s := pace.wait_s(len(data))) > 0.0:
                 self._hold(wait_s)

@@ -89,7 +89,11 @@ def gateway(folder: Path, hours: float, done: Any) -> None:
     settings = GatewaySettings(journal=folder, journal_bytes=KEPT_BYTES, published_bytes=KEPT_BYTES)
     link = DeviceLink(DeviceSettings(name=DEVICE, port="none"), settings)
     link.out.direct(Publishers(None, "p", link.spool).put)
-    link.readers = [SimpleNamespace(connected=True, message="", reconnects=0, held=0, held_at=None)]
+    link.readers = [
+        SimpleNamespace(
+            connected=True, message="", reconnects=0, held=0, held_at=None, silent_s=0.0
+        )
+    ]
     begin_ns, t_s = time.monotonic_ns(), [0.0]
 
     def write(data: bytes) -> bool:

@@ -32,7 +32,9 @@ class Board:
         settings = GatewaySettings(journal=folder)
         self.link = DeviceLink(DeviceSettings(name="cube", port="file:///none"), settings)
         self.link.readers = [
-            SimpleNamespace(connected=True, message="", reconnects=0, held=0, held_at=None)
+            SimpleNamespace(
+                connected=True, message="", reconnects=0, held=0, held_at=None, silent_s=0.0
+            )
         ]
         self.out = []
         self.link.out.direct(lambda topic, device, message: self.out.append((topic, message)))

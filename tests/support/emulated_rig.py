@@ -26,7 +26,7 @@ SLICE_S = 0.01
 class HostPort:
     """What a gateway has of an open port: it writes into the board's receiver."""
 
-    connected, message, reconnects = True, "", 0
+    connected, message, reconnects, silent_s = True, "", 0, 0.0
 
     def __init__(self, board: Board) -> None:
         self._board = board

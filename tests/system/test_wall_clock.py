@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import time
 
@@ -53,7 +54,10 @@ def test_a_session_over_a_clock_that_is_set_and_a_gateway_that_is_stopped(tmp_pa
         assert STOPPED_S - 0.5 < links[-1].stopped_s < STOPPED_S + 30.0
         assert "this gateway's process was stopped" in links[-1].message
         stalls = [f.text for m in boards for f in m.faults if f.name == "uart-stall"]
-        assert not any("silent" in text for text in stalls)
+        # That the gateway was stopped is not the line's silence; the board's own process, on a busy
+        # machine, may have a moment of it.
+        silences = [float(s) for text in stalls for s in re.findall(r"silent for ([\d.]+)", text)]
+        assert max(silences, default=0.0) < STOPPED_S / 2, stalls
         session.close()
         del keep
     # every stamp lies before the moment it was heard, and none is later than it can be by its sigma
