@@ -11,50 +11,49 @@ from typer.core import TyperGroup
 
 from gyrofree.commands.parser import Commands, run_main
 
-HERE = "gyrofree.commands"
-PLACES = {
-    "export": f"{HERE}.handover:export",
-    "report": f"{HERE}.handover:report",
-    "import": f"{HERE}.handover:import_log",
-    "rerun": f"{HERE}.handover:rerun",
-    "reprocess": f"{HERE}.reprocess:reprocess",
-    "run": f"{HERE}.run:run",
-    "board": f"{HERE}.board:board",
-    "demo": f"{HERE}.demo:demo",
-    "setup": f"{HERE}.installation.setup:setup",
-    "up": f"{HERE}.installation.up:up",
-    "router": f"{HERE}.services:router",
-    "gateway": f"{HERE}.services:gateway",
-    "estimator": f"{HERE}.services:estimator",
-    "record": f"{HERE}.services:record",
-    "procedures": f"{HERE}.services:procedures",
-    "dashboard": f"{HERE}.services:dashboard",
-    "simulate": f"{HERE}.simulate:simulate",
-    "play": f"{HERE}.demo:play",
-    "replay": f"{HERE}.replay:replay",
-    "doctor": f"{HERE}.installation.doctor:doctor",
-    "log-level": f"{HERE}.installation.log_level:log_level",
-    "backup": f"{HERE}.installation.backup:backup",
-    "restore": f"{HERE}.installation.backup:restore",
-    "orders": f"{HERE}.installation.orders:orders",
-    "completion": f"{HERE}.installation.completion:completion",
-    "users": f"{HERE}.users:app",
-    "alarms": f"{HERE}.installation.alarms:app",
-    "config": f"{HERE}.installation.config:app",
-    "site": f"{HERE}.installation.site:app",
-    "certs": f"{HERE}.installation.certs:app",
-    "layout": f"{HERE}.layout:app",
-    "sessions": f"{HERE}.sessions:app",
-    "procedure": f"{HERE}.procedure:app",
-    "calibrate": f"{HERE}.calibrate:app",
-    "reproduce": f"{HERE}.run:app",
+PLACES = {  # module of gyrofree.commands, and what is in it: a function or a typer app
+    "export": "handover:export",
+    "report": "handover:report",
+    "import": "handover:import_log",
+    "rerun": "handover:rerun",
+    "reprocess": "reprocess:reprocess",
+    "run": "run:run",
+    "board": "board:board",
+    "demo": "demo:demo",
+    "setup": "installation.setup:setup",
+    "up": "installation.up:up",
+    "router": "services:router",
+    "gateway": "services:gateway",
+    "estimator": "services:estimator",
+    "record": "services:record",
+    "procedures": "services:procedures",
+    "dashboard": "services:dashboard",
+    "simulate": "simulate:simulate",
+    "play": "demo:play",
+    "replay": "replay:replay",
+    "doctor": "installation.doctor:doctor",
+    "log-level": "installation.log_level:log_level",
+    "backup": "installation.backup:backup",
+    "restore": "installation.backup:restore",
+    "orders": "installation.orders:orders",
+    "completion": "installation.completion:completion",
+    "users": "users:app",
+    "alarms": "installation.alarms:app",
+    "config": "installation.config:app",
+    "site": "installation.site:app",
+    "certs": "installation.certs:app",
+    "layout": "layout:app",
+    "sessions": "sessions:app",
+    "procedure": "procedure:app",
+    "calibrate": "calibrate:app",
+    "reproduce": "run:app",
 }
 
 LOOK = {"add_completion": False, "rich_markup_mode": None, "pretty_exceptions_enable": False}
 
 
 class OnDemand(Mapping[str, Any]):
-    """Commands by name; the places are `module:attribute` of a function or of a typer app."""
+    """Commands by name, made of what stands at their places."""
 
     def __init__(self, places: dict[str, str]) -> None:
         self._places, self._made = places, dict[str, Any]()
@@ -73,7 +72,7 @@ class OnDemand(Mapping[str, Any]):
     @staticmethod
     def _make(name: str, place: str) -> Any:
         module, _, attribute = place.partition(":")
-        found = getattr(importlib.import_module(module), attribute)
+        found = getattr(importlib.import_module(f"gyrofree.commands.{module}"), attribute)
         alone = Commands(**LOOK)
         alone.callback()(lambda: None)  # or a typer of one command is that command
         if isinstance(found, typer.Typer):
@@ -83,21 +82,18 @@ class OnDemand(Mapping[str, Any]):
         return typer.main.get_group(alone).commands[name]
 
 
-def group_of(places: dict[str, str]) -> type[TyperGroup]:
-    """The class of a group with these commands."""
-    commands = OnDemand(places)
+COMMANDS = OnDemand(PLACES)
 
-    class Group(TyperGroup):
-        """Its commands are at their places."""
 
-        def __init__(self, **settings: Any) -> None:
-            super().__init__(**settings | {"commands": commands})
+class Root(TyperGroup):
+    """All commands."""
 
-    return Group
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings | {"commands": COMMANDS})
 
 
 app = Commands(
-    cls=group_of(PLACES),
+    cls=Root,
     no_args_is_help=True,
     help=(
         "Bench and remote eye for inertial units without gyroscopes.\n\n"
