@@ -203,7 +203,6 @@ def answered(anna, button) -> None:
         return True
 
     until(over, "the recording has not ended")
-    expect(button).to_have_text("Record", timeout=PATIENCE)
 
 
 def test_recording_is_started_stopped_downloaded_and_replayed(anna, tmp_path):
@@ -215,6 +214,7 @@ def test_recording_is_started_stopped_downloaded_and_replayed(anna, tmp_path):
         expect(button).to_contain_text("Really stop", timeout=PATIENCE)
         assert anna.api("recording")[1]["recording"], "one click ended a recording"
         answered(anna, button)
+    expect(button).to_have_text("Record", timeout=PATIENCE)
     page.fill("#session", "Table, second run")
     button.click()
     expect(button).to_contain_text("Stop", timeout=PATIENCE)
@@ -224,6 +224,7 @@ def test_recording_is_started_stopped_downloaded_and_replayed(anna, tmp_path):
     button.click()
     expect(button).to_contain_text("Really stop", timeout=PATIENCE)
     answered(anna, button)
+    expect(button).to_have_text("Record", timeout=PATIENCE)
 
     page.goto(f"{anna.demo.url}/sessions")
     page.set_viewport_size(DESKTOP)
