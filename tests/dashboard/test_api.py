@@ -28,7 +28,7 @@ from sessions.recording.settings import RecorderSettings
 
 @pytest.fixture(scope="module")
 def door(tmp_path_factory):
-    with open_door(tmp_path_factory.mktemp("door"), scene=False, body_timeout_s=1.0) as opened:
+    with open_door(tmp_path_factory.mktemp("door"), scene=False, body_timeout_s=3.0) as opened:
         yield opened
 
 

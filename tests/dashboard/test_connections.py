@@ -91,7 +91,7 @@ def test_many_addresses_together_do_not_lock_anybody_out(patient):
 
 
 def test_what_asks_nothing_is_ended_and_what_works_is_not(tmp_path):
-    with open_door(tmp_path, request_s=1.5, body_timeout_s=1.0) as door:
+    with open_door(tmp_path, request_s=4.0, body_timeout_s=2.0) as door:
         with (
             door.client("otto") as client,
             sockets(door, 3, "127.0.0.2") as silent,
@@ -170,7 +170,7 @@ def test_who_takes_nothing_of_an_answer_is_ended_and_who_takes_little_is_not(tmp
 def test_a_connection_that_goes_on_asking_is_not_idle(tmp_path):
     """However short its requests are, between which everybody looks at it."""
     ask = HEAD + b"\r\n"
-    with open_door(tmp_path, request_s=1.0) as door, sockets(door, 1, "127.0.0.2") as (link,):
+    with open_door(tmp_path, request_s=4.0) as door, sockets(door, 1, "127.0.0.2") as (link,):
         link.settimeout(5.0)
         for _ in range(40):
             link.sendall(ask)
@@ -179,7 +179,7 @@ def test_a_connection_that_goes_on_asking_is_not_idle(tmp_path):
                 part = link.recv(65536)
                 assert part, "it was ended"
                 answer += part
-            time.sleep(0.08)
+            time.sleep(0.12)
 
 
 def test_a_head_without_an_end_is_refused(patient):

@@ -51,8 +51,9 @@ def test_a_record_is_one_line_of_json_whatever_is_in_it(text, fields, wrong):
 def test_a_level_holds_for_its_time_and_the_last_order_counts():
     logger = logging.Logger("own", logging.INFO)
     level = LogLevel(logger)
-    level.set("debug", 0.05, "ann")
+    level.set("debug", 60.0, "ann")
     assert level.name == "debug"
+    level.set("debug", 0.05, "ann")
     end = time.monotonic() + 20.0
     while level.name != "info":
         assert time.monotonic() < end
