@@ -70,8 +70,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object | 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """`-n auto`: one more than there are cores, since many tests wait for processes of theirs."""
-    return len(os.sched_getaffinity(0)) + 1
+    """`-n auto`: two more than there are cores, since many tests wait for processes of theirs."""
+    return len(os.sched_getaffinity(0)) + 2
 
 
 @pytest.fixture(scope="session")
