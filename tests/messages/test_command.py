@@ -190,7 +190,7 @@ def test_one_commands_others_are_refused_by_name_and_everybody_may_stop(site):
         "otto (lab) gave it to anna (office)",
         "root (office) took it from anna (office), as admin",
     ]
-    # orders of two places may be heard of in either order: they stand by their own time
+    # of two places they may be heard of in either order (docs/command.md)
     rows = [r for r in rows if r.whom != "who keeps the command"]
     rows.sort(key=lambda r: r.at_utc_ns)
     said = [(r.user, r.place, r.what, r.outcome, r.seconds >= 0.0) for r in rows]
