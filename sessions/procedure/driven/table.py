@@ -1,20 +1,16 @@
 """Rate tables: what a procedure asks of one, and one that takes text commands over a line."""
 
-import fcntl
 import math
 import re
 import threading
-import time
 from typing import Protocol
 
 import serial
 
 from sessions.procedure.driven.description import Description, TableError
 from sessions.procedure.driven.guard import HANGS_S, Guard
+from sessions.procedure.driven.line import LONGEST, Patience, drain, opened, send
 
-LONGEST = 4096  # bytes of one reply
-DRAIN_S = 0.2
-BUSY_S = 3.0  # that a line may be held by another
 PER_UNIT = {"deg/s": math.pi / 180.0, "rad/s": 1.0, "rpm": 2.0 * math.pi / 60.0}  # rad/s
 
 
@@ -225,60 +221,30 @@ class TextTable:
                 raise TableError(f"{self.name} on {self._port}: {why}") from None
 
     def _talk(self, command: str, answered: bool) -> str:
-        line, end = self._open(), self._said.terminator.encode()
-        _drain(line)
-        line.write(command.encode() + end)
+        line, end, limit_s = self._open(), self._said.terminator.encode(), self._said.timeout_s
+        drain(line)
+        send(line, command.encode() + end, limit_s)
         if not answered:
             return ""
-        until, told = time.monotonic() + self._said.timeout_s, b""
+        patience, told = Patience(limit_s), b""
         while not told.endswith(end):
             if self._hurry.is_set():
                 raise TableError(f"{self.name}: {command!r} was given up for a stop")
-            # an answer that came while this process was held up is one
-            over = time.monotonic() > until and not line.in_waiting
-            if over or len(told) >= LONGEST:
+            if patience.over() or len(told) >= LONGEST:
                 heard = repr(told[:80].decode(errors="replace")) if told else "nothing"
                 raise TableError(
                     f"{self.name} on {self._port}: {command!r} was answered by {heard} within "
-                    f"{self._said.timeout_s:g} s"
+                    f"{limit_s:g} s"
                 )
             told += line.read(1)
         return told.decode(errors="replace").strip()
 
     def _open(self) -> serial.SerialBase:
         if self._line is None:
-            url = self._port.replace("tcp://", "socket://", 1)
-            self._line = serial.serial_for_url(
-                url, baudrate=self._said.baud, timeout=0.1, write_timeout=self._said.timeout_s
-            )
-            _alone(self._line)
+            self._line = opened(self._port, self._said.baud)
         return self._line
 
     def _close(self) -> None:
         if self._line is not None:
             self._line.close()
             self._line = None
-
-
-def _alone(line: serial.SerialBase) -> None:
-    """Have a line to oneself: who is about to leave it, as the guard after a stop, still gets its
-    answer and takes none of ours. One that hangs is not waited for long: a stop must get through.
-    """
-    until = time.monotonic() + BUSY_S
-    while isinstance(line, serial.Serial) and time.monotonic() < until:
-        try:
-            fcntl.flock(line.fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            time.sleep(0.02)
-        else:
-            return
-
-
-def _drain(line: serial.SerialBase) -> None:
-    """Forget what was said before, but not for ever where somebody pours."""
-    if isinstance(line, serial.Serial):
-        line.reset_input_buffer()
-        return
-    until = time.monotonic() + DRAIN_S
-    while line.in_waiting and time.monotonic() < until:
-        line.read(LONGEST)
