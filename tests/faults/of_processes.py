@@ -8,6 +8,7 @@ from support.one_thread import held
 from faults.account import Account
 from faults.bench import Bench
 from faults.scenario import Alarmed, Certified, Line, Loss, Scenario, Status, Word
+from messages.bus.pulse import MOST_S
 
 RESTARTED = "{} ended by signal SIGKILL: starting it again"
 
@@ -85,7 +86,7 @@ def stop_supervisor(bench: Bench) -> None:
     """It has no session on the bus; one of its children beats for it."""
     up = bench.supervisor
     up.suspend()
-    time.sleep(5.0)
+    time.sleep(MOST_S + 3.0)  # a turn of it may take so long
     up.resume()
 
 
@@ -148,8 +149,8 @@ PROCESSES = (
     stands("dashboard", "dashboard"),
     stands("router", "router"),
     Scenario(
-        "up stopped for 5 s",
-        "SIGSTOP of the supervisor, SIGCONT after 5 s",
+        f"up stopped for {MOST_S + 3.0:g} s",
+        f"SIGSTOP of the supervisor, SIGCONT after {MOST_S + 3.0:g} s",
         stop_supervisor,
         said=(alarm("up"),),
     ),

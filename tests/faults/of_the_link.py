@@ -90,6 +90,7 @@ def spoil(bench: FarBench) -> None:
     bench.kill("office", "site")
 
 
+# Back within a second or two: whether its alarm comes first goes by the machine.
 RESTARTED = Line("site ended by signal SIGKILL: starting it again")
 
 LINK = (
@@ -154,19 +155,19 @@ LINK = (
         "who serves copies killed",
         "`kill -9` of the lab's `site serve`",
         lambda bench: bench.kill("lab", "site"),
-        said=(RESTARTED, Alarmed("service-lab-authority")),
+        said=(RESTARTED,),
     ),
     copying(
         "who copies killed",
         "`kill -9` of the office's `site serve`",
         lambda bench: bench.kill("office", "site"),
-        said=(RESTARTED, Alarmed("service-office-authority")),
+        said=(RESTARTED,),
     ),
     copying(
         "half a copy spoilt",
         "a bit of what is on the office's disk is turned and its `site serve` killed",
         spoil,
-        said=(RESTARTED, Alarmed("service-office-authority")),
+        said=(RESTARTED,),
     ),
     copying(
         "disk of the office full",
