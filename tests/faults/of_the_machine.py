@@ -1,6 +1,7 @@
 """Faults of what a machine gives its processes: memory, files, and journals that it damages."""
 
 import contextlib
+import itertools
 import os
 import resource
 import signal
@@ -54,13 +55,19 @@ def out_of_memory(bench: Bench, service: str) -> None:
     bench.until(lambda: service in bench.children(), f"another {service}")
 
 
+def lowest_free(process: psutil.Process) -> int:
+    """The number that its next file would have; one that has closed some has gaps."""
+    used = {int(entry.name) for entry in Path(f"/proc/{process.pid}/fd").iterdir()}
+    return next(number for number in itertools.count() if number not in used)
+
+
 def no_more_files(bench: Bench) -> None:
     """No process may open one, neither file nor connection; the page is asked meanwhile."""
     before: list[tuple[psutil.Process, tuple[int, int]]] = []
     for service in SERVICES:
         for process in bench.processes(service):
             limits = process.rlimit(resource.RLIMIT_NOFILE)
-            process.rlimit(resource.RLIMIT_NOFILE, (process.num_fds(), limits[1]))
+            process.rlimit(resource.RLIMIT_NOFILE, (lowest_free(process), limits[1]))
             before.append((process, limits))
     try:
         end = time.monotonic() + SHUT_S
