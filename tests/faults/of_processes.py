@@ -10,6 +10,7 @@ from faults.bench import Bench
 from faults.scenario import Alarmed, Certified, Line, Loss, Scenario, Status, Word
 from messages.bus.pulse import MOST_S
 
+STOPPED_S = MOST_S + 3.0  # longer than a turn of the supervisor may take
 RESTARTED = "{} ended by signal SIGKILL: starting it again"
 
 
@@ -86,7 +87,7 @@ def stop_supervisor(bench: Bench) -> None:
     """It has no session on the bus; one of its children beats for it."""
     up = bench.supervisor
     up.suspend()
-    time.sleep(MOST_S + 3.0)  # a turn of it may take so long
+    time.sleep(STOPPED_S)
     up.resume()
 
 
@@ -149,8 +150,8 @@ PROCESSES = (
     stands("dashboard", "dashboard"),
     stands("router", "router"),
     Scenario(
-        f"up stopped for {MOST_S + 3.0:g} s",
-        f"SIGSTOP of the supervisor, SIGCONT after {MOST_S + 3.0:g} s",
+        f"up stopped for {STOPPED_S:g} s",
+        f"SIGSTOP of the supervisor, SIGCONT after {STOPPED_S:g} s",
         stop_supervisor,
         said=(alarm("up"),),
     ),
